@@ -1,0 +1,93 @@
+#include "src/core/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+namespace gapscope {
+namespace {
+
+Error SystemError(const char* what, const std::string& path) {
+  return Error{.what = what, .where = path, .actual = std::strerror(errno), .allowed = "", .cure = ""};
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+}  // namespace
+
+Result<std::string> ReadFile(const std::string& path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) return SystemError("cannot open the file", path);
+  struct stat info {};
+  if (fstat(file.get(), &info) != 0) return SystemError("cannot read the file", path);
+  if (S_ISDIR(info.st_mode)) {
+    return Error{.what = "cannot read the file", .where = path, .actual = "a folder", .allowed = "a regular file",
+                 .cure = "name a file in it"};
+  }
+  std::string bytes;
+  bytes.resize(info.st_size > 0 ? static_cast<std::size_t>(info.st_size) : 1 << 16);
+  std::size_t used = 0;
+  while (true) {
+    if (used == bytes.size()) {
+      char extra;
+      const ssize_t more = read(file.get(), &extra, 1);
+      if (more < 0) return SystemError("cannot read the file", path);
+      if (more == 0) break;
+      bytes.resize(bytes.size() * 2);
+      bytes[used++] = extra;
+      continue;
+    }
+    const ssize_t got = read(file.get(), bytes.data() + used, bytes.size() - used);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return SystemError("cannot read the file", path);
+    if (got == 0) break;
+    used += static_cast<std::size_t>(got);
+  }
+  bytes.resize(used);
+  return bytes;
+}
+
+Status WriteFile(const std::string& path, std::string_view bytes) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  std::error_code failure;
+  if (!folder.empty()) std::filesystem::create_directories(folder, failure);
+  std::string temporary = path + ".XXXXXX";
+  const Descriptor file(mkstemp(temporary.data()));
+  if (file.get() < 0) return SystemError("cannot write the file", path);
+  fchmod(file.get(), 0644);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t put = write(file.get(), bytes.data() + done, bytes.size() - done);
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) {
+      const Error error = SystemError("cannot write the file", path);
+      unlink(temporary.c_str());
+      return error;
+    }
+    done += static_cast<std::size_t>(put);
+  }
+  if (rename(temporary.c_str(), path.c_str()) != 0) {
+    const Error error = SystemError("cannot rename the finished file to its place", path);
+    unlink(temporary.c_str());
+    return error;
+  }
+  return Ok();
+}
+
+}  // namespace gapscope

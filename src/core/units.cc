@@ -1,0 +1,68 @@
+#include "src/core/units.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <map>
+#include <vector>
+
+namespace gapscope {
+namespace {
+
+const std::map<std::string, Unit, std::less<>>& Table() {
+  constexpr double kDeg = std::numbers::pi / 180;
+  constexpr double kRpm = 2 * std::numbers::pi / 60;
+  static const std::map<std::string, Unit, std::less<>> table = {
+      {"1", {"1", 1}},          {"%", {"1", 0.01}},
+      {"s", {"s", 1}},          {"ms", {"s", 1e-3}},        {"us", {"s", 1e-6}},       {"ns", {"s", 1e-9}},
+      {"rad", {"rad", 1}},      {"mrad", {"rad", 1e-3}},    {"deg", {"rad", kDeg}},    {"rev", {"rad", 360 * kDeg}},
+      {"rad/s", {"rad/s", 1}},  {"deg/s", {"rad/s", kDeg}}, {"rpm", {"rad/s", kRpm}},  {"rev/s", {"rad/s", 60 * kRpm}},
+      {"rad/s^2", {"rad/s^2", 1}},
+      {"V", {"V", 1}},          {"mV", {"V", 1e-3}},        {"dV", {"V", 0.1}},
+      {"A", {"A", 1}},          {"mA", {"A", 1e-3}},
+      {"N m", {"N m", 1}},      {"Nm", {"N m", 1}},         {"mN m", {"N m", 1e-3}},   {"mNm", {"N m", 1e-3}},
+      {"m", {"m", 1}},          {"mm", {"m", 1e-3}},        {"m/s", {"m/s", 1}},       {"N", {"N", 1}},
+      {"kg", {"kg", 1}},        {"g", {"kg", 1e-3}},        {"ohm", {"ohm", 1}},       {"degC", {"degC", 1}},
+  };
+  return table;
+}
+
+}  // namespace
+
+std::size_t EditDistance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      const bool same = std::tolower(static_cast<unsigned char>(a[i - 1])) ==
+                        std::tolower(static_cast<unsigned char>(b[j - 1]));
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (same ? 0 : 1)});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
+
+Result<Unit> ParseUnit(std::string_view text) {
+  if (const auto found = Table().find(text); found != Table().end()) return found->second;
+  // "counts/2048": an encoder of 2048 counts per revolution.
+  if (constexpr std::string_view kCounts = "counts/"; text.starts_with(kCounts)) {
+    const double per_rev = std::strtod(std::string(text.substr(kCounts.size())).c_str(), nullptr);
+    if (std::isfinite(per_rev) && per_rev >= 1) return Unit{"rad", 2 * std::numbers::pi / per_rev};
+  }
+  std::vector<std::string> names;
+  for (const auto& [name, unit] : Table()) names.push_back(name);
+  const std::string nearest = Nearest(text, names);
+  std::string allowed;
+  for (const auto& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
+  return Error{.what = "unknown unit", .where = "", .actual = "'" + std::string(text) + "'",
+               .allowed = allowed + ", counts/<per revolution>",
+               .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+}
+
+}  // namespace gapscope

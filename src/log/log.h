@@ -1,0 +1,65 @@
+// A hardware log as it stands in its file: a table of columns in the file's own units, and the header's values.
+// Nothing has been converted, repaired or dropped; src/log/timeline.h does that, by named policies, and counts it.
+#ifndef GAPSCOPE_LOG_LOG_H_
+#define GAPSCOPE_LOG_LOG_H_
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "src/core/result.h"
+
+namespace gapscope {
+
+// One column; rows without a value hold NaN. All columns of a log have the same number of rows.
+struct Column {
+  std::string name;  // as in the file, blanks trimmed
+  std::string unit;  // as the file states it ("V" of "voltage [V]"), empty when it does not
+  std::vector<double> values;
+};
+
+// Something that was noticed or repaired while reading: never silent, always counted.
+struct Finding {
+  std::string kind;    // "missing", "repeated_stamp", "time_reversal", "gap", "saturation", "wrap", ...
+  std::string column;  // empty: the whole row
+  std::size_t count = 0;
+  std::size_t first_row = 0;  // row index of the first one, 0-based
+  std::string text;           // one sentence for the user, saying what was done about it
+};
+
+struct Log {
+  std::string path;
+  std::string format;  // "csv" or "bam_json"
+  std::vector<Column> columns;
+  std::map<std::string, double> header;            // numbers of the header, by name
+  std::map<std::string, std::string> header_text;  // texts of the header, by name
+  std::vector<Finding> findings;
+
+  std::size_t rows() const { return columns.empty() ? 0 : columns.front().values.size(); }
+  // The column of that name, or null. The first one when the file repeats a name (reported as a finding).
+  const Column* Find(std::string_view name) const;
+  std::vector<std::string> ColumnNames() const;
+};
+
+enum class LogFormat { kAuto, kCsv, kBamJson };
+
+// A second file that belongs to the log and is paired with it row by row: its path is the log's path with the last
+// `find` in its file name replaced by `replace`; its columns are named `prefix` + name.
+struct Companion {
+  std::string find, replace, prefix;
+};
+
+struct ReadOptions {
+  LogFormat format = LogFormat::kAuto;
+  std::vector<Companion> companions;
+};
+
+// Reads a log. Errors name file and line (and column): absent, empty, binary, no header, wrong number of fields, not a
+// number, unterminated quote, invalid JSON, unequal companion, more than 10^9 values.
+Result<Log> ReadLog(const std::string& path, const ReadOptions& options);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_LOG_LOG_H_

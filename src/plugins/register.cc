@@ -1,0 +1,16 @@
+// Registers every gapscope plugin when the library is loaded.
+#include <mujoco/mujoco.h>
+
+namespace gapscope::plugins {
+void RegisterMotor();
+void RegisterFriction();
+void RegisterSpring();
+void RegisterEncoder();
+}  // namespace gapscope::plugins
+
+mjPLUGIN_LIB_INIT(gapscope) {
+  gapscope::plugins::RegisterMotor();
+  gapscope::plugins::RegisterFriction();
+  gapscope::plugins::RegisterSpring();
+  gapscope::plugins::RegisterEncoder();
+}

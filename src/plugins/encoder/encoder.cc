@@ -1,0 +1,3 @@
+namespace gapscope::plugins {
+void RegisterEncoder() {}
+}  // namespace gapscope::plugins

@@ -1,0 +1,3 @@
+namespace gapscope::plugins {
+void RegisterFriction() {}
+}  // namespace gapscope::plugins

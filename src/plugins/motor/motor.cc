@@ -1,0 +1,3 @@
+namespace gapscope::plugins {
+void RegisterMotor() {}
+}  // namespace gapscope::plugins

@@ -1,0 +1,3 @@
+namespace gapscope::plugins {
+void RegisterSpring() {}
+}  // namespace gapscope::plugins

@@ -12,7 +12,7 @@ namespace gapscope {
 namespace {
 
 Error SystemError(const char* what, const std::string& path) {
-  return Error{.what = what, .where = path, .actual = std::strerror(errno), .allowed = "", .cure = ""};
+  return Error{.what = what, .where = path, .actual = std::strerror(errno)};
 }
 
 class Descriptor {

@@ -60,7 +60,7 @@ Result<Unit> ParseUnit(std::string_view text) {
   const std::string nearest = Nearest(text, names);
   std::string allowed;
   for (const auto& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
-  return Error{.what = "unknown unit", .where = "", .actual = "'" + std::string(text) + "'",
+  return Error{.what = "unknown unit", .actual = "'" + std::string(text) + "'",
                .allowed = allowed + ", counts/<per revolution>",
                .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
 }

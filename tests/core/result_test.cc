@@ -18,7 +18,7 @@ TEST(ErrorTest, TextNamesWhereWhatActualAllowedCure) {
 }
 
 TEST(ResultTest, ValueOfAnErrorThrows) {
-  const Result<int> result = Error{.what = "no", .where = "", .actual = "", .allowed = "", .cure = ""};
+  const Result<int> result = Error{.what = "no"};
   EXPECT_FALSE(result.ok());
   EXPECT_THROW((void)result.value(), std::logic_error);
 }

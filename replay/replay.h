@@ -1,0 +1,68 @@
+// Logs replayed through a model: free run or windows, on several threads, the same bytes for any number of them.
+#ifndef GAPSCOPE_REPLAY_REPLAY_H_
+#define GAPSCOPE_REPLAY_REPLAY_H_
+
+#include <string>
+#include <vector>
+
+#include "replay/simulator.h"
+#include "src/core/thread_pool.h"
+
+namespace gapscope {
+
+struct ReplayOptions {
+  ReplayMode mode = ReplayMode::kFreeRun;
+  double window_s = 1.0;         // kWindows: length; windows follow each other without overlap
+  double time_step_s = 0;        // 0: chosen (see ChooseTimeStep)
+  std::vector<double> values;    // parameters, as model.Nominal(); empty: nominal
+};
+
+// Measured and predicted on the recording's stamps.
+struct SignalTrace {
+  std::string signal;
+  SignalKind kind = SignalKind::kPosition;
+  bool scored = true;
+  double resolution = 0;
+  std::vector<double> measured, predicted;  // predicted: NaN where not simulated, or at a window's first row
+};
+
+struct LogReplay {
+  std::string log_path;
+  Outcome outcome = Outcome::kCompleted;
+  double diverged_at_s = 0;
+  std::size_t windows = 0, diverged_windows = 0;
+  std::vector<double> time_s;
+  std::vector<SignalTrace> signals;
+};
+
+struct ReplayResult {
+  ReplayMode mode = ReplayMode::kFreeRun;
+  double time_step_s = 0;
+  double time_step_error = 0;  // change of the combined error when the step is halved
+  std::vector<LogReplay> logs;
+  double wall_s = 0, simulated_s = 0;
+  std::size_t steps = 0;
+};
+
+// The windows of a recording: one for a free run; else windows of `window_s`, the last one at least half as long.
+std::vector<Window> MakeWindows(const Recording& recording, ReplayMode mode, double window_s);
+
+ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool);
+
+// The largest step, of the model's own halved up to five times, whose halving changes the combined error by less than 1 % of it.
+struct TimeStep {
+  double step_s = 0;
+  double error_change = 0;  // of the combined error
+};
+TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool);
+
+// Root mean square over scored signals of (RMSE / standard deviation of the measured signal), then over logs; NaN rows are left out, a log that
+// diverged gives infinity.
+double ReplayError(const std::vector<LogReplay>& logs);
+
+// Largest torque, angle, speed and command on each joint and actuator over the recordings, from a nominal free run: the rig's own size.
+ScaleTable EstimateScales(const Model& model, const std::vector<Recording>& recordings);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_REPLAY_REPLAY_H_

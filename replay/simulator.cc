@@ -1,0 +1,194 @@
+#include "replay/simulator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace gapscope {
+namespace {
+
+constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
+
+ModelPtr CopyForReplay(const mjModel& model) {
+  ModelPtr copy(mj_copyModel(nullptr, &model));
+  // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this small.
+  copy->opt.disableflags |= mjDSBL_AUTORESET | mjDSBL_SENSOR | mjDSBL_ISLAND;
+  return copy;
+}
+
+bool IsSane(const mjModel& m, const mjData& d) {
+  if (d.warning[mjWARN_BADQPOS].number || d.warning[mjWARN_BADQVEL].number || d.warning[mjWARN_BADQACC].number) return false;
+  for (int i = 0; i < m.nq; ++i) {
+    if (!(std::abs(d.qpos[i]) < kRunaway)) return false;
+  }
+  for (int i = 0; i < m.nv; ++i) {
+    if (!(std::abs(d.qvel[i]) < 1000 * kRunaway)) return false;
+  }
+  return true;
+}
+
+// Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1]; before the first stamp the first value. `row` is a hint that
+// moves with the time.
+double MeanHeld(const std::vector<double>& time, const std::vector<double>& values, double from, double to, std::size_t& row) {
+  while (row > 0 && time[row] > from) --row;
+  while (row + 1 < time.size() && time[row + 1] <= from) ++row;
+  if (row + 1 >= time.size() || time[row + 1] >= to) return values[row];
+  double sum = 0, t = from;
+  std::size_t k = row;
+  while (t < to) {
+    const double next = k + 1 < time.size() ? std::min(time[k + 1], to) : to;
+    sum += values[k] * (next - t);
+    t = next;
+    if (k + 1 < time.size() && time[k + 1] <= t) ++k;
+  }
+  return sum / (to - from);
+}
+
+}  // namespace
+
+InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values) {
+  const mjModel& m = model.compiled();
+  InitialState state;
+  state.qpos.assign(m.qpos0, m.qpos0 + m.nq);
+  state.qvel.assign(m.nv, 0.0);
+  std::vector<bool> known(m.nv, false);
+  for (const auto& measured : recording.measured) {
+    const SignalSource& source = model.source(measured.index);
+    if (source.kind != SignalKind::kPosition) continue;
+    const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+    state.qpos[source.qpos] = fit.value - (source.offset >= 0 ? values[source.offset] : 0);
+    state.qvel[source.dof] = fit.slope;
+    known[source.dof] = true;
+  }
+  for (const auto& measured : recording.measured) {
+    const SignalSource& source = model.source(measured.index);
+    if (source.kind != SignalKind::kVelocity || known[source.dof]) continue;
+    state.qvel[source.dof] = FitLocally(recording, measured, row, kInitialFitHalfWidth_s).value;
+  }
+  for (const auto& [joint, from] : model.mirrored_joints()) {
+    state.qpos[m.jnt_qposadr[joint]] = state.qpos[m.jnt_qposadr[from]];
+    state.qvel[m.jnt_dofadr[joint]] = state.qvel[m.jnt_dofadr[from]];
+  }
+  return state;
+}
+
+Simulator::Simulator(const Model& model, double max_step_s)
+    : model_(model), mujoco_(CopyForReplay(model.compiled())), data_(mj_makeData(mujoco_.get())), writer_(model, mujoco_.get(), data_.get()),
+      max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep), values_(model.Nominal()), held_(model.command_actuators().size(), 0) {
+  for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
+}
+
+bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
+  std::copy(values.begin(), values.end(), values_.begin());
+  command_delay_s_ = model_.command_delay() >= 0 ? values_[model_.command_delay()] : 0;
+  return writer_.Write(values, recording.values);
+}
+
+void Simulator::SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s) {
+  const auto& actuators = model_.command_actuators();
+  for (std::size_t c = 0; c < actuators.size(); ++c) {
+    const auto& values = recording.commands[c].values;
+    data_->ctrl[actuators[c]] = command_delay_s_ == 0 ? values[row] : MeanHeld(recording.time_s, values, from_s - command_delay_s_, to_s - command_delay_s_, held_[c]);
+  }
+}
+
+double Simulator::Read(const SignalSource& source) const {
+  switch (source.kind) {
+    case SignalKind::kPosition: return data_->qpos[source.qpos];
+    case SignalKind::kVelocity: return data_->qvel[source.dof];
+    case SignalKind::kTorque: break;
+  }
+  if (source.estimate >= 0) return data_->plugin_state[source.estimate];
+  if (source.dof >= 0) return data_->qfrc_actuator[source.dof];
+  return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
+}
+
+RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted) {
+  mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  const std::size_t signals = recording.measured.size();
+  GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= window.rows() * signals);
+  mj_resetData(m, d);
+  std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
+  std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
+  d->time = recording.time_s[window.begin];
+  std::fill(held_.begin(), held_.end(), window.begin);
+  Prime(recording, window);
+
+  RunResult result;
+  for (std::size_t row = window.begin; row < window.end; ++row) {
+    const double now = recording.time_s[row];
+    d->time = now;
+    if (reads_torque_) {
+      // The drive's torque at this stamp, still under the command that went before.
+      const std::size_t before = row > 0 ? row - 1 : 0;
+      SetCommands(recording, before, now, now);
+      mj_fwdPosition(m, d);
+      mj_fwdVelocity(m, d);
+      mj_fwdActuation(m, d);
+    }
+    double* out = predicted.data() + (row - window.begin) * signals;
+    for (std::size_t s = 0; s < signals; ++s) out[s] = Read(model_.source(recording.measured[s].index));
+    if (row + 1 == window.end) break;
+
+    const double interval = recording.time_s[row + 1] - now;
+    const int steps = std::max(1, static_cast<int>(std::ceil(interval / max_step_s_ - 1e-6)));
+    m->opt.timestep = interval / steps;
+    if (command_delay_s_ == 0) SetCommands(recording, row, now, now);
+    for (int step = 0; step < steps; ++step) {
+      if (command_delay_s_ != 0) SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
+      mj_step(m, d);
+    }
+    result.steps += static_cast<std::size_t>(steps);
+    if (!IsSane(*m, *d)) {
+      result.outcome = Outcome::kDiverged;
+      result.diverged_at_s = now;
+      std::fill(out + signals, predicted.data() + window.rows() * signals, std::numeric_limits<double>::quiet_NaN());
+      break;
+    }
+  }
+  DelaySignals(recording, window, predicted);
+  return result;
+}
+
+// A late sensor is an exact shift of the prediction: the cubic through the neighbouring stamps, read `delay` earlier. Offsets are added here too.
+void Simulator::DelaySignals(const Recording& recording, Window window, std::span<double> predicted) {
+  const std::size_t signals = recording.measured.size(), rows = window.rows();
+  for (std::size_t s = 0; s < signals; ++s) {
+    const SignalSource& source = model_.source(recording.measured[s].index);
+    const double delay = source.delay >= 0 ? values_[source.delay] : 0;
+    const double offset = source.offset >= 0 ? values_[source.offset] : 0;
+    if (delay != 0 && rows > 1) {
+      if (column_.size() < rows) column_.resize(rows);
+      for (std::size_t r = 0; r < rows; ++r) column_[r] = predicted[r * signals + s];
+      const double* time = recording.time_s.data() + window.begin;
+      const auto slope = [&](std::size_t k) {
+        const std::size_t a = k > 0 ? k - 1 : 0, b = std::min(k + 1, rows - 1);
+        return (column_[b] - column_[a]) / (time[b] - time[a]);
+      };
+      std::size_t k = 0;
+      for (std::size_t r = 0; r < rows; ++r) {
+        const double t = time[r] - delay;
+        if (t <= time[0]) {
+          predicted[r * signals + s] = column_[0] + slope(0) * (t - time[0]);
+          continue;
+        }
+        while (k + 2 < rows && time[k + 1] <= t) ++k;
+        while (k > 0 && time[k] > t) --k;
+        const double h = time[k + 1] - time[k], x = (t - time[k]) / h;
+        const double a = column_[k], b = column_[k + 1], da = h * slope(k), db = h * slope(k + 1);
+        predicted[r * signals + s] = a + x * (da + x * (3 * (b - a) - 2 * da - db + x * (2 * (a - b) + da + db)));
+      }
+    }
+    if (offset != 0) {
+      for (std::size_t r = 0; r < rows; ++r) predicted[r * signals + s] += offset;
+    }
+  }
+}
+
+void Simulator::Prime(const Recording& recording, Window window) {
+  (void)recording;
+  (void)window;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,76 @@
+// One recording simulated by one worker: commands held from stamp to stamp, the state read at each stamp exactly. No allocation after construction.
+#ifndef GAPSCOPE_REPLAY_SIMULATOR_H_
+#define GAPSCOPE_REPLAY_SIMULATOR_H_
+
+#include <span>
+#include <vector>
+
+#include "src/core/mujoco_handles.h"
+#include "src/experiment/recording.h"
+#include "src/model/model.h"
+
+namespace gapscope {
+
+// Rows [begin, end) of a recording.
+struct Window {
+  std::size_t begin = 0, end = 0;
+  std::size_t rows() const { return end - begin; }
+};
+
+enum class Outcome { kCompleted, kDiverged };
+
+struct RunResult {
+  Outcome outcome = Outcome::kCompleted;
+  double diverged_at_s = 0;  // the recording's time at the last good stamp
+  std::size_t steps = 0;
+};
+
+// Where a window starts. Joints that are not measured start at the model's initial pose, at rest.
+struct InitialState {
+  std::vector<double> qpos, qvel;
+};
+
+// Half width of the fit that gives the initial state from a log (see FitLocally).
+inline constexpr double kInitialFitHalfWidth_s = 0.02;
+
+// The initial state at a row: measured joints from a local quadratic fit of their position (less their offset parameter) and its slope, or the
+// measured velocity where only that exists; joints that an effect added start with the joint they belong to.
+InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values);
+
+class Simulator {
+ public:
+  // `model` must outlive the simulator. Steps are at most `max_step_s` long (0: the model's own time step).
+  Simulator(const Model& model, double max_step_s);
+
+  // Writes parameters (see ParameterWriter::Write); false: they make no model.
+  bool SetParameters(std::span<const double> values, const Recording& recording);
+
+  // Simulates the window from `start`. `predicted` receives rows() x recording.measured.size() numbers, row by row: at each stamp the value
+  // before that stamp's command acts; NaN after a divergence. A signal's delay and offset parameters are applied.
+  RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted);
+
+  void set_max_step_s(double step) { max_step_s_ = step; }
+  const mjModel& mujoco_model() const { return *mujoco_; }
+  mjData& data() { return *data_; }
+
+ private:
+  void Prime(const Recording& recording, Window window);
+  void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
+  double Read(const SignalSource& source) const;
+  void DelaySignals(const Recording& recording, Window window, std::span<double> predicted);
+
+  const Model& model_;
+  ModelPtr mujoco_;
+  DataPtr data_;
+  ParameterWriter writer_;
+  double max_step_s_;
+  double command_delay_s_ = 0;
+  bool reads_torque_ = false;
+  std::vector<double> values_;
+  std::vector<double> column_;        // scratch of DelaySignals
+  std::vector<std::size_t> held_;     // per command: row held at the start of the step
+};
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_REPLAY_SIMULATOR_H_

@@ -1,0 +1,20 @@
+// The subcommands. Each adds itself to the program and says what to run once the arguments are parsed; the callback returns the exit status.
+#ifndef GAPSCOPE_CLI_COMMANDS_H_
+#define GAPSCOPE_CLI_COMMANDS_H_
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "src/core/result.h"
+
+namespace gapscope::cli {
+
+using Run = std::function<Result<int>()>;
+
+void AddInit(CLI::App& program, Run& run);
+void AddInspect(CLI::App& program, Run& run);
+void AddReplay(CLI::App& program, Run& run);
+
+}  // namespace gapscope::cli
+
+#endif  // GAPSCOPE_CLI_COMMANDS_H_

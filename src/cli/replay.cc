@@ -1,0 +1,67 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+
+#include "src/cli/commands.h"
+#include "src/cli/session.h"
+#include "src/core/file.h"
+#include "src/report/replay_report.h"
+
+namespace gapscope::cli {
+namespace {
+
+struct ReplayFlags {
+  CommonFlags common;
+  ModelFlags model;
+  std::string mode;
+  double window_s = 0, time_step_s = 0, fail_above = 0;
+};
+
+Result<int> RunReplay(const ReplayFlags& flags) {
+  GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
+  PrintFindings(session.recordings, flags.common.quiet);
+  ReplayOptions options{.mode = session.experiment.replay.mode, .window_s = session.experiment.replay.window_s, .time_step_s = flags.time_step_s, .values = session.values};
+  if (flags.mode == "free_run") options.mode = ReplayMode::kFreeRun;
+  if (flags.mode == "windows") options.mode = ReplayMode::kWindows;
+  if (flags.mode == "closed_loop") {
+    return Error{.what = "no controller is described", .where = flags.model.experiment, .actual = "--mode closed_loop", .allowed = "free_run, windows"};
+  }
+  if (flags.window_s > 0) options.window_s = flags.window_s;
+  const ReplayResult result = Replay(*session.model, session.recordings, options, *session.pool);
+  const Comparison comparison = Compare(result, session.recordings, *session.pool);
+  const ReplayReport report{.result = result, .comparison = comparison, .model = *session.model, .values = session.values, .seed = flags.common.seed};
+  if (!flags.common.out.empty()) {
+    const std::filesystem::path out = flags.common.out;
+    GS_RETURN_IF_ERROR(WriteFile(out / "result.json", ReplayJson(report) + "\n"));
+    GS_RETURN_IF_ERROR(WriteTraces(out / "traces", result, session.recordings));
+    GS_ASSIGN(const std::string xml, session.model->ToXml(session.values, session.recordings.front().values, session.scales));
+    GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
+  }
+  if (flags.common.json) {
+    fmt::print("{}\n", ReplayJson(report));
+  } else {
+    fmt::print("{}", ReplayTable(report));
+  }
+  if (flags.fail_above > 0 && !(comparison.error <= flags.fail_above)) {
+    if (!flags.common.quiet) fmt::print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", comparison.error, flags.fail_above);
+    return kBelowThreshold;
+  }
+  return kDone;
+}
+
+}  // namespace
+
+void AddReplay(CLI::App& program, Run& run) {
+  auto flags = std::make_shared<ReplayFlags>();
+  CLI::App* command = program.add_subcommand("replay", "Replay logged commands in simulation: predicted against measured, scores");
+  AddModelFlags(*command, flags->model, true);
+  AddCommonFlags(*command, flags->common, true);
+  command->add_option("--mode", flags->mode, "free_run, windows or closed_loop (default: the experiment's)")->check(CLI::IsMember({"free_run", "windows", "closed_loop"}));
+  command->add_option("--window", flags->window_s, "Length of a window, s")->check(CLI::PositiveNumber);
+  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen so that halving it changes the error by < 1 %)")->check(CLI::PositiveNumber);
+  command->add_option("--fail-above", flags->fail_above, "Exit status 1 when the error is above this")->check(CLI::PositiveNumber);
+  command->footer("Example: gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out out");
+  command->callback([flags, &run] { run = [flags] { return RunReplay(*flags); }; });
+}
+
+}  // namespace gapscope::cli

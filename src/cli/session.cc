@@ -1,0 +1,81 @@
+#include "src/cli/session.h"
+
+#include <fmt/core.h>
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+namespace gapscope::cli {
+
+void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
+  command.add_flag("--json", flags.json, "Print the result as JSON on stdout, nothing else");
+  command.add_flag("--quiet", flags.quiet, "No messages on stderr but errors");
+  command.add_option("--jobs", flags.jobs, "Workers; 0: one per processor. The result does not depend on it")->check(CLI::Range(0, 1024));
+  command.add_option("--seed", flags.seed, "Seed of everything random");
+  if (writes_folder) command.add_option("--out", flags.out, "Folder for result.json, traces and model.xml");
+}
+
+void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects) {
+  command.add_option("experiment", flags.experiment, "Experiment file (YAML)")->required();
+  command.add_option("logs", flags.logs, "Hardware logs")->required();
+  if (!effects) return;
+  command.add_option("--with", flags.with, "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL]")->allow_extra_args(false);
+  command.add_option("--set", flags.set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
+  command.add_option("--params", flags.params, "YAML file of parameter values")->allow_extra_args(false);
+}
+
+Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths, ThreadPool& pool) {
+  std::vector<std::optional<Result<Recording>>> loaded(paths.size());
+  pool.ForEach(paths.size(), [&](std::size_t i, int) { loaded[i] = LoadRecording(experiment, paths[i]); });
+  std::vector<Recording> recordings;
+  for (auto& result : loaded) {
+    if (!result->ok()) return result->error();
+    recordings.push_back(std::move(*result).value());
+  }
+  return recordings;
+}
+
+Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) {
+  Session session;
+  session.pool = std::make_unique<ThreadPool>(common.jobs > 0 ? common.jobs : DefaultWorkers());
+  GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));
+  GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
+  GS_ASSIGN(session.model, Model::Build(session.experiment));
+  if (!flags.with.empty()) {
+    session.scales = EstimateScales(*session.model, session.recordings);
+    GS_ASSIGN(const std::vector<EffectUse> uses, session.model->ParseEffects(flags.with));
+    GS_ASSIGN(session.model, Model::Build(session.experiment, uses, session.scales));
+  }
+  session.values = session.model->Nominal();
+  for (const auto& file : flags.params) {
+    GS_ASSIGN(const auto numbers, LoadParameterValues(file));
+    for (const auto& [name, value] : numbers) {
+      GS_ASSIGN(const int index, session.model->Find(name, file));
+      session.values[index] = value;
+    }
+  }
+  for (const auto& text : flags.set) {
+    const std::size_t equal = text.find('=');
+    double value = 0;
+    const char* end = text.data() + text.size();
+    const auto parsed = equal == std::string::npos ? std::from_chars_result{text.data(), std::errc::invalid_argument}
+                                                   : std::from_chars(text.data() + equal + 1, end, value);
+    if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) {
+      return Error{.what = "not NAME=VALUE", .where = "--set", .actual = "'" + text + "'", .allowed = "a parameter's name, '=', a finite number"};
+    }
+    GS_ASSIGN(const int index, session.model->Find(text.substr(0, equal), "--set " + text));
+    session.values[index] = value;
+  }
+  return session;
+}
+
+void PrintFindings(const std::vector<Recording>& recordings, bool quiet) {
+  if (quiet) return;
+  for (const auto& recording : recordings) {
+    for (const auto& finding : recording.findings) fmt::print(stderr, "{}: {}\n", recording.log_path, finding.text);
+  }
+}
+
+}  // namespace gapscope::cli

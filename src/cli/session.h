@@ -1,0 +1,60 @@
+// What the commands share: common flags, and an experiment with its logs and model, loaded.
+#ifndef GAPSCOPE_CLI_SESSION_H_
+#define GAPSCOPE_CLI_SESSION_H_
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "replay/replay.h"
+#include "src/core/thread_pool.h"
+#include "src/experiment/recording.h"
+#include "src/model/model.h"
+
+namespace gapscope::cli {
+
+// Exit statuses of the program (contract.md).
+inline constexpr int kDone = 0, kBelowThreshold = 1, kBadInput = 2, kBug = 3;
+
+struct CommonFlags {
+  bool json = false, quiet = false;
+  int jobs = 0;
+  std::uint64_t seed = 0;
+  std::string out;
+};
+
+// Adds --json, --jobs, --seed, --quiet; and --out where the command writes a folder.
+void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder);
+
+struct ModelFlags {
+  std::string experiment;
+  std::vector<std::string> logs;
+  std::vector<std::string> with;    // EFFECT[@ON]
+  std::vector<std::string> set;     // NAME=VALUE
+  std::vector<std::string> params;  // YAML files of values
+};
+// Adds EXPERIMENT LOG... and, where the command takes them, --with, --set, --params.
+void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects);
+
+struct Session {
+  Experiment experiment;
+  std::vector<Recording> recordings;
+  ScaleTable scales;
+  std::shared_ptr<const Model> model;
+  std::vector<double> values;  // nominal with --params and --set written over it
+  std::unique_ptr<ThreadPool> pool;
+};
+
+Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common);
+
+// Reads all logs, in parallel; the first error in the order of the arguments.
+Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths, ThreadPool& pool);
+
+// Every finding of the logs on stderr, one line each, unless quiet.
+void PrintFindings(const std::vector<Recording>& recordings, bool quiet);
+
+}  // namespace gapscope::cli
+
+#endif  // GAPSCOPE_CLI_SESSION_H_

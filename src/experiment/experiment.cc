@@ -1,0 +1,246 @@
+#include "src/experiment/experiment.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <numbers>
+#include <set>
+
+#include "src/core/units.h"
+#include "src/experiment/yaml_reader.h"
+
+namespace gapscope {
+namespace {
+
+// Reads `unit`, `scale` and `add` of a column: SI = unit * scale * raw + add.
+// Returns the SI unit.
+std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, double* offset) {
+  const auto parsed = ParseUnit(map.Text("unit", "1"));
+  if (!parsed.ok()) map.Fail(node, parsed.error());
+  *factor = (parsed.ok() ? parsed.value().factor : 1) * map.Number("scale", 1);
+  *offset = map.Number("add", 0);
+  return parsed.ok() ? parsed.value().si : "1";
+}
+
+Status ReadLogSection(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap map(node, path, "'log'");
+  constexpr LogFormat kFormats[] = {LogFormat::kAuto, LogFormat::kCsv, LogFormat::kBamJson};
+  experiment->read.format = kFormats[map.Choice("format", {"auto", "csv", "bam_json"}, 0)];
+  if (const YAML::Node time = map.Child("time"); time.IsDefined()) {
+    YamlMap time_map(time, path, "'time'");
+    experiment->timeline.time_column = time_map.Text("column", "");
+    const char* kUnits[] = {"", "s", "ms", "us", "ns"};
+    experiment->timeline.time_unit = kUnits[time_map.Choice("unit", {"auto", "s", "ms", "us", "ns"}, 0)];
+    GS_RETURN_IF_ERROR(time_map.Finish());
+  }
+  if (const YAML::Node companions = map.Child("companions"); companions.IsDefined()) {
+    for (const auto& item : companions) {
+      YamlMap companion(item, path, "a companion");
+      experiment->read.companions.push_back(
+          {companion.Text("find"), companion.Text("replace"), companion.Text("prefix", "")});
+      if (experiment->read.companions.back().find.empty()) {
+        companion.Fail(item, {.what = "'find' of a companion is empty"});
+      }
+      GS_RETURN_IF_ERROR(companion.Finish());
+    }
+  }
+  if (const YAML::Node repair = map.Child("repair"); repair.IsDefined()) {
+    YamlMap policy(repair, path, "'repair'");
+    constexpr TimeRepair kTime[] = {TimeRepair::kDropRows, TimeRepair::kError};
+    constexpr MissingRepair kMissing[] = {MissingRepair::kHold, MissingRepair::kDropRows, MissingRepair::kError};
+    experiment->timeline.repeated = kTime[policy.Choice("repeated", {"drop_rows", "error"}, 0)];
+    experiment->timeline.reversed = kTime[policy.Choice("reversed", {"drop_rows", "error"}, 0)];
+    experiment->timeline.missing = kMissing[policy.Choice("missing", {"hold", "drop_rows", "error"}, 0)];
+    experiment->timeline.gap_factor = policy.Number("gap_factor", experiment->timeline.gap_factor);
+    GS_RETURN_IF_ERROR(policy.Finish());
+  }
+  return map.Finish();
+}
+
+Status ReadValues(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap names(node, path, "'values'");
+  for (const auto& pair : node) {
+    if (!pair.first.IsScalar()) break;
+    const std::string name = pair.first.Scalar();
+    YamlMap map(names.Child(name.c_str()), path, "the log value '" + name + "'");
+    LogValue value{.name = name, .header = map.Text("header", ""), .column = map.Text("column", ""), .factor = 1};
+    double offset = 0;
+    ReadScaling(map, pair.second, &value.factor, &offset);
+    if (map.Has("default")) value.fallback = map.Number("default");
+    if (value.header.empty() == value.column.empty()) {
+      map.Fail(pair.second, {.what = "the log value '" + name + "' needs either 'header' or 'column'"});
+    }
+    GS_RETURN_IF_ERROR(map.Finish());
+    experiment->values.push_back(std::move(value));
+  }
+  return names.Finish();
+}
+
+std::vector<std::string> ReadColumns(YamlMap& map, const YAML::Node& node, bool required) {
+  std::vector<std::string> columns = map.TextList("column");
+  for (auto& more : map.TextList("columns")) columns.push_back(std::move(more));
+  if (columns.empty() && required) {
+    map.Fail(node, {.what = "no 'column' is named", .cure = "add 'column: NAME'"});
+  }
+  return columns;
+}
+
+Status ReadCommands(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined()) return Ok();
+  for (const auto& item : node) {
+    YamlMap map(item, path, "a command");
+    CommandSpec command;
+    command.actuator = map.Text("actuator");
+    command.optional = map.Flag("optional", false);
+    command.fallback = map.Text("default", "0");
+    command.columns = ReadColumns(map, item, !map.Has("default"));
+    if (command.columns.empty()) command.optional = true;
+    command.unit = ReadScaling(map, item, &command.factor, &command.offset);
+    GS_RETURN_IF_ERROR(map.Finish());
+    for (const auto& other : experiment->commands) {
+      if (other.actuator == command.actuator) {
+        return Error{.what = "two commands drive the actuator '" + command.actuator + "'", .where = YamlPlace(path, item), .cure = "delete one"};
+      }
+    }
+    experiment->commands.push_back(std::move(command));
+  }
+  return Ok();
+}
+
+Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined() || !node.IsSequence() || node.size() == 0) {
+    return Error{.what = "nothing is measured", .where = YamlPlace(path, node), .allowed = "a list under 'measured:'",
+                 .cure = "add '- {signal: NAME, column: NAME, joint: NAME}'"};
+  }
+  for (const auto& item : node) {
+    YamlMap map(item, path, "a measured signal");
+    MeasuredSpec spec;
+    spec.signal = map.Text("signal");
+    spec.columns = ReadColumns(map, item, false);
+    if (spec.columns.empty()) spec.columns = {spec.signal};
+    constexpr SignalKind kKinds[] = {SignalKind::kPosition, SignalKind::kVelocity, SignalKind::kTorque};
+    spec.kind = kKinds[map.Choice("kind", {"position", "velocity", "torque"}, 0)];
+    const std::string joint = map.Text("joint", ""), actuator = map.Text("actuator", "");
+    spec.on = spec.kind == SignalKind::kTorque ? actuator : joint;
+    if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
+      map.Fail(item, {.what = "the signal '" + spec.signal + "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
+    }
+    ReadScaling(map, item, &spec.factor, &spec.offset);
+    spec.resolution = map.Number("resolution", 0);
+    spec.optional = map.Flag("optional", false);
+    spec.scored = map.Flag("score", true);
+    spec.offset_parameter = map.Text("offset", "");
+    if (map.Has("wrap")) {
+      spec.wrap = WrapRepair::kUnwrap;
+      spec.wrap_period = map.Number("wrap");
+      if (!(spec.wrap_period > 0)) map.Fail(item, {.what = "'wrap' is the period to remove, in SI", .allowed = "> 0"});
+    }
+    if (spec.resolution < 0) map.Fail(item, {.what = "'resolution' is negative", .allowed = ">= 0"});
+    GS_RETURN_IF_ERROR(map.Finish());
+    for (const auto& other : experiment->measured) {
+      if (other.signal == spec.signal) {
+        return Error{.what = "the signal '" + spec.signal + "' stands twice", .where = YamlPlace(path, item), .cure = "rename one"};
+      }
+    }
+    experiment->measured.push_back(std::move(spec));
+  }
+  return Ok();
+}
+
+Status ReadParameters(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap names(node, path, "'parameters'");
+  for (const auto& pair : node) {
+    if (!pair.first.IsScalar()) break;
+    const std::string name = pair.first.Scalar();
+    YamlMap map(names.Child(name.c_str()), path, "the parameter '" + name + "'");
+    Parameter parameter{.name = name, .unit = map.Text("unit"), .doc = map.Text("doc", ""), .nominal = map.Number("nominal"), .low = 0, .high = 0,
+                        .frozen = map.Flag("frozen", false)};
+    const std::vector<double> bounds = map.NumberList("bounds", 2);
+    parameter.low = bounds.size() == 2 ? bounds[0] : parameter.nominal;
+    parameter.high = bounds.size() == 2 ? bounds[1] : parameter.nominal;
+    if (bounds.empty() && !parameter.frozen) {
+      map.Fail(pair.second, {.what = "the parameter '" + name + "' has no bounds",
+                             .cure = "add 'bounds: [low, high]' or 'frozen: true'"});
+    } else if (!(parameter.low <= parameter.nominal && parameter.nominal <= parameter.high)) {
+      map.Fail(pair.second, {.what = "the nominal value of '" + name + "' is outside its bounds", .actual = std::to_string(parameter.nominal),
+                             .allowed = std::to_string(parameter.low) + " to " + std::to_string(parameter.high)});
+    }
+    GS_RETURN_IF_ERROR(map.Finish());
+    experiment->parameters.push_back(std::move(parameter));
+  }
+  return names.Finish();
+}
+
+Status ReadSettings(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap fields(node, path, "'set'");
+  for (const auto& pair : node) {
+    if (!pair.first.IsScalar()) break;
+    FieldSetting setting{.field = pair.first.Scalar(), .expressions = fields.TextList(pair.first.Scalar().c_str()), .where = YamlPlace(path, pair.first)};
+    if (setting.expressions.empty()) {
+      return Error{.what = "the field '" + setting.field + "' has no expression", .where = setting.where};
+    }
+    experiment->settings.push_back(std::move(setting));
+  }
+  return fields.Finish();
+}
+
+Status ReadReplay(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap map(node, path, "'replay'");
+  constexpr ReplayMode kModes[] = {ReplayMode::kFreeRun, ReplayMode::kWindows};
+  experiment->replay.mode = kModes[map.Choice("mode", {"free_run", "windows"}, 0)];
+  experiment->replay.window_s = map.Number("window_s", experiment->replay.window_s);
+  experiment->replay.start_s = map.Number("start_s", 0);
+  if (!(experiment->replay.window_s > 0) || experiment->replay.start_s < 0) {
+    map.Fail(node, {.what = "'window_s' must be above and 'start_s' not below zero"});
+  }
+  return map.Finish();
+}
+
+}  // namespace
+
+Result<Experiment> LoadExperiment(const std::string& path) {
+  GS_ASSIGN(const YAML::Node root, ReadYaml(path));
+  Experiment experiment;
+  experiment.path = path;
+  YamlMap map(root, path, "the experiment");
+  const std::string schema = map.Text("schema", "gapscope.experiment/1");
+  if (schema != "gapscope.experiment/1") {
+    map.Fail(root, {.what = "unknown schema", .actual = "'" + schema + "'", .allowed = "gapscope.experiment/1"});
+  }
+  map.Text("doc", "");
+  const std::string model = map.Text("model");
+  const YAML::Node log = map.Child("log"), values = map.Child("values"), commands = map.Child("commands"), measured = map.Child("measured"),
+                   parameters = map.Child("parameters"), set = map.Child("set"), replay = map.Child("replay");
+  GS_RETURN_IF_ERROR(map.Finish());
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  experiment.model_path = (folder / model).lexically_normal().string();
+
+  GS_RETURN_IF_ERROR(ReadLogSection(log, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadValues(values, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadCommands(commands, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadMeasured(measured, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadParameters(parameters, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadSettings(set, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadReplay(replay, path, &experiment));
+  return experiment;
+}
+
+Result<std::map<std::string, double>> LoadParameterValues(const std::string& path) {
+  GS_ASSIGN(const YAML::Node root, ReadYaml(path));
+  YamlMap map(root, path, "the parameter file");
+  map.Text("doc", "");
+  std::map<std::string, double> values;
+  for (const auto& pair : root) {
+    if (pair.first.IsScalar() && pair.first.Scalar() != "doc") {
+      values[pair.first.Scalar()] = map.Number(pair.first.Scalar().c_str());
+    }
+  }
+  GS_RETURN_IF_ERROR(map.Finish());
+  return values;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,94 @@
+// The experiment file: how a log is bound to a model. docs/experiment.md documents it key by key.
+#ifndef GAPSCOPE_EXPERIMENT_EXPERIMENT_H_
+#define GAPSCOPE_EXPERIMENT_EXPERIMENT_H_
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "src/core/result.h"
+#include "src/log/log.h"
+#include "src/log/timeline.h"
+
+namespace gapscope {
+
+// A number that every log brings with it: from its header, or the mean of a column over the log.
+struct LogValue {
+  std::string name;    // as expressions use it: "log.kp"
+  std::string header;  // name in the log's header; empty: `column`
+  std::string column;
+  double factor = 1;   // to SI
+  std::optional<double> fallback;  // when the log has neither
+};
+
+// A column that drives an actuator, held from its row to the next.
+struct CommandSpec {
+  std::string actuator;
+  std::vector<std::string> columns;  // the first one that the log has
+  std::string unit;                  // SI unit of the command: "V", "A", "N m", "rad" ...
+  double factor = 1, offset = 0;     // command in SI = factor * column + offset
+  bool optional = false;             // without the column: `fallback`
+  std::string fallback = "0";        // expression of log values
+};
+
+enum class SignalKind { kPosition, kVelocity, kTorque };
+
+// A column that is compared with the model.
+struct MeasuredSpec {
+  std::string signal;                // name in results: "arm_rad"
+  std::vector<std::string> columns;  // the first one that the log has
+  SignalKind kind = SignalKind::kPosition;
+  std::string on;                    // joint, or actuator for kTorque
+  double factor = 1, offset = 0;     // measured in SI = factor * column + offset
+  double resolution = 0;             // size of one sensor count, SI; 0: unknown
+  bool optional = false;
+  bool scored = true;                // counts in the error
+  WrapRepair wrap = WrapRepair::kKeep;
+  double wrap_period = 0;
+  std::string offset_parameter;      // predicted = model + this parameter; empty: none
+};
+
+struct Parameter {
+  std::string name, unit, doc;
+  double nominal = 0, low = 0, high = 0;
+  bool frozen = false;  // not tuned unless freed by name
+};
+
+// A field of the compiled model and the expressions of parameters and log values that give its components.
+struct FieldSetting {
+  std::string field;  // "joint/arm/damping"
+  std::vector<std::string> expressions;
+  std::string where;  // file:line:column, for errors
+};
+
+enum class ReplayMode { kFreeRun, kWindows, kClosedLoop };
+
+struct ReplayDefaults {
+  ReplayMode mode = ReplayMode::kFreeRun;
+  double window_s = 1.0;
+  double start_s = 0;  // rows before this are left out (a rig that is still handled by hand, say)
+};
+
+struct Experiment {
+  std::string path;        // of the experiment file
+  std::string model_path;  // of the MJCF
+  ReadOptions read;
+  TimelineOptions timeline;
+  std::vector<LogValue> values;
+  std::vector<CommandSpec> commands;
+  std::vector<MeasuredSpec> measured;
+  std::vector<Parameter> parameters;
+  std::vector<FieldSetting> settings;
+  ReplayDefaults replay;
+};
+
+// Reads and checks an experiment file. Errors give file:line:column; an unknown key names the nearest valid one.
+Result<Experiment> LoadExperiment(const std::string& path);
+
+// {parameter: value} from a YAML file, for `--params`. Errors: not a map of numbers, a value that is not finite.
+Result<std::map<std::string, double>> LoadParameterValues(const std::string& path);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_EXPERIMENT_EXPERIMENT_H_

@@ -1,0 +1,93 @@
+#include "src/experiment/expression.h"
+
+#include <muParser.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "src/core/units.h"
+
+namespace gapscope {
+namespace {
+
+constexpr std::size_t kMaxLength = 4096;
+constexpr const char* kNameChars = "0123456789_abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.@";
+
+std::optional<double> AsNumber(const std::string& text) {
+  double value = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (code != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+// Most expressions are a number or one name: those need no parser.
+struct Expression::Impl {
+  double constant = 0;
+  const double* variable = nullptr;
+  std::unique_ptr<mu::Parser> parser;
+};
+
+Expression::Expression(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Expression::Expression(Expression&&) noexcept = default;
+Expression& Expression::operator=(Expression&&) noexcept = default;
+Expression::~Expression() = default;
+
+Result<Expression> Expression::Parse(const std::string& text, const std::vector<std::string>& names, double* variables, const std::string& where) {
+  auto impl = std::make_unique<Impl>();
+  if (const auto number = AsNumber(text)) {
+    impl->constant = *number;
+    return Expression(std::move(impl));
+  }
+  if (const auto found = std::find(names.begin(), names.end(), text); found != names.end()) {
+    impl->variable = variables + (found - names.begin());
+    return Expression(std::move(impl));
+  }
+  if (text.size() > kMaxLength || std::count(text.begin(), text.end(), '(') > 64) {
+    return Error{.what = "the expression is too long", .where = where, .allowed = std::to_string(kMaxLength) + " characters"};
+  }
+  impl->parser = std::make_unique<mu::Parser>();
+  try {
+    impl->parser->DefineNameChars(kNameChars);
+    impl->parser->DefineConst("pi", std::numbers::pi);
+    for (std::size_t i = 0; i < names.size(); ++i) impl->parser->DefineVar(names[i], variables + i);
+    impl->parser->SetExpr(text);
+    impl->parser->Eval();
+  } catch (const mu::Parser::exception_type& e) {
+    const std::string nearest = e.GetCode() == mu::ecUNASSIGNABLE_TOKEN ? Nearest(e.GetToken(), names) : "";
+    std::string message = e.GetMsg();
+    std::erase(message, '\n');
+    return Error{.what = "bad expression '" + text + "': " + message, .where = where, .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+  }
+  return Expression(std::move(impl));
+}
+
+double Expression::Evaluate() const {
+  if (impl_->variable) return *impl_->variable;
+  if (!impl_->parser) return impl_->constant;
+  try {
+    return impl_->parser->Eval();
+  } catch (const mu::Parser::exception_type&) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
+Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values, const std::string& where) {
+  std::vector<std::string> names;
+  std::vector<double> numbers;
+  for (const auto& [name, value] : values) {
+    names.push_back(name);
+    numbers.push_back(value);
+  }
+  GS_ASSIGN(const Expression expression, Expression::Parse(text, names, numbers.data(), where));
+  const double value = expression.Evaluate();
+  if (!std::isfinite(value)) return Error{.what = "the expression '" + text + "' is not finite", .where = where};
+  return value;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,52 @@
+// A log bound to an experiment: commands and measurements in SI on one time axis.
+#ifndef GAPSCOPE_EXPERIMENT_RECORDING_H_
+#define GAPSCOPE_EXPERIMENT_RECORDING_H_
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "src/experiment/experiment.h"
+
+namespace gapscope {
+
+struct Recording {
+  struct Command {
+    std::string actuator;
+    std::string column;          // the log's column, or "constant"
+    std::vector<double> values;  // one per stamp, held to the next stamp
+  };
+  struct Measured {
+    MeasuredSpec spec;
+    std::size_t index = 0;       // in experiment.measured
+    std::string column;
+    std::vector<double> values;  // one per stamp; NaN where the log has no value and the policy keeps that
+  };
+
+  std::string log_path;
+  std::vector<double> time_s;  // from zero, strictly increasing
+  std::vector<Command> commands;
+  std::vector<Measured> measured;  // only those that the log has
+  std::map<std::string, double> values;
+  Timeline timeline;
+  std::vector<Finding> findings;  // of reading, timeline and binding
+
+  std::size_t rows() const { return time_s.size(); }
+  double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }
+};
+
+// Reads one log and binds it. Errors: those of reading; a column that is neither there nor optional (with the nearest
+// name); no scored signal at all; fewer than two rows.
+Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path);
+
+// The value and slope of a measured signal at `row`, from a local quadratic least-squares fit over +-`half_width_s`
+// (one-sided at the ends): the initial state of a replay. Slope in SI per second.
+struct LocalFit {
+  double value = 0, slope = 0;
+};
+LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
+                    double half_width_s);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_EXPERIMENT_RECORDING_H_

@@ -1,0 +1,25 @@
+#include "src/model/effects/catalogue.h"
+
+namespace gapscope {
+
+Effect Effect_cable_spring() {
+  return {
+      .name = "cable_spring",
+      .place = EffectPlace::kJoint,
+      .parameters = {
+          {.key = "stiffness_n_m_per_rad", .unit = "N m/rad", .scale = ScaleKind::kStiffness, .neutral = 0, .low = 0, .high = 3, .trials = {0.05, 0.2, 0.6}, .start = 0.1},
+          {.key = "rest_rad", .unit = "rad", .scale = ScaleKind::kAngle, .neutral = 0, .low = -4, .high = 4, .trials = {-1, 0, 1}, .start = 0},
+      },
+      .meaning = "a cable pulls to a rest angle",
+      .signature = "linear in angle about a rest angle",
+      .told_apart = "slow sweep of the range",
+      .partners = {"gravity_offset", "torque_bias", "cogging"},
+      .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
+        GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "stiffness_n_m_per_rad", names[0]));
+        GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "rest_rad", names[1]));
+        return Ok();
+      },
+  };
+}
+
+}  // namespace gapscope

@@ -1,0 +1,27 @@
+#include "src/model/effects/catalogue.h"
+
+namespace gapscope {
+
+Effect Effect_cogging() {
+  return {
+      .name = "cogging",
+      .place = EffectPlace::kDrivenJoint,
+      .parameters = {
+          {.key = "amplitude_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1, .trials = {0.03, 0.1}, .start = 0.03},
+          {.key = "periods_per_rev", .unit = "1", .scale = ScaleKind::kOne, .neutral = 12, .low = 1, .high = 100, .trials = {3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 18, 20, 24, 28, 32, 36, 42, 48}, .start = 12},
+          {.key = "phase_rad", .unit = "rad", .scale = ScaleKind::kOne, .neutral = 0, .low = -3.2, .high = 3.2, .trials = {0, 1.57}, .start = 0},
+      },
+      .meaning = "torque ripple over the angle",
+      .signature = "periodic in angle",
+      .told_apart = "constant slow speed",
+      .partners = {"cable_spring"},
+      .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
+        GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cogging_n_m", names[0]));
+        GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cogging_periods_per_rev", names[1]));
+        GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cogging_phase_rad", names[2]));
+        return Ok();
+      },
+  };
+}
+
+}  // namespace gapscope

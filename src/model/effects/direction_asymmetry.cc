@@ -1,0 +1,23 @@
+#include "src/model/effects/catalogue.h"
+
+namespace gapscope {
+
+// On the motor the gain differs by the sign of the torque.
+Effect Effect_direction_asymmetry() {
+  return {
+      .name = "direction_asymmetry",
+      .place = EffectPlace::kMotor,
+      .parameters = {
+          {.key = "asymmetry", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = -0.6, .high = 0.6, .trials = {-0.1, 0.1}, .start = 0},
+      },
+      .meaning = "the drive's gain differs by the sign of the torque",
+      .signature = "response differs by direction",
+      .told_apart = "both directions",
+      .partners = {"torque_bias"},
+      .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
+        return structure.AddMotorTerm(on, "asymmetry", names[0]);
+      },
+  };
+}
+
+}  // namespace gapscope

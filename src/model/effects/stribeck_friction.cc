@@ -1,0 +1,27 @@
+#include "src/model/effects/catalogue.h"
+
+namespace gapscope {
+
+Effect Effect_stribeck_friction() {
+  return {
+      .name = "stribeck_friction",
+      .place = EffectPlace::kJoint,
+      .parameters = {
+          {.key = "friction_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1, .start = 0.02},
+          {.key = "breakaway_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1.5, .trials = {0.03, 0.1}, .start = 0.05},
+          {.key = "stribeck_speed_rad_per_s", .unit = "rad/s", .scale = ScaleKind::kSpeed, .neutral = 0.05, .low = 0.001, .high = 1, .start = 0.05},
+      },
+      .meaning = "dry friction with a hump at low speed",
+      .signature = "hump at low speed, stick-slip",
+      .told_apart = "creep",
+      .partners = {"coulomb_friction"},
+      .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
+        GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "friction_n_m", names[0]));
+        GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "breakaway_n_m", names[1]));
+        GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "stribeck_speed_rad_per_s", names[2]));
+        return Ok();
+      },
+  };
+}
+
+}  // namespace gapscope

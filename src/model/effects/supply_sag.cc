@@ -1,0 +1,27 @@
+#include "src/model/effects/catalogue.h"
+
+namespace gapscope {
+
+Effect Effect_supply_sag() {
+  return {
+      .name = "supply_sag",
+      .place = EffectPlace::kMotor,
+      .parameters = {
+          {.key = "time_constant_s", .unit = "s", .scale = ScaleKind::kOne, .neutral = 0.3, .low = 0.02, .high = 3, .start = 0.3},
+          {.key = "sag_fraction", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.9, .trials = {0.2, 0.5}, .start = 0.2},
+          {.key = "limit_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 2, .low = 0.05, .high = 2, .start = 0.8},
+      },
+      .meaning = "the drive's ceiling falls under load",
+      .signature = "the limit falls with load and time",
+      .told_apart = "logged voltage",
+      .partners = {"torque_limit", "torque_speed_curve"},
+      .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
+        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "sag_time_constant_s", names[0]));
+        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "sag_fraction", names[1]));
+        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "torque_limit_n_m", names[2]));
+        return Ok();
+      },
+  };
+}
+
+}  // namespace gapscope

@@ -1,0 +1,23 @@
+#include "src/model/effects/catalogue.h"
+
+namespace gapscope {
+
+Effect Effect_torque_constant_droop() {
+  return {
+      .name = "torque_constant_droop",
+      .place = EffectPlace::kMotor,
+      .parameters = {
+          {.key = "loss_at_peak", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.8, .trials = {0.1, 0.3, 0.5}, .start = 0.1},
+      },
+      .meaning = "less torque per ampere at high current",
+      .signature = "torque falls short at high current",
+      .told_apart = "stalls at several levels",
+      .partners = {"torque_limit"},
+      .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
+        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_at_peak", names[0]));
+        return structure.AddMotorTerm(on, "droop_reference_n_m", "scale@" + on + ".torque_n_m");
+      },
+  };
+}
+
+}  // namespace gapscope

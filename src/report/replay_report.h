@@ -1,0 +1,31 @@
+// A replay for people and programs: console table, JSON (gapscope.replay/1), traces as CSV.
+#ifndef GAPSCOPE_REPORT_REPLAY_REPORT_H_
+#define GAPSCOPE_REPORT_REPLAY_REPORT_H_
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "src/compare/comparison.h"
+
+namespace gapscope {
+
+struct ReplayReport {
+  const ReplayResult& result;
+  const Comparison& comparison;
+  const Model& model;
+  std::span<const double> values;  // of the model's parameters
+  std::uint64_t seed = 0;
+};
+
+// At most 100 columns.
+std::string ReplayTable(const ReplayReport& report);
+std::string ReplayJson(const ReplayReport& report);
+
+// One CSV per log in `folder`, for PlotJuggler: __time, command/ACTUATOR, measured/SIGNAL, predicted/SIGNAL. Logs of the same file name get their
+// position in front.
+Status WriteTraces(const std::string& folder, const ReplayResult& result, const std::vector<Recording>& recordings);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_REPORT_REPLAY_REPORT_H_

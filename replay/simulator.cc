@@ -80,7 +80,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
 
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
   std::copy(values.begin(), values.end(), values_.begin());
-  command_delay_s_ = model_.command_delay() >= 0 ? values_[model_.command_delay()] : 0;
+  command_delay_s_ = shift_s_ + (model_.command_delay() >= 0 ? values_[model_.command_delay()] : 0);
   return writer_.Write(values, recording.values);
 }
 

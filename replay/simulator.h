@@ -50,6 +50,8 @@ class Simulator {
   RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted);
 
   void set_max_step_s(double step) { max_step_s_ = step; }
+  // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next SetParameters.
+  void set_shift_s(double shift) { shift_s_ = shift; }
   const mjModel& mujoco_model() const { return *mujoco_; }
   mjData& data() { return *data_; }
 
@@ -64,7 +66,7 @@ class Simulator {
   DataPtr data_;
   ParameterWriter writer_;
   double max_step_s_;
-  double command_delay_s_ = 0;
+  double shift_s_ = 0, command_delay_s_ = 0;
   bool reads_torque_ = false;
   std::vector<double> values_;
   std::vector<double> column_;        // scratch of DelaySignals

@@ -1,0 +1,120 @@
+// The least-squares problem of a fit: residuals of replayed windows against the log, with the nuisances that every log brings.
+//
+//   cost(y, x) = 1/2 sum_windows [ sum_rows,signals rho(w (predicted - measured)) + |prior(x_w)|^2 ]
+//
+// y: the tuned parameters (in search coordinates), one zero offset per measured position and log, one command shift below a sample. x_w: the window's
+// initial state, as corrections of what the log says (angle and speed of every measured joint). Windows are independent given y, so each x_w is
+// eliminated from the normal equations by its own small Schur complement (Golub & Pereyra, "The differentiation of pseudo-inverses and nonlinear
+// least squares problems whose variables separate", SIAM J. Numer. Anal. 10, 1973; Triggs et al., "Bundle adjustment", 2000, sec. 6).
+// Derivatives are finite differences: every column is a replay of its window, and windows run in parallel.
+#ifndef GAPSCOPE_TUNE_FIT_PROBLEM_H_
+#define GAPSCOPE_TUNE_FIT_PROBLEM_H_
+
+#include <Eigen/Dense>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "replay/replay.h"
+
+namespace gapscope {
+
+enum class Objective { kWindows, kFreeRun, kBoth };
+
+struct FitOptions {
+  std::vector<int> free;            // indices of tuned parameters
+  Objective objective = Objective::kWindows;
+  double window_s = 1.0;
+  double lead_in_s = 0.05;          // start of a window that is not scored
+  double time_step_s = 0;           // 0: the model's
+  bool fit_offsets = true;          // zero offsets of measured positions, per log
+  bool fit_shift = true;            // command shift within +-1 sample, common to all logs
+  bool fit_states = true;           // initial state of each window
+  double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
+};
+
+// A parameter in search coordinates: logarithmic where its lower bound is positive, else in units of `scale`.
+struct Coordinate {
+  int parameter = 0;
+  bool logarithmic = false;
+  double scale = 1, low = 0, high = 0;  // bounds in search coordinates
+  double ToSearch(double value) const;
+  double ToValue(double search) const;
+};
+
+// One candidate solution.
+struct FitPoint {
+  Eigen::VectorXd y;                    // parameters, then offsets, then the shift
+  std::vector<Eigen::VectorXd> states;  // per window
+};
+
+// Normal equations at a point with the window states eliminated.
+struct Linearization {
+  double cost = 0;
+  Eigen::MatrixXd hessian;                  // Gauss-Newton, of y
+  Eigen::VectorXd gradient;                 // of y, at the states' own optimum
+  std::vector<Eigen::VectorXd> window_gradients;  // reduced, per window: for cluster-robust covariances
+  std::vector<Eigen::MatrixXd> state_gain;  // dx_w = state_step - state_gain dy
+  std::vector<Eigen::VectorXd> state_step;
+  bool valid = false;                       // false: the point cannot be simulated
+};
+
+class FitProblem {
+ public:
+  // All references must outlive the problem. `values`: fixed parameters, and where the free ones start.
+  FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options, std::vector<double> values, ThreadPool& pool);
+  ~FitProblem();
+
+  const std::vector<Coordinate>& coordinates() const { return coordinates_; }
+  std::size_t size() const { return low_.size(); }
+  const Eigen::VectorXd& low() const { return low_; }
+  const Eigen::VectorXd& high() const { return high_; }
+  std::size_t windows() const { return windows_.size(); }
+  std::size_t residuals() const;           // scored rows x signals
+
+  FitPoint Start() const;
+  // Parameter values at a point; offset of log l and signal s (0 where none is fitted).
+  std::vector<double> Values(const FitPoint& point) const;
+  double Offset(const FitPoint& point, std::size_t log, std::size_t signal) const;
+  double Shift(const FitPoint& point) const;
+
+  // Cost; infinity where a replay diverges. `log_costs` receives each log's part.
+  double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr);
+  // `step`: finite difference in search coordinates.
+  Linearization Linearize(const FitPoint& point, double step);
+  // Moves y by dy and each window's state by its own best answer to that.
+  FitPoint Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const;
+
+  std::size_t replays() const { return replays_; }   // passes over all windows
+  // Huber threshold in residual units; infinity: plain squares. Set from the residuals of the last Cost().
+  void UpdateRobustScale(const FitPoint& point);
+
+ private:
+  struct FitWindow;
+  struct Worker;
+  struct Scaling;
+
+  bool Simulate(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift,
+                std::vector<double>& predicted) const;
+  void Residuals(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted, Eigen::VectorXd& residual) const;
+  double WindowCost(const Eigen::VectorXd& residual, const FitWindow& window, const Eigen::VectorXd& state) const;
+  Worker& GetWorker(int index);
+
+  const Model& model_;
+  const std::vector<Recording>& recordings_;
+  FitOptions options_;
+  std::vector<double> values_;
+  ThreadPool& pool_;
+  std::vector<Coordinate> coordinates_;
+  Eigen::VectorXd low_, high_;
+  std::vector<FitWindow> windows_;
+  std::vector<std::vector<Scaling>> scaling_;   // per log, per signal
+  std::vector<std::unique_ptr<Worker>> workers_;
+  double huber_threshold_;
+  std::size_t replays_ = 0;
+  double shift_scale_s_ = 0;                    // one sample; 0: no shift is fitted
+};
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_TUNE_FIT_PROBLEM_H_

@@ -29,6 +29,12 @@ struct Finding {
   std::string text;           // one sentence for the user, saying what was done about it
 };
 
+// Row `row` stands on line `line` (1-based) of the file, and the rows after it on the lines after it, one each, up to
+// the next anchor. Comments, blank lines and formats with many rows to a line start a new anchor.
+struct LineAnchor {
+  std::size_t row = 0, line = 1;
+};
+
 struct Log {
   std::string path;
   std::string format;  // "csv" or "bam_json"
@@ -36,11 +42,17 @@ struct Log {
   std::map<std::string, double> header;            // numbers of the header, by name
   std::map<std::string, std::string> header_text;  // texts of the header, by name
   std::vector<Finding> findings;
+  std::vector<LineAnchor> lines;  // ascending in row; empty: a format without lines
+  std::size_t header_line = 1;    // where the columns' names are
 
   std::size_t rows() const { return columns.empty() ? 0 : columns.front().values.size(); }
-  // The column of that name, or null. The first one when the file repeats a name (reported as a finding).
+  // The column of that name, or null. The first one when the file repeats a name (reported as a finding). "voltage",
+  // "voltage [V]" and "voltage (V)" all find the column whose heading was "voltage [V]".
   const Column* Find(std::string_view name) const;
   std::vector<std::string> ColumnNames() const;
+  // "path:line" of a row, or of the names, for error messages.
+  std::string Where(std::size_t row) const;
+  std::string WhereHeader() const;
 };
 
 enum class LogFormat { kAuto, kCsv, kBamJson };
@@ -56,8 +68,9 @@ struct ReadOptions {
   std::vector<Companion> companions;
 };
 
-// Reads a log. Errors name file and line (and column): absent, empty, binary, no header, wrong number of fields, not a
-// number, unterminated quote, invalid JSON, unequal companion, more than 10^9 values.
+// Reads a log. Errors name file and line (and column): absent, empty, binary, UTF-16, no header, wrong number of fields,
+// not a number, unterminated quote, endless line, invalid JSON, unequal companion, more than 10^9 values. Companions
+// whose rows differ by one are cut to the shorter file (Finding "companion_rows").
 Result<Log> ReadLog(const std::string& path, const ReadOptions& options);
 
 }  // namespace gapscope

@@ -1,0 +1,147 @@
+#include "src/log/log.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <new>
+
+#include <fmt/format.h>
+
+#include "src/core/file.h"
+#include "src/log/bam_reader.h"
+#include "src/log/csv_reader.h"
+#include "src/log/text.h"
+
+namespace gapscope {
+namespace {
+
+// One entry per format. A new format is a reader and a line here (and its name in LogFormat).
+struct FormatReader {
+  LogFormat format;
+  bool (*matches)(const std::string& path, std::string_view bytes);  // for kAuto; the first that matches reads
+  Result<Log> (*read)(const std::string& path, std::string_view bytes);
+};
+
+bool LooksLikeJson(const std::string& path, std::string_view bytes) {
+  const std::size_t first = bytes.find_first_not_of(" \t\r\n", BomSize(bytes));
+  return path.ends_with(".json") || (first != std::string_view::npos && (bytes[first] == '{' || bytes[first] == '['));
+}
+bool Always(const std::string&, std::string_view) { return true; }
+
+constexpr std::array kReaders = {
+    FormatReader{LogFormat::kBamJson, LooksLikeJson, ReadBamJson},
+    FormatReader{LogFormat::kCsv, Always, ReadCsv},
+};
+
+Result<Log> ReadOne(const std::string& path, LogFormat format) {
+  GS_ASSIGN(const std::string bytes, ReadFile(path));
+  for (const auto& reader : kReaders) {
+    if (format == LogFormat::kAuto ? !reader.matches(path, bytes) : reader.format != format) continue;
+    try {
+      return reader.read(path, bytes);
+    } catch (const std::bad_alloc&) {
+      return Error{.what = "not enough memory for this log", .where = At(path, 1), .actual = fmt::format("{} bytes", bytes.size()),
+                   .allowed = "", .cure = "split it, or leave out columns"};
+    }
+  }
+  return Error{.what = "no reader for this format", .where = At(path, 1), .actual = "", .allowed = "auto, csv, bam_json", .cure = ""};
+}
+
+Result<std::string> CompanionPath(const std::string& path, const Companion& companion) {
+  const std::filesystem::path whole(path);
+  std::string name = whole.filename().string();
+  const std::size_t at = companion.find.empty() ? std::string::npos : name.rfind(companion.find);
+  if (at == std::string::npos || companion.find == companion.replace) {
+    return Error{.what = "no name for the file that belongs to this log", .where = At(path, 1), .actual = Quoted(name, 200),
+                 .allowed = fmt::format("a name with {}, to be replaced by {}", Quoted(companion.find), Quoted(companion.replace)),
+                 .cure = "name the right log, or correct 'companions' in the experiment file"};
+  }
+  name.replace(at, companion.find.size(), companion.replace);
+  return (whole.parent_path() / name).string();
+}
+
+// Pairs the rows of `other` with those of `log`.
+Status Join(const Companion& companion, Log other, Log* log) {
+  const std::size_t own = log->rows(), theirs = other.rows();
+  if (own > theirs + 1 || theirs > own + 1) {
+    return Error{.what = "two files that belong together have different numbers of rows", .where = At(log->path, log->header_line),
+                 .actual = fmt::format("{} rows here, {} in {}", own, theirs, other.path), .allowed = "equal numbers, or one more in one of them",
+                 .cure = "are they of the same run?"};
+  }
+  if (own != theirs) {
+    const std::size_t rows = std::min(own, theirs);
+    for (auto& column : log->columns) column.values.resize(rows);
+    for (auto& column : other.columns) column.values.resize(rows);
+    log->findings.push_back({"companion_rows", "", 1, rows,
+                             fmt::format("{} rows here, {} in {}; the extra last row was cut off", own, theirs, other.path)});
+  }
+  for (auto& column : other.columns) {
+    column.name = companion.prefix + column.name;
+    log->columns.push_back(std::move(column));
+  }
+  for (const auto& [key, value] : other.header) log->header.emplace(companion.prefix + key, value);
+  for (const auto& [key, value] : other.header_text) log->header_text.emplace(companion.prefix + key, value);
+  for (auto& finding : other.findings) {
+    if (!finding.column.empty()) finding.column = companion.prefix + finding.column;
+    finding.text = other.path + ": " + finding.text;
+    log->findings.push_back(std::move(finding));
+  }
+  return Ok();
+}
+
+bool EqualApartFromBlanks(std::string_view a, std::string_view b) {
+  std::size_t i = 0, j = 0;
+  while (true) {
+    while (i < a.size() && a[i] == ' ') ++i;
+    while (j < b.size() && b[j] == ' ') ++j;
+    if (i == a.size() || j == b.size()) return i == a.size() && j == b.size();
+    if (a[i++] != b[j++]) return false;
+  }
+}
+
+}  // namespace
+
+const Column* Log::Find(std::string_view name) const {
+  for (const auto& column : columns) {
+    if (column.name == name) return &column;
+  }
+  for (const auto& column : columns) {
+    if (column.unit.empty()) continue;
+    if (EqualApartFromBlanks(column.name + "[" + column.unit + "]", name) || EqualApartFromBlanks(column.name + "(" + column.unit + ")", name)) {
+      return &column;
+    }
+  }
+  return nullptr;
+}
+
+std::vector<std::string> Log::ColumnNames() const {
+  std::vector<std::string> names;
+  for (const auto& column : columns) names.push_back(column.name);
+  return names;
+}
+
+std::string Log::Where(std::size_t row) const {
+  const auto after = std::upper_bound(lines.begin(), lines.end(), row, [](std::size_t r, const LineAnchor& a) { return r < a.row; });
+  if (after == lines.begin()) return At(path, header_line);
+  const LineAnchor& anchor = *(after - 1);
+  return At(path, anchor.line + (row - anchor.row));
+}
+
+std::string Log::WhereHeader() const { return At(path, header_line); }
+
+Result<Log> ReadLog(const std::string& path, const ReadOptions& options) {
+  GS_ASSIGN(Log log, ReadOne(path, options.format));
+  for (const auto& companion : options.companions) {
+    GS_ASSIGN(const std::string other_path, CompanionPath(path, companion));
+    Result<Log> other = ReadOne(other_path, options.format);
+    if (!other.ok()) {
+      Error error = other.error();
+      error.what = "the file that belongs to " + path + " cannot be used: " + error.what;
+      return error;
+    }
+    GS_RETURN_IF_ERROR(Join(companion, std::move(other).value(), &log));
+  }
+  return log;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,260 @@
+#include "src/compare/conditions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "src/compare/bootstrap.h"
+#include "src/compare/condition_bins.h"
+#include "src/compare/noise.h"
+#include "src/compare/spectrum.h"
+#include "src/core/result.h"
+
+namespace gapscope {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kFewestRows = 3;
+constexpr std::size_t kFewestRowsForInterval = 20;
+constexpr std::size_t kFewestRowsForFrequency = 16;
+constexpr double kBandwidthPart = 0.95;
+constexpr std::array<double, 4> kBandLimits = {0.25, 0.5, 1, 2};  // of the signal's bandwidth
+constexpr double kBlockCorrelationTimes = 4;
+constexpr double kLow = 0.05, kHigh = 0.95;
+
+// One condition and its share of the time. Its squared error stands in a column of its own, by cell (bootstrap.h).
+struct Condition {
+  ConditionFamily family;
+  std::string name;
+  double share_of_time;
+};
+
+struct Conditions {
+  std::vector<Condition> list;
+  std::vector<std::vector<double>> columns;  // squared error, list.size() columns of CellCount(rows)
+};
+
+// measured - predicted in units of the greatest error, so that no square overflows; NaN for rows left out.
+std::vector<double> ScaledErrors(const ConditionInput& input, const std::vector<char>& used) {
+  std::vector<double> errors(used.size(), kNaN);
+  double greatest = 0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    errors[i] = input.measured[i] / 2 - input.predicted[i] / 2;
+    greatest = std::max(greatest, std::abs(errors[i]));
+  }
+  if (greatest > 0) {
+    for (double& error : errors) error /= greatest;
+  } else {
+    errors.clear();
+  }
+  return errors;
+}
+
+void AddPartition(const Partition& partition, const std::vector<double>& errors, Conditions* conditions) {
+  std::vector<std::size_t> rows(partition.names.size());
+  std::size_t all = 0;
+  for (const int bin : partition.bin) {
+    if (bin < 0) continue;
+    ++rows[static_cast<std::size_t>(bin)];
+    ++all;
+  }
+  if (std::count_if(rows.begin(), rows.end(), [](std::size_t count) { return count > 0; }) < 2) return;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (rows[k] == 0) continue;
+    const double share = static_cast<double>(rows[k]) / static_cast<double>(all);
+    conditions->list.push_back({.family = partition.family, .name = partition.names[k], .share_of_time = share});
+    std::vector<double>& column = conditions->columns.emplace_back(CellCount(errors.size()));
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+      if (partition.bin[i] == static_cast<int>(k)) column[i / RowsPerCell(errors.size())] += errors[i] * errors[i];
+    }
+  }
+}
+
+// The frequency below which 95 % of the signal's mean square lies, mean removed; NaN for a constant signal.
+double Bandwidth(const BandSplitter& signal, double* total) {
+  *total = 0;
+  for (std::size_t k = 1; k < signal.bins(); ++k) *total += signal.power()[k];
+  double sum = 0;
+  for (std::size_t k = 1; k < signal.bins(); ++k) {
+    sum += signal.power()[k];
+    if (sum >= kBandwidthPart * *total && sum > 0) return static_cast<double>(k) * signal.bin_hz();
+  }
+  return kNaN;
+}
+
+void AddFrequencies(const ConditionInput& input, const std::vector<char>& used, const std::vector<double>& errors,
+                    Conditions* conditions) {
+  std::vector<double> measured(used.size(), kNaN);
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (used[i]) measured[i] = input.measured[i];
+  }
+  const double step_s = MedianStep(input.time_s);
+  const BandSplitter signal(FillGaps(measured), step_s), error(FillGaps(errors), step_s);
+  double signal_power = 0;
+  const double bandwidth_hz = Bandwidth(signal, &signal_power);
+  if (!std::isfinite(bandwidth_hz)) return;
+
+  // The mean, then bands between limits; the last one ends at the Nyquist frequency.
+  const double nyquist_hz = 0.5 / step_s;
+  std::vector<double> limits_hz = {0};
+  for (const double part : kBandLimits) {
+    const double limit = RoundToTwoDigits(part * bandwidth_hz);
+    if (limit > limits_hz.back() && limit < nyquist_hz) limits_hz.push_back(limit);
+  }
+  limits_hz.push_back(nyquist_hz);
+  std::size_t first = 0;
+  for (std::size_t band = 0; band < limits_hz.size(); ++band) {
+    std::size_t last = error.bins();
+    if (band == 0) {
+      last = 1;
+    } else if (band + 1 < limits_hz.size()) {
+      last = static_cast<std::size_t>(std::ceil(limits_hz[band] / error.bin_hz() * (1 - 1e-12)));
+    }
+    if (last <= first) continue;
+    Condition condition{.family = ConditionFamily::kFrequency,
+                        .name = band == 0 ? "constant error"
+                                          : "frequency " + NumberText(limits_hz[band - 1]) + ".." +
+                                                NumberText(limits_hz[band]) + " Hz",
+                        .share_of_time = 0};
+    for (std::size_t k = std::max<std::size_t>(1, first); k < last; ++k) {
+      condition.share_of_time += signal.power()[k] / signal_power;
+    }
+    conditions->list.push_back(std::move(condition));
+    const std::vector<double> part = error.Part(first, last);
+    std::vector<double>& column = conditions->columns.emplace_back(CellCount(used.size()));
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      if (used[i]) column[i / RowsPerCell(used.size())] += part[i] * part[i];
+    }
+    first = last;
+  }
+}
+
+// Length of the bootstrap's blocks.
+std::size_t BlockCells(const std::vector<double>& errors) {
+  std::vector<double> squares(errors.size());
+  for (std::size_t i = 0; i < errors.size(); ++i) squares[i] = errors[i] * errors[i];
+  const double correlation_rows = CorrelationTime(squares, 1.0);
+  const double rows = kBlockCorrelationTimes * (std::isnan(correlation_rows) ? 1 : correlation_rows);
+  const double cells = static_cast<double>(CellCount(errors.size()));
+  const double wanted = std::clamp(rows / static_cast<double>(RowsPerCell(errors.size())), cells / 200, cells / 10);
+  return static_cast<std::size_t>(std::max(1L, std::lround(wanted)));
+}
+
+// The families' places in `conditions`: first and one past the last.
+std::vector<std::pair<std::size_t, std::size_t>> Families(const std::vector<Condition>& conditions) {
+  std::vector<std::pair<std::size_t, std::size_t>> families;
+  for (std::size_t c = 0; c < conditions.size(); ++c) {
+    if (families.empty() || conditions[families.back().first].family != conditions[c].family) families.push_back({c, c});
+    families.back().second = c + 1;
+  }
+  return families;
+}
+
+// Shares of sums[first..last-1] in their total; all NaN when that is zero.
+void Shares(std::span<const double> sums, std::pair<std::size_t, std::size_t> family, std::span<double> shares) {
+  double total = 0;
+  for (std::size_t c = family.first; c < family.second; ++c) total += sums[c];
+  for (std::size_t c = family.first; c < family.second; ++c) shares[c] = total > 0 ? sums[c] / total : kNaN;
+}
+
+double Percentile(std::vector<double>* values, double part) {
+  const auto at = static_cast<std::ptrdiff_t>(std::lround(part * static_cast<double>(values->size() - 1)));
+  std::nth_element(values->begin(), values->begin() + at, values->end());
+  return (*values)[static_cast<std::size_t>(at)];
+}
+
+void SetIntervals(const Conditions& conditions, std::size_t block, const ConditionOptions& options,
+                  std::vector<ConditionShare>* result) {
+  const std::size_t width = conditions.list.size();
+  std::vector<double> drawn = ResampleSums(conditions.columns, block, options.replicates, options.seed);
+  const auto families = Families(conditions.list);
+  for (std::size_t start = 0; start < drawn.size(); start += width) {
+    const std::span<double> row(&drawn[start], width);
+    for (const auto& family : families) Shares(row, family, row);
+  }
+  std::vector<double> values;
+  for (std::size_t c = 0; c < width; ++c) {
+    values.clear();
+    for (std::size_t start = 0; start < drawn.size(); start += width) {
+      if (!std::isnan(drawn[start + c])) values.push_back(drawn[start + c]);
+    }
+    if (values.size() < 20) continue;
+    (*result)[c].low = Percentile(&values, kLow);
+    (*result)[c].high = Percentile(&values, kHigh);
+  }
+}
+
+void CheckInput(const ConditionInput& input, const ConditionOptions& options) {
+  const std::size_t n = input.time_s.size();
+  GS_CHECK(input.measured.size() == n && input.predicted.size() == n && options.replicates >= 20);
+  for (const auto& values : {input.speed, input.command, input.angle}) GS_CHECK(values.empty() || values.size() == n);
+  GS_CHECK(std::all_of(input.time_s.begin(), input.time_s.end(), [](double t) { return std::isfinite(t); }));
+  GS_CHECK(std::adjacent_find(input.time_s.begin(), input.time_s.end(), std::greater_equal<>()) == input.time_s.end());
+}
+
+}  // namespace
+
+std::vector<ConditionShare> LocateError(const ConditionInput& input, const ConditionOptions& options) {
+  CheckInput(input, options);
+  const std::size_t n = input.time_s.size();
+  std::vector<char> used(n);
+  std::size_t used_rows = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    used[i] = std::isfinite(input.measured[i]) && std::isfinite(input.predicted[i]);
+    used_rows += used[i] ? 1 : 0;
+  }
+  if (used_rows < kFewestRows) return {};
+  const std::vector<double> errors = ScaledErrors(input, used);
+  if (errors.empty()) return {};
+
+  Conditions conditions;
+  for (const Partition& partition : MakePartitions(input, used)) AddPartition(partition, errors, &conditions);
+  if (used_rows >= kFewestRowsForFrequency) AddFrequencies(input, used, errors, &conditions);
+
+  // Shares of the whole log, then their intervals. A family without any error has no shares.
+  std::vector<double> totals;
+  for (const auto& column : conditions.columns) totals.push_back(std::accumulate(column.begin(), column.end(), 0.0));
+  for (const auto& family : Families(conditions.list)) Shares(totals, family, totals);
+  std::vector<ConditionShare> result;
+  for (std::size_t c = 0; c < totals.size(); ++c) {
+    const Condition& condition = conditions.list[c];
+    result.push_back({.signal = input.signal, .condition = condition.name, .share_of_error = totals[c],
+                      .share_of_time = condition.share_of_time, .low = kNaN, .high = kNaN, .family = condition.family});
+  }
+  if (used_rows >= kFewestRowsForInterval && !result.empty()) {
+    SetIntervals(conditions, BlockCells(errors), options, &result);
+  }
+  std::erase_if(result, [](const ConditionShare& share) { return std::isnan(share.share_of_error); });
+  return result;
+}
+
+std::vector<ConditionShare> MostTelling(std::span<const ConditionShare> shares, const TellingOptions& options) {
+  std::vector<ConditionShare> telling;
+  for (const ConditionShare& share : shares) {
+    if (share.share_of_error >= options.least_share && share.low > share.share_of_time &&
+        share.share_of_error >= options.least_ratio * share.share_of_time) {
+      telling.push_back(share);
+    }
+  }
+  std::stable_sort(telling.begin(), telling.end(), [](const ConditionShare& a, const ConditionShare& b) {
+    const double excess_a = a.low - a.share_of_time, excess_b = b.low - b.share_of_time;
+    if (excess_a != excess_b) return excess_a > excess_b;
+    return std::tie(a.signal, a.family, a.condition) < std::tie(b.signal, b.family, b.condition);
+  });
+  std::map<std::pair<std::string, ConditionFamily>, std::size_t> taken;
+  std::vector<ConditionShare> result;
+  for (ConditionShare& share : telling) {
+    if (result.size() >= options.limit) break;
+    if (++taken[{share.signal, share.family}] <= options.per_family) result.push_back(std::move(share));
+  }
+  return result;
+}
+
+}  // namespace gapscope

@@ -88,9 +88,12 @@ class LiveParameters {
     return address_[i] >= 0 ? m->numeric_data[address_[i]] : value_[i];
   }
 
+  // Whether parameter i can ever differ from `neutral`: its stage is skipped otherwise.
+  bool IsNeutral(int i, double neutral) const { return address_[i] < 0 && value_[i] == neutral; }
+
  private:
   static std::string UnitText(const ParameterSpec& spec) {
-    return std::strcmp(spec.unit, "1") == 0 ? std::string() : " " + std::string(spec.unit);
+    return std::strcmp(spec.unit, "1") == 0 ? std::string() : std::string(" ").append(spec.unit);
   }
   std::array<double, N> value_{};
   std::array<int, N> address_{};

@@ -1,3 +1,187 @@
+#include "src/plugins/encoder/encoder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/plugins/common/compile_guard.h"
+
 namespace gapscope::plugins {
-void RegisterEncoder() {}
+namespace {
+
+constexpr const char* kAttributes[] = {"resolution_rad", "offset_rad",  "delay_s",       "time_constant_s",
+                                       "velocity",       "max_delay_s", "min_timestep_s"};
+constexpr double kDefaultMaxDelay_s = 0.05;
+
+bool Flag(std::string_view text, bool* value) {
+  *value = text == "true" || text == "1";
+  return *value || text.empty() || text == "false" || text == "0";
+}
+
+}  // namespace
+
+const std::array<ParameterSpec, Encoder::kParameters> Encoder::kSpecs = {{
+    {"resolution_rad", "rad", 0, 0, 10},
+    {"offset_rad", "rad", 0, -1e6, 1e6},
+    {"delay_s", "s", 0, 0, 10},
+    {"time_constant_s", "s", 0, 0, 1e3},
+}};
+
+double Encoder::MaxDelay(const mjModel* m, int instance) {
+  double value = 0;
+  if (ParseNumber(ConfigText(m, instance, "max_delay_s"), &value)) return value;
+  const std::string name = InstanceName(m, instance);
+  if (!name.empty() && mj_name2id(m, mjOBJ_NUMERIC, (name + ".delay_s").c_str()) >= 0) return kDefaultMaxDelay_s;
+  return ParseNumber(ConfigText(m, instance, "delay_s"), &value) && value > 0 ? kDefaultMaxDelay_s : 0;
+}
+
+int Encoder::StateSize(const mjModel* m, int instance) {
+  const double max_delay = MaxDelay(m, instance);
+  if (!(max_delay > 0) || max_delay > 10) return kSlots;
+  double step = 0;
+  if (!ParseNumber(ConfigText(m, instance, "min_timestep_s"), &step) || !(step > 0)) step = m->opt.timestep / 2;
+  return kSlots + History::Size(static_cast<int>(std::min(std::ceil(max_delay / step) + 2, 1e6)), 0);
+}
+
+std::unique_ptr<Encoder> Encoder::Create(const mjModel* m, int instance, std::string* problem) {
+  auto encoder = std::make_unique<Encoder>();
+  encoder->inert_ = true;
+  encoder->state_ = m->plugin_stateadr[instance];
+  const std::string who = "gapscope.encoder instance '" + InstanceName(m, instance) + "': ";
+
+  if (*problem = encoder->live_.Resolve(m, instance, kSpecs); !problem->empty()) {
+    *problem = "gapscope.encoder " + *problem;
+    return encoder;
+  }
+  const std::string_view velocity_text = ConfigText(m, instance, "velocity");
+  if (!Flag(velocity_text, &encoder->velocity_)) {
+    *problem = who + "attribute 'velocity' is '" + std::string(velocity_text) + "', allowed true, false";
+    return encoder;
+  }
+  for (const char* key : {"max_delay_s", "min_timestep_s"}) {
+    const std::string_view text = ConfigText(m, instance, key);
+    double value = 0;
+    if (!text.empty() && (!ParseNumber(text, &value) || value < 0 || value > 10)) {
+      *problem = who + "attribute '" + key + "' is '" + std::string(text) + "', allowed 0 to 10 s; leave it out";
+      return encoder;
+    }
+  }
+  encoder->max_delay_s_ = MaxDelay(m, instance);
+  if (const double delay = encoder->live_(m, kDelay); delay > encoder->max_delay_s_) {
+    *problem = who + "attribute 'delay_s' is " + std::to_string(delay) + " s, allowed 0 to max_delay_s = " +
+               std::to_string(encoder->max_delay_s_) + " s; raise max_delay_s";
+    return encoder;
+  }
+
+  int sensor = -1;
+  for (int i = 0; i < m->nsensor; ++i) {
+    if (m->sensor_plugin[i] != instance) continue;
+    if (sensor >= 0) {
+      *problem = who + "two sensors name it, allowed one per instance; make another instance";
+      return encoder;
+    }
+    sensor = i;
+  }
+  if (sensor < 0) {
+    *problem = who + "no sensor names it, allowed one; add <sensor><plugin objtype=\"joint\" .../>";
+    return encoder;
+  }
+  const int joint = m->sensor_objid[sensor];
+  if (m->sensor_objtype[sensor] != mjOBJ_JOINT ||
+      (m->jnt_type[joint] != mjJNT_HINGE && m->jnt_type[joint] != mjJNT_SLIDE)) {
+    *problem = who + "its sensor is not on a hinge or slide joint; write objtype=\"joint\" objname=\"...\"";
+    return encoder;
+  }
+  encoder->output_ = m->sensor_adr[sensor];
+  encoder->qpos_ = m->jnt_qposadr[joint];
+  encoder->dof_ = m->jnt_dofadr[joint];
+  if (!encoder->live_.IsNeutral(kDelay, 0)) {
+    encoder->capacity_ = History::Capacity(m->plugin_statenum[instance] - kSlots, 0);
+  }
+  encoder->inert_ = false;
+  return encoder;
+}
+
+void Encoder::Compute(const mjModel* m, mjData* d) const {
+  if (inert_) return;
+  double* slots = d->plugin_state + state_;
+  Motion motion{d->qpos[qpos_], d->qvel[dof_]};
+  if (capacity_ > 0) {
+    History history(slots + kSlots, capacity_, 0);
+    history.Open(d->time, motion.q, motion.qdot, nullptr);
+    motion = history.MotionAt(std::min(live_(m, kDelay), max_delay_s_), d->time, motion, m->opt.timestep);
+  }
+  double angle = motion.q + live_(m, kOffset);
+  if (const double resolution = live_(m, kResolution); resolution > 0) {
+    angle = std::round(angle / resolution) * resolution;
+  }
+
+  // The drive differentiates its own readings; before there are two, it is taken to know the speed.
+  double speed = motion.qdot;
+  if (slots[kHasLast] != 0 && d->time > slots[kLastTime]) {
+    const double step = d->time - slots[kLastTime], constant = live_(m, kTimeConstant);
+    const double share = constant > 0 ? -std::expm1(-step / constant) : 1;
+    speed = slots[kLastSpeed] + share * ((angle - slots[kLastAngle]) / step - slots[kLastSpeed]);
+  }
+  slots[kOpen] = 1;
+  slots[kTime] = d->time;
+  slots[kAngle] = angle;
+  slots[kSpeed] = speed;
+  d->sensordata[output_] = angle;
+  if (velocity_) d->sensordata[output_ + 1] = speed;
+}
+
+void Encoder::Advance(mjData* d) const {
+  double* slots = d->plugin_state + state_;
+  if (inert_ || slots[kOpen] == 0) return;
+  slots[kOpen] = 0;
+  slots[kHasLast] = 1;
+  slots[kLastTime] = slots[kTime];
+  slots[kLastAngle] = slots[kAngle];
+  slots[kLastSpeed] = slots[kSpeed];
+  if (capacity_ > 0) History(slots + kSlots, capacity_, 0).Close();
+}
+
+void Encoder::Register() {
+  static thread_local CompileGuard guard;
+  mjpPlugin plugin;
+  mjp_defaultPlugin(&plugin);
+  plugin.name = "gapscope.encoder";
+  plugin.capabilityflags = mjPLUGIN_SENSOR;
+  plugin.needstage = mjSTAGE_VEL;
+  plugin.nattribute = static_cast<int>(std::size(kAttributes));
+  plugin.attributes = kAttributes;
+  plugin.nstate = +[](const mjModel* m, int instance) {
+    guard.NoteState(m);
+    return StateSize(m, instance);
+  };
+  plugin.nsensordata = +[](const mjModel* m, int instance, int) {
+    bool velocity = false;
+    Flag(ConfigText(m, instance, "velocity"), &velocity);
+    return velocity ? 2 : 1;
+  };
+  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
+    std::string problem;
+    std::unique_ptr<Encoder> encoder = Encoder::Create(m, instance, &problem);
+    if (guard.Judge(m, problem) < 0) return -1;
+    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(encoder.release());
+    return 0;
+  };
+  plugin.destroy = +[](mjData* d, int instance) {
+    delete reinterpret_cast<Encoder*>(d->plugin_data[instance]);
+    d->plugin_data[instance] = 0;
+  };
+  plugin.reset = +[](const mjModel* m, mjtNum* plugin_state, void*, int instance) {
+    mju_zero(plugin_state, m->plugin_statenum[instance]);
+  };
+  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
+    reinterpret_cast<const Encoder*>(d->plugin_data[instance])->Compute(m, d);
+  };
+  plugin.advance = +[](const mjModel*, mjData* d, int instance) {
+    reinterpret_cast<const Encoder*>(d->plugin_data[instance])->Advance(d);
+  };
+  mjp_registerPlugin(&plugin);
+}
+
+void RegisterEncoder() { Encoder::Register(); }
+
 }  // namespace gapscope::plugins

@@ -1,7 +1,7 @@
 #include "src/experiment/recording.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 
@@ -109,51 +109,56 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
   return recording;
 }
 
+namespace {
+
+// A log that begins at rest: nothing leaves the first sample's count for the first 10 ms.
+bool StartsAtRest(const Recording& recording, const Recording::Measured& measured) {
+  constexpr double kSpan_s = 0.01;
+  const auto& t = recording.time_s;
+  for (std::size_t k = 1; k < t.size() && (k < 3 || t[k] - t[0] <= kSpan_s); ++k) {
+    if (!(std::abs(measured.values[k] - measured.values[0]) <= 1.01 * measured.spec.resolution)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row, double half_width_s) {
+  if (row == 0 && StartsAtRest(recording, measured)) return {measured.values[0], 0};
   const auto& t = recording.time_s;
   std::size_t first = row, last = row;
   while (first > 0 && t[row] - t[first - 1] <= half_width_s) --first;
   while (last + 1 < t.size() && t[last + 1] - t[row] <= half_width_s) ++last;
-  // At least five samples, so that the quadratic does not follow single counts.
-  while (last - first < 4 && (first > 0 || last + 1 < t.size())) {
+  // At least seven samples where there are, so that the quadratic does not follow single counts.
+  while (last - first < 6 && (first > 0 || last + 1 < t.size())) {
     if (last + 1 < t.size()) ++last;
-    if (last - first < 4 && first > 0) --first;
+    if (last - first < 6 && first > 0) --first;
   }
-  // Normal equations of y = a + b s + c s^2 with s = t - t[row], scaled to +-1.
+  // Normal equations of y = a + b s + c s^2 with s = (t - t[row]) / scale.
   const double scale = std::max(t[last] - t[row], t[row] - t[first]);
-  if (!(scale > 0)) return {measured.values[row], 0};
-  std::array<double, 5> moment{};
-  std::array<double, 3> right{};
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  double squares = 0;
+  int count = 0;
   for (std::size_t k = first; k <= last; ++k) {
-    if (!std::isfinite(measured.values[k])) continue;
-    const double s = (t[k] - t[row]) / scale;
-    double power = 1;
-    for (int p = 0; p < 5; ++p, power *= s) {
-      moment[p] += power;
-      if (p < 3) right[p] += power * measured.values[k];
-    }
+    const double y = measured.values[k], s = scale > 0 ? (t[k] - t[row]) / scale : 0;
+    if (!std::isfinite(y)) continue;
+    const Eigen::Vector3d basis(1, s, s * s);
+    normal += basis * basis.transpose();
+    right += basis * y;
+    squares += y * y;
+    ++count;
   }
-  std::array<std::array<double, 4>, 3> m{};
-  const int order = moment[0] >= 5 ? 3 : moment[0] >= 2 ? 2 : 1;
-  if (moment[0] == 0) return {0, 0};
-  for (int i = 0; i < order; ++i) {
-    for (int j = 0; j < order; ++j) m[i][j] = moment[i + j];
-    m[i][3] = right[i];
-  }
-  for (int i = 0; i < order; ++i) {
-    int pivot = i;
-    for (int r = i + 1; r < order; ++r) {
-      if (std::abs(m[r][i]) > std::abs(m[pivot][i])) pivot = r;
-    }
-    std::swap(m[i], m[pivot]);
-    if (m[i][i] == 0) return {right[0] / moment[0], 0};
-    for (int r = 0; r < order; ++r) {
-      if (r == i) continue;
-      const double f = m[r][i] / m[i][i];
-      for (int c = i; c < 4; ++c) m[r][c] -= f * m[i][c];
-    }
-  }
-  return {m[0][3] / m[0][0], order > 1 ? m[1][3] / m[1][1] / scale : 0};
+  if (count < 4) return {std::isfinite(measured.values[row]) ? measured.values[row] : 0, 0};
+  const Eigen::Matrix3d inverse = normal.inverse();
+  const Eigen::Vector3d fit = inverse * right;
+  const double scatter = std::max(squares - fit.dot(right), 0.0) / (count - 3);
+  const double quantisation = measured.spec.resolution * measured.spec.resolution / 12;
+  const double slope_error = std::sqrt(std::max(scatter, quantisation) * inverse(1, 1));
+  // A slope that the samples cannot tell from rest is rest: at a log's first row the fit is one-sided and weak.
+  constexpr double kSignificant = 2;
+  if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(measured.values[row])) return {measured.values[row], 0};
+  return {fit[0], fit[1] / scale};
 }
 
 }  // namespace gapscope

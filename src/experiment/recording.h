@@ -40,7 +40,8 @@ struct Recording {
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path);
 
 // The value and slope of a measured signal at `row`, from a local quadratic least-squares fit over +-`half_width_s`
-// (one-sided at the ends): the initial state of a replay. Slope in SI per second.
+// (one-sided at the ends): the initial state of a replay. Slope in SI per second; a slope within two standard errors of zero is zero, and the value
+// then the sample itself; so is that of a first row whose neighbours stay within one count for 10 ms.
 struct LocalFit {
   double value = 0, slope = 0;
 };

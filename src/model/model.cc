@@ -5,7 +5,7 @@
 
 #include "src/core/units.h"
 #include "src/model/structure.h"
-#include "src/plugins/motor/layout.h"
+#include "src/plugins/motor/history.h"
 
 namespace gapscope {
 namespace {
@@ -23,6 +23,14 @@ std::vector<std::string> NamesOf(const std::vector<Parameter>& parameters, const
   for (const auto& p : parameters) names.push_back(p.name);
   for (const auto& v : experiment.values) names.push_back(v.name);
   return names;
+}
+
+// Where in plugin_state a gapscope.motor keeps its own torque estimate; -1 for any other actuator.
+int EstimateAddress(const mjModel& m, int actuator) {
+  const int instance = m.actuator_plugin[actuator];
+  const mjpPlugin* plugin = instance < 0 ? nullptr : mjp_getPluginAtSlot(m.plugin[instance]);
+  if (!plugin || std::string_view(plugin->name) != "gapscope.motor") return -1;
+  return m.plugin_stateadr[instance] + plugins::MotorState::kEstimate;
 }
 
 std::vector<std::string> ElementNames(const mjModel& m, mjtObj type, int count) {
@@ -123,7 +131,7 @@ Status Model::ResolveNames() {
       source.actuator = mj_name2id(&m, mjOBJ_ACTUATOR, measured.on.c_str());
       if (source.actuator < 0) return NoElement("a measured torque is of an actuator that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
       if (m.actuator_trntype[source.actuator] == mjTRN_JOINT) source.joint = m.actuator_trnid[2 * source.actuator];
-      source.estimate = plugins::MotorEstimateAddress(&m, source.actuator);
+      source.estimate = EstimateAddress(m, source.actuator);
     } else {
       source.joint = mj_name2id(&m, mjOBJ_JOINT, measured.on.c_str());
       if (source.joint < 0) return NoElement("a measured signal is of a joint that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), file);

@@ -327,6 +327,8 @@ Status Structure::FinishMotors() {
         std::fill_n(input->biasprm, mjNBIAS, 0.0);
       }
     }
+    // Lags and the sag keep their state in activations of the first actuator.
+    for (const char* stage : {"time_constant_s", "second_time_constant_s", "sag_fraction"}) drive->actdim += terms.contains(stage) ? 1 : 0;
     for (const auto& [key, expression] : terms) {
       AddNumeric(instance + "." + key, 0);
       Set("numeric/" + instance + "." + key, {expression});

@@ -64,7 +64,7 @@ std::string ReplayTable(const ReplayReport& report) {
   text += std::isfinite(result.time_step_error)
               ? fmt::format("time step {:.4g} ms; halving it changes the error by {:.2g}\n", 1e3 * result.time_step_s, result.time_step_error)
               : fmt::format("time step {:.4g} ms, as asked\n", 1e3 * result.time_step_s);
-  const std::vector<ConditionShare> telling = comparison.logs.empty() ? std::vector<ConditionShare>{} : MostTelling(comparison.logs.front().where, 5);
+  const std::vector<ConditionShare> telling = comparison.logs.empty() ? std::vector<ConditionShare>{} : MostTelling(comparison.logs.front().where, {.limit = 5});
   if (!telling.empty()) {
     text += fmt::format("\nwhere the error lies in the first log {:<24} {:>9} {:>9}   90 % interval\n", "", "of error", "of time");
     for (const auto& share : telling) {

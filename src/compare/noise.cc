@@ -68,11 +68,10 @@ class DensityFitter {
  public:
   DensityFitter(std::vector<Band> bands, double dt_s) : bands_(std::move(bands)), dt_s_(dt_s) {}
 
-  // Best white plus coloured density for bands first..end.
-  Fit Best(std::size_t first) const {
+  // Best white plus coloured density for bands first..end, correlated no longer than `slowest_s`.
+  Fit Best(std::size_t first, double slowest_s) const {
     Fit best = White(first);
     const double white_cost = best.cost;
-    const double slowest_s = 1 / (2 * std::numbers::pi * bands_[first].low_hz);
     // Faster than 1.5 steps cannot be told from white.
     for (double tau_s = slowest_s; tau_s > 1.5 * dt_s_; tau_s /= std::numbers::sqrt2) {
       const Fit fit = Coloured(first, tau_s);
@@ -86,6 +85,11 @@ class DensityFitter {
   }
 
   const std::vector<Band>& bands() const { return bands_; }
+
+  // The slowest noise whose corner lies within bands first..end.
+  double SlowestSeen(std::size_t first) const {
+    return std::max(4 * dt_s_, 1 / (2 * std::numbers::pi * bands_[first].low_hz));
+  }
 
  private:
   double MeanShape(const Band& band, double tau_s) const {
@@ -150,12 +154,12 @@ class DensityFitter {
   double dt_s_;
 };
 
-// The lowest band without motion.
+// The lowest band without motion. What is foretold may rise all the way down as slow noise does.
 std::size_t LowestNoiseBand(const DensityFitter& fitter, std::size_t start) {
   std::size_t first = start;
   while (first > 0) {
     const Band& next = fitter.bands()[first - 1];
-    const double foretold = fitter.Density(fitter.Best(first), next);
+    const double foretold = fitter.Density(fitter.Best(first, fitter.SlowestSeen(0)), next);
     if (next.density > foretold * (kCoarseRise + kNoiseRise / std::sqrt(next.averages))) {
       // The motion's foot may reach into the band just taken.
       return first < start ? first + 1 : first;
@@ -183,7 +187,8 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
   std::vector<Band> bands = MakeBands(spectrum, options.motion_band_hz);
   if (bands.size() < 2) return floor;
   floor.band_high_hz = bands.back().high_hz;
-  if (std::all_of(bands.begin(), bands.end(), [](const Band& band) { return band.density <= 0; })) {
+  const auto [low, high] = std::minmax_element(filled.begin(), filled.end());
+  if (*low == *high) {
     // A signal that does not change has no noise but the sensor's steps.
     floor.white_std = floor.coloured_std = 0;
     floor.total_std = floor.quantisation_std;
@@ -203,7 +208,7 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
     while (start + 2 < fitter.bands().size() && fitter.bands()[start].low_hz < kStartOfNyquist * nyquist_hz) ++start;
     first = LowestNoiseBand(fitter, start);
   }
-  const Fit fit = fitter.Best(first);
+  const Fit fit = fitter.Best(first, fitter.SlowestSeen(first));
   floor.band_low_hz = fitter.bands()[first].low_hz;
   floor.white_std = std::sqrt(fit.white / (2 * dt_s));
   floor.coloured_std = 0;

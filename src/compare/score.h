@@ -33,8 +33,9 @@ struct SignalScore {
 // resolution 0 it is NaN.
 //
 // lag_s: measured(t) is compared with predicted(t - lag). Both are brought to a uniform step (the median one) by linear
-// interpolation; the lag is the greatest Pearson coefficient over the overlap, for |lag| <= min(0.25 s, duration / 4),
-// with a parabola through the peak and its neighbours. At the limit of the range it is the limit. NaN where there is
+// interpolation, points in gaps of more than three steps left out; the lag is the greatest Pearson coefficient over the
+// pairs of points that overlap, for |lag| <= min(0.25 s, duration / 4), with a parabola through the peak and its
+// neighbours. At the limit of the range it is the limit. NaN where there is
 // nothing to align: fewer than 8 rows, a constant signal, or signals such as ramps that correlate equally at every lag
 // (within 1e-9). correlation is NaN below three rows or for a constant signal.
 SignalScore ScoreSignal(std::string signal, std::span<const double> time_s, std::span<const double> measured,

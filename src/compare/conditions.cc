@@ -119,11 +119,11 @@ void AddFrequencies(const ConditionInput& input, const std::vector<char>& used, 
       last = static_cast<std::size_t>(limits_hz[band] / error.bin_hz() * (1 + 1e-12)) + 1;  // limit included
     }
     if (last <= first) continue;
-    Condition condition{.family = ConditionFamily::kFrequency,
-                        .name = band == 0 ? "constant error"
-                                          : "frequency " + NumberText(limits_hz[band - 1]) + ".." +
-                                                NumberText(limits_hz[band]) + " Hz",
-                        .share_of_time = 0};
+    Condition condition{
+        .family = ConditionFamily::kFrequency,
+        .name = band == 0 ? "constant error"
+                          : "frequency " + NumberText(limits_hz[band - 1]) + ".." + NumberText(limits_hz[band]) + " Hz",
+        .share_of_time = 0};
     for (std::size_t k = std::max<std::size_t>(1, first); k < last; ++k) {
       condition.share_of_time += signal.power()[k] / signal_power;
     }
@@ -141,7 +141,8 @@ void AddFrequencies(const ConditionInput& input, const std::vector<char>& used, 
 std::vector<std::pair<std::size_t, std::size_t>> Families(const std::vector<Condition>& conditions) {
   std::vector<std::pair<std::size_t, std::size_t>> families;
   for (std::size_t c = 0; c < conditions.size(); ++c) {
-    if (families.empty() || conditions[families.back().first].family != conditions[c].family) families.push_back({c, c});
+    const bool next = families.empty() || conditions[families.back().first].family != conditions[c].family;
+    if (next) families.push_back({c, c});
     families.back().second = c + 1;
   }
   return families;
@@ -154,8 +155,8 @@ void Shares(std::span<const double> sums, std::pair<std::size_t, std::size_t> fa
   for (std::size_t c = family.first; c < family.second; ++c) shares[c] = total > 0 ? sums[c] / total : kNaN;
 }
 
-// Length of the bootstrap's blocks. What varies in a share s = S_c / S is, to first order, the sum of c_i - s e_i^2 over
-// the log: the slowest of these decides, but for the time windows, which are as slow as the log.
+// Length of the bootstrap's blocks. What varies in a share s = S_c / S is, to first order, the sum of c_i - s e_i^2
+// over the log: the slowest of these decides, but for the time windows, which are as slow as the log.
 std::size_t BlockCells(const Conditions& conditions, const std::vector<double>& shares) {
   double slowest = 1;
   for (const auto& [first, last] : Families(conditions.list)) {
@@ -186,8 +187,8 @@ double Percentile(std::vector<double>* values, double part) {
 // AR(1) a part 1 / (2 kBlockCorrelationTimes) of the variance).
 double Widening(double blocks) {
   const double free = std::max(2.0, blocks - 1), z = kNormal95;
-  const double student = z + (std::pow(z, 3) + z) / (4 * free) +
-                         (5 * std::pow(z, 5) + 16 * std::pow(z, 3) + 3 * z) / (96 * free * free);
+  const double student =
+      z + (std::pow(z, 3) + z) / (4 * free) + (5 * std::pow(z, 5) + 16 * std::pow(z, 3) + 3 * z) / (96 * free * free);
   return student / z * std::sqrt((free + 1) / free) / std::sqrt(1 - 1 / (2 * kBlockCorrelationTimes));
 }
 
@@ -207,8 +208,7 @@ void SetIntervals(const Conditions& conditions, std::size_t block, const Conditi
     const std::span<double> row(&drawn[start], width);
     for (const auto& family : families) Shares(row, family, row);
   }
-  const double widening =
-      Widening(static_cast<double>(conditions.columns.front().size()) / static_cast<double>(block));
+  const double widening = Widening(static_cast<double>(conditions.columns.front().size()) / static_cast<double>(block));
   std::vector<double> values;
   for (std::size_t c = 0; c < width; ++c) {
     values.clear();
@@ -256,8 +256,13 @@ std::vector<ConditionShare> LocateError(const ConditionInput& input, const Condi
   std::vector<ConditionShare> result;
   for (std::size_t c = 0; c < totals.size(); ++c) {
     const Condition& condition = conditions.list[c];
-    result.push_back({.signal = input.signal, .condition = condition.name, .share_of_error = totals[c],
-                      .share_of_time = condition.share_of_time, .low = kNaN, .high = kNaN, .family = condition.family});
+    result.push_back({.signal = input.signal,
+                      .condition = condition.name,
+                      .share_of_error = totals[c],
+                      .share_of_time = condition.share_of_time,
+                      .low = kNaN,
+                      .high = kNaN,
+                      .family = condition.family});
   }
   if (used_rows >= kFewestRowsForInterval && !result.empty()) {
     SetIntervals(conditions, BlockCells(conditions, totals), options, &result);

@@ -25,7 +25,7 @@ constexpr double kColouredGain = 9;       // twice the log-likelihood, for two m
 
 // A quarter octave of the spectrum.
 struct Band {
-  double low_hz, high_hz;  // first and last bin
+  double low_hz, high_hz;   // first and last bin
   std::size_t first, last;  // bins first..last-1
   double density;           // mean over the bins
   double averages;          // independent periodograms behind it
@@ -48,13 +48,17 @@ std::vector<Band> MakeBands(const Spectrum& spectrum, double lowest_hz) {
   const double nyquist_hz = spectrum.bin_hz * static_cast<double>(spectrum.density.size() - 1);
   const auto end = static_cast<std::size_t>(kTopOfNyquist * nyquist_hz / spectrum.bin_hz) + 1;
   // Bins 0 and 1 hold what is left of mean and slope.
-  auto first = std::max<std::size_t>(2, static_cast<std::size_t>(std::ceil(lowest_hz / spectrum.bin_hz)));
+  auto first = std::max<std::size_t>(
+      2, static_cast<std::size_t>(std::ceil(std::min(lowest_hz, 2 * nyquist_hz) / spectrum.bin_hz)));
   while (first < end) {
     const auto wide = static_cast<std::size_t>(static_cast<double>(first) * std::exp2(0.25));
     const std::size_t last = std::min(end, std::max(first + 1, wide));
     Band band{.low_hz = static_cast<double>(first) * spectrum.bin_hz,
               .high_hz = static_cast<double>(last - 1) * spectrum.bin_hz,
-              .first = first, .last = last, .density = 0, .averages = 0};
+              .first = first,
+              .last = last,
+              .density = 0,
+              .averages = 0};
     const double bins = static_cast<double>(last - first);
     for (std::size_t k = first; k < last; ++k) band.density += spectrum.density[k] / bins;
     band.averages = spectrum.averages * std::max(1.0, bins / kHannWidth);
@@ -94,7 +98,8 @@ class DensityFitter {
  private:
   double MeanShape(const Band& band, double tau_s) const {
     return (Shape(band.low_hz, tau_s, dt_s_) + 4 * Shape((band.low_hz + band.high_hz) / 2, tau_s, dt_s_) +
-            Shape(band.high_hz, tau_s, dt_s_)) / 6;
+            Shape(band.high_hz, tau_s, dt_s_)) /
+           6;
   }
 
   double Cost(std::size_t first, const std::vector<double>& model) const {
@@ -139,7 +144,8 @@ class DensityFitter {
       }
       const double determinant = a11 * a22 - a12 * a12;
       if (!(determinant > 1e-12 * a11 * a22)) break;
-      Fit fit{.white = (a22 * b1 - a12 * b2) / determinant, .coloured = (a11 * b2 - a12 * b1) / determinant,
+      Fit fit{.white = (a22 * b1 - a12 * b2) / determinant,
+              .coloured = (a11 * b2 - a12 * b1) / determinant,
               .tau_s = tau_s};
       if (fit.white < 0) fit = {.white = 0, .coloured = b2 / a22, .tau_s = tau_s};
       if (fit.coloured < 0) fit = {.white = b1 / a11, .coloured = 0, .tau_s = tau_s};
@@ -173,9 +179,13 @@ std::size_t LowestNoiseBand(const DensityFitter& fitter, std::size_t start) {
 
 NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double> values, const NoiseOptions& options) {
   GS_CHECK(time_s.size() == values.size() && options.resolution >= 0 && options.motion_band_hz >= 0);
-  NoiseFloor floor{.white_std = kNaN, .coloured_std = kNaN, .correlation_time_s = kNaN,
-                   .quantisation_std = options.resolution / std::sqrt(12.0), .total_std = kNaN,
-                   .band_low_hz = kNaN, .band_high_hz = kNaN};
+  NoiseFloor floor{.white_std = kNaN,
+                   .coloured_std = kNaN,
+                   .correlation_time_s = kNaN,
+                   .quantisation_std = options.resolution / std::sqrt(12.0),
+                   .total_std = kNaN,
+                   .band_low_hz = kNaN,
+                   .band_high_hz = kNaN};
   const auto finite = std::count_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   if (static_cast<std::size_t>(finite) < kFewestRows) return floor;
   const std::vector<double> filled = FillGaps(values);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kLongestLag_s = 0.25;
-constexpr double kFlat = 1e-9;             // correlation that varies less than this has no peak
+constexpr double kFlat = 1e-9;  // correlation that varies less than this has no peak
 constexpr std::size_t kFewestRowsForLag = 8;
 constexpr double kGapSteps = 3;
 constexpr std::size_t kMostPointsPerRow = 4;  // resampling: a gap may not multiply the work
@@ -125,7 +125,8 @@ struct OverlapSums {
 };
 
 // Without gaps the overlap is a stretch of each signal: differences of running sums.
-OverlapSums WholeOverlap(const std::vector<double>& measured, const std::vector<double>& predicted, std::size_t max_lag) {
+OverlapSums WholeOverlap(const std::vector<double>& measured, const std::vector<double>& predicted,
+                         std::size_t max_lag) {
   const std::size_t n = measured.size(), lags = 2 * max_lag + 1;
   const auto stretch_sums = [&](const std::vector<double>& values, bool is_measured) {
     std::vector<double> running(n + 1), result(lags);
@@ -214,8 +215,14 @@ SignalScore ScoreSignal(std::string signal, std::span<const double> time_s, std:
   GS_CHECK(time_s.size() == measured.size() && time_s.size() == predicted.size() && resolution >= 0);
   GS_CHECK(std::all_of(time_s.begin(), time_s.end(), [](double t) { return std::isfinite(t); }));
   GS_CHECK(std::adjacent_find(time_s.begin(), time_s.end(), std::greater_equal<>()) == time_s.end());
-  SignalScore score{.signal = std::move(signal), .rmse = kNaN, .mae = kNaN, .nrmse = kNaN, .max = kNaN,
-                    .lag_s = kNaN, .correlation = kNaN, .samples = 0};
+  SignalScore score{.signal = std::move(signal),
+                    .rmse = kNaN,
+                    .mae = kNaN,
+                    .nrmse = kNaN,
+                    .max = kNaN,
+                    .lag_s = kNaN,
+                    .correlation = kNaN,
+                    .samples = 0};
   const Rows rows = UsedRows(time_s, measured, predicted);
   score.samples = rows.time_s.size();
   if (score.samples == 0) return score;

@@ -11,12 +11,12 @@ namespace gapscope {
 // Error e = measured - predicted, in the signal's SI unit. What cannot be computed is NaN, never zero.
 struct SignalScore {
   std::string signal;
-  double rmse = 0;         // sqrt(mean e^2)
-  double mae = 0;          // mean |e|
-  double nrmse = 0;        // rmse / max(standard deviation of measured, resolution); 1
-  double max = 0;          // greatest |e|
-  double lag_s = 0;        // shift that aligns best; positive: measured later than predicted
-  double correlation = 0;  // Pearson's, at zero lag; -1..1
+  double rmse = 0;          // sqrt(mean e^2)
+  double mae = 0;           // mean |e|
+  double nrmse = 0;         // rmse / max(standard deviation of measured, resolution); 1
+  double max = 0;           // greatest |e|
+  double lag_s = 0;         // shift that aligns best; positive: measured later than predicted
+  double correlation = 0;   // Pearson's, at zero lag; -1..1
   std::size_t samples = 0;  // rows used
 };
 
@@ -27,10 +27,10 @@ struct SignalScore {
 // says how many are used. A prediction of infinity is not left out: it makes the errors infinite, and lag and
 // correlation NaN.
 //
-// nrmse: the standard deviation is that of all finite `measured` rows of the log (divided by n), predicted there or not,
-// so that two predictions of one log are always on the same scale. It is not taken below `resolution` (the sensor's step
-// in the signal's unit): a signal that stands still is scored in steps of its sensor. For a constant signal and
-// resolution 0 it is NaN.
+// nrmse: the standard deviation is that of all finite `measured` rows of the log (divided by n), predicted there or
+// not, so that two predictions of one log are always on the same scale. It is not taken below `resolution` (the
+// sensor's step in the signal's unit): a signal that stands still is scored in steps of its sensor. For a constant
+// signal and resolution 0 it is NaN.
 //
 // lag_s: measured(t) is compared with predicted(t - lag). Both are brought to a uniform step (the median one) by linear
 // interpolation, points in gaps of more than three steps left out; the lag is the greatest Pearson coefficient over the

@@ -20,8 +20,16 @@ struct TestLog {
   std::vector<double> time_s, measured, predicted, speed, command, angle;
 
   ConditionInput Input() const {
-    return {.signal = "arm_rad", .time_s = time_s, .measured = measured, .predicted = predicted, .speed = speed,
-            .command = command, .angle = angle, .speed_unit = "rad/s", .command_unit = "V", .angle_unit = "rad"};
+    return {.signal = "arm_rad",
+            .time_s = time_s,
+            .measured = measured,
+            .predicted = predicted,
+            .speed = speed,
+            .command = command,
+            .angle = angle,
+            .speed_unit = "rad/s",
+            .command_unit = "V",
+            .angle_unit = "rad"};
   }
 };
 
@@ -135,8 +143,8 @@ TEST(ConditionsTest, BandsHoldTheSinesThatLieInThem) {
   for (std::size_t i = 0; i < log.time_s.size(); ++i) {
     const double t = log.time_s[i];
     log.measured[i] = std::cos(M_PI * t);  // bandwidth 0.5 Hz: bands to 0.12, 0.25, 0.5 and 1 Hz
-    log.predicted[i] = log.measured[i] + 0.1 + 0.2 * std::cos(2 * M_PI * 0.05 * t) + 0.3 * std::cos(2 * M_PI * 0.8 * t) +
-                        0.4 * std::cos(2 * M_PI * 40 * t);
+    log.predicted[i] = log.measured[i] + 0.1 + 0.2 * std::cos(2 * M_PI * 0.05 * t) +
+                       0.3 * std::cos(2 * M_PI * 0.8 * t) + 0.4 * std::cos(2 * M_PI * 40 * t);
   }
   const std::vector<ConditionShare> shares = LocateError(log.Input());
   const double total = 0.01 + 0.02 + 0.045 + 0.08;
@@ -217,12 +225,14 @@ TEST(ConditionsTest, EvenNoiseHasNothingToTell) {
 TEST(ConditionsTest, TinyPerfectAndConstantInputsSayNothing) {
   for (const std::size_t n : {0u, 1u, 2u}) {
     TestLog log = WithNoise(Sine(), 1);
-    for (auto* values : {&log.time_s, &log.measured, &log.predicted, &log.speed, &log.command, &log.angle}) values->resize(n);
+    for (auto* values : {&log.time_s, &log.measured, &log.predicted, &log.speed, &log.command, &log.angle})
+      values->resize(n);
     EXPECT_TRUE(LocateError(log.Input()).empty());
   }
   for (const std::size_t n : {3u, 4u, 15u, 16u, 19u, 20u, 21u, 63u}) {
     TestLog log = WithNoise(Sine(), 1);
-    for (auto* values : {&log.time_s, &log.measured, &log.predicted, &log.speed, &log.command, &log.angle}) values->resize(n);
+    for (auto* values : {&log.time_s, &log.measured, &log.predicted, &log.speed, &log.command, &log.angle})
+      values->resize(n);
     for (const ConditionShare& share : LocateError(log.Input())) EXPECT_EQ(std::isnan(share.low), n < 20) << n;
   }
   EXPECT_TRUE(LocateError(Sine().Input()).empty());  // no error at all
@@ -264,7 +274,8 @@ TEST(ConditionsTest, FamiliesWithoutDataAreLeftOutAndBrokenContractsThrow) {
 
 TEST(ConditionsTest, SameSeedSameBytesOtherSeedOtherIntervals) {
   const TestLog log = WithNoise(Sine(), 1);
-  const auto a = LocateError(log.Input(), {.seed = 7, .replicates = 100}), b = LocateError(log.Input(), {.seed = 7, .replicates = 100});
+  const auto a = LocateError(log.Input(), {.seed = 7, .replicates = 100}),
+             b = LocateError(log.Input(), {.seed = 7, .replicates = 100});
   const auto c = LocateError(log.Input(), {.seed = 8, .replicates = 100});
   ASSERT_EQ(a.size(), b.size());
   bool other = false;
@@ -281,15 +292,20 @@ TEST(ConditionsTest, SameSeedSameBytesOtherSeedOtherIntervals) {
 TEST(MostTellingTest, KeepsWhatIsClearOfItsTimeAndSortsIt) {
   const auto share = [](const char* signal, const char* condition, double error, double time, double low,
                         ConditionFamily family) {
-    return ConditionShare{.signal = signal, .condition = condition, .share_of_error = error, .share_of_time = time,
-                          .low = low, .high = 1, .family = family};
+    return ConditionShare{.signal = signal,
+                          .condition = condition,
+                          .share_of_error = error,
+                          .share_of_time = time,
+                          .low = low,
+                          .high = 1,
+                          .family = family};
   };
   using enum ConditionFamily;
   const std::vector<ConditionShare> shares = {
-      share("q", "unclear", 0.6, 0.1, 0.05, kSpeed),  share("q", "small", 0.05, 0.01, 0.04, kSpeed),
-      share("q", "close", 0.55, 0.5, 0.52, kSpeed),   share("q", "no interval", 0.9, 0.1, kNaN, kSpeed),
-      share("q", "third", 0.5, 0.1, 0.2, kTime),      share("q", "first", 0.8, 0.1, 0.7, kTime),
-      share("p", "equal", 0.8, 0.1, 0.7, kTime),      share("q", "second", 0.6, 0.1, 0.4, kTime)};
+      share("q", "unclear", 0.6, 0.1, 0.05, kSpeed), share("q", "small", 0.05, 0.01, 0.04, kSpeed),
+      share("q", "close", 0.55, 0.5, 0.52, kSpeed),  share("q", "no interval", 0.9, 0.1, kNaN, kSpeed),
+      share("q", "third", 0.5, 0.1, 0.2, kTime),     share("q", "first", 0.8, 0.1, 0.7, kTime),
+      share("p", "equal", 0.8, 0.1, 0.7, kTime),     share("q", "second", 0.6, 0.1, 0.4, kTime)};
   const std::vector<ConditionShare> telling = MostTelling(shares);
   ASSERT_EQ(telling.size(), 3u) << Names(telling);
   EXPECT_EQ(Names(telling), "equal; first; second; ");  // by signal when equal; two of a family

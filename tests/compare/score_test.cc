@@ -35,10 +35,10 @@ TEST(ScoreTest, NumbersByHand) {
   const SignalScore score = ScoreSignal("q", time_s, measured, predicted);
   EXPECT_EQ(score.signal, "q");
   EXPECT_EQ(score.samples, 4u);
-  EXPECT_NEAR(score.rmse, std::sqrt(5.0 / 4), kRounding);       // errors 0, 1, 0, -2
+  EXPECT_NEAR(score.rmse, std::sqrt(5.0 / 4), kRounding);  // errors 0, 1, 0, -2
   EXPECT_NEAR(score.mae, 0.75, kRounding);
   EXPECT_EQ(score.max, 2);
-  EXPECT_NEAR(score.nrmse, 1, kRounding);                        // variance of 1, 2, 3, 4 is 5/4
+  EXPECT_NEAR(score.nrmse, 1, kRounding);  // variance of 1, 2, 3, 4 is 5/4
   EXPECT_NEAR(score.correlation, 8.5 / std::sqrt(5 * 16.75), kRounding);
   EXPECT_TRUE(std::isnan(score.lag_s));
 }
@@ -60,8 +60,8 @@ TEST(ScoreTest, ConstantSignalIsScoredInSensorStepsOrNotAtAll) {
   EXPECT_TRUE(std::isnan(score.lag_s));
   // A signal that moves by far more than its resolution is scored by its own deviation.
   const std::vector<double> moving = {0, 1, 0, 1, 0, 1, 0, 1, 0, 1};
-  EXPECT_NEAR(ScoreSignal("q", time_s, moving, predicted, 0.05).nrmse, ScoreSignal("q", time_s, moving, predicted).nrmse,
-              kRounding);
+  EXPECT_NEAR(ScoreSignal("q", time_s, moving, predicted, 0.05).nrmse,
+              ScoreSignal("q", time_s, moving, predicted).nrmse, kRounding);
 }
 
 TEST(ScoreTest, TinyInputsGiveNaNWhereNothingCanBeSaid) {
@@ -130,11 +130,23 @@ TEST(LagTest, IrregularStampsGapsAndMissingRowsDoNotShiftIt) {
     time_s.push_back(t);
     t += i == 1500 ? 0.3 : 0.002 * even(random);
   }
-  std::vector<double> predicted = Map(time_s, Motion), measured = Map(time_s, [](double s) { return Motion(s - 0.0133); });
+  std::vector<double> predicted = Map(time_s, Motion),
+                      measured = Map(time_s, [](double s) { return Motion(s - 0.0133); });
   for (std::size_t i = 100; i < 3000; i += 97) predicted[i] = kNaN;
   const SignalScore score = ScoreSignal("q", time_s, measured, predicted);
   EXPECT_EQ(score.samples, 2970u);
   EXPECT_NEAR(score.lag_s, 0.0133, 0.002 * kLagInSteps);
+}
+
+// Windows with an unscored lead-in, as replay makes them: 90 ms of every second is missing.
+TEST(LagTest, UnscoredLeadInsDoNotShiftIt) {
+  const std::vector<double> time_s = Times(5000, 0.002);
+  std::vector<double> predicted = Map(time_s, Chirp);
+  const std::vector<double> measured = Map(time_s, [](double t) { return Chirp(t - 0.0047); });
+  for (std::size_t i = 0; i < predicted.size(); ++i) {
+    if (i % 500 < 45) predicted[i] = kNaN;
+  }
+  EXPECT_NEAR(ScoreSignal("q", time_s, measured, predicted).lag_s, 0.0047, 0.002 * kLagInSteps);
 }
 
 TEST(LagTest, StaysWithinTheShorterOfAQuarterSecondAndAQuarterOfTheLog) {

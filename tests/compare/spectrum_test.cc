@@ -76,7 +76,8 @@ TEST(SpectrumTest, WelchGivesWhiteNoiseItsDensityAndASineItsPower) {
   EXPECT_NEAR(noise.averages, 72, 5);
 
   std::vector<double> sine(20000);
-  for (std::size_t i = 0; i < sine.size(); ++i) sine[i] = 3 * std::sin(2 * M_PI * 40 * step_s * static_cast<double>(i)) + 7;
+  for (std::size_t i = 0; i < sine.size(); ++i)
+    sine[i] = 3 * std::sin(2 * M_PI * 40 * step_s * static_cast<double>(i)) + 7;
   const Spectrum line = WelchSpectrum(sine, step_s, 512);
   const double power = std::accumulate(line.density.begin(), line.density.end(), 0.0) * line.bin_hz;
   EXPECT_NEAR(power, 4.5, 0.01);

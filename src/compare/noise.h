@@ -34,6 +34,8 @@ struct NoiseFloor {
 // without motion it reaches the lowest frequency. Motion that fills the band counts as noise: the floor is then an
 // upper bound; coloured noise slower than 1 / (2 pi band_low_hz) cannot be told from motion and counts as that slow: a
 // lower bound.
+// A log that was filtered or upsampled before it was written (flexlink_2dsfl) has nothing left up there: only
+// `resolution` then says what the sensor adds.
 //
 // `values`: measured signal or residual; rows that are not finite are bridged by a line. Rows are taken as the median
 // step apart: jitter smears the motion a little, but not the noise, as interpolating would. Same size as `time_s`,

@@ -8,8 +8,8 @@
 
 namespace gapscope {
 
-// Rows are gathered in cells of equal length, at most 2048 (the last one may be shorter), so that a log of a million rows
-// costs no more than one of two thousand.
+// Rows are gathered in cells of equal length, at most 2048 (the last one may be shorter), so that a log of a million
+// rows costs no more than one of two thousand.
 std::size_t RowsPerCell(std::size_t rows);
 std::size_t CellCount(std::size_t rows);
 

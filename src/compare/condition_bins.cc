@@ -140,7 +140,10 @@ Partition ByReversal(const ConditionInput& input, const std::vector<char>& used,
   for (std::size_t i = 0; i < reversal.size(); ++i) {
     if (!used[i] || !std::isfinite(input.speed[i])) continue;
     const double since_s = input.time_s[i] - reversal[i];
-    partition.bin[i] = std::isnan(since_s) ? 3 : since_s < kReversalLimits_s[0] ? 0 : since_s < kReversalLimits_s[1] ? 1 : 2;
+    partition.bin[i] = std::isnan(since_s)              ? 3
+                       : since_s < kReversalLimits_s[0] ? 0
+                       : since_s < kReversalLimits_s[1] ? 1
+                                                        : 2;
   }
   return partition;
 }
@@ -174,14 +177,12 @@ std::vector<double> AngleLimits(std::span<const double> angle, const std::vector
 
 std::string NumberText(double value) {
   std::array<char, 32> buffer;
-  const auto [end, code] =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value == 0 ? 0.0 : value, std::chars_format::general, 6);
+  const auto [end, code] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value == 0 ? 0.0 : value,
+                                         std::chars_format::general, 6);
   return std::string(buffer.data(), end);
 }
 
-double RoundToTwoDigits(double value) {
-  return value == 0 ? 0 : RoundToDecimal(value, Exponent(value) - 1, Nearest);
-}
+double RoundToTwoDigits(double value) { return value == 0 ? 0 : RoundToDecimal(value, Exponent(value) - 1, Nearest); }
 
 std::vector<Partition> MakePartitions(const ConditionInput& input, const std::vector<char>& used) {
   std::vector<Partition> partitions;

@@ -25,8 +25,9 @@ constexpr std::size_t kFewestRowsForInterval = 20;
 constexpr std::size_t kFewestRowsForFrequency = 16;
 constexpr double kBandwidthPart = 0.95;
 constexpr std::array<double, 4> kBandLimits = {0.25, 0.5, 1, 2};  // of the signal's bandwidth
-constexpr double kBlockCorrelationTimes = 4;
+constexpr double kBlockCorrelationTimes = 6;
 constexpr double kLow = 0.05, kHigh = 0.95;
+constexpr double kNormal95 = 1.6449;  // the normal distribution's 95th percentile
 
 // One condition and its share of the time. Its squared error stands in a column of its own, by cell (bootstrap.h).
 struct Condition {
@@ -115,14 +116,14 @@ void AddFrequencies(const ConditionInput& input, const std::vector<char>& used, 
     if (band == 0) {
       last = 1;
     } else if (band + 1 < limits_hz.size()) {
-      last = static_cast<std::size_t>(std::ceil(limits_hz[band] / error.bin_hz() * (1 - 1e-12)));
+      last = static_cast<std::size_t>(limits_hz[band] / error.bin_hz() * (1 + 1e-12)) + 1;  // limit included
     }
     if (last <= first) continue;
-    Condition condition{.family = ConditionFamily::kFrequency,
-                        .name = band == 0 ? "constant error"
-                                          : "frequency " + NumberText(limits_hz[band - 1]) + ".." +
-                                                NumberText(limits_hz[band]) + " Hz",
-                        .share_of_time = 0};
+    Condition condition{
+        .family = ConditionFamily::kFrequency,
+        .name = band == 0 ? "constant error"
+                          : "frequency " + NumberText(limits_hz[band - 1]) + ".." + NumberText(limits_hz[band]) + " Hz",
+        .share_of_time = 0};
     for (std::size_t k = std::max<std::size_t>(1, first); k < last; ++k) {
       condition.share_of_time += signal.power()[k] / signal_power;
     }
@@ -136,22 +137,12 @@ void AddFrequencies(const ConditionInput& input, const std::vector<char>& used, 
   }
 }
 
-// Length of the bootstrap's blocks.
-std::size_t BlockCells(const std::vector<double>& errors) {
-  std::vector<double> squares(errors.size());
-  for (std::size_t i = 0; i < errors.size(); ++i) squares[i] = errors[i] * errors[i];
-  const double correlation_rows = CorrelationTime(squares, 1.0);
-  const double rows = kBlockCorrelationTimes * (std::isnan(correlation_rows) ? 1 : correlation_rows);
-  const double cells = static_cast<double>(CellCount(errors.size()));
-  const double wanted = std::clamp(rows / static_cast<double>(RowsPerCell(errors.size())), cells / 200, cells / 10);
-  return static_cast<std::size_t>(std::max(1L, std::lround(wanted)));
-}
-
 // The families' places in `conditions`: first and one past the last.
 std::vector<std::pair<std::size_t, std::size_t>> Families(const std::vector<Condition>& conditions) {
   std::vector<std::pair<std::size_t, std::size_t>> families;
   for (std::size_t c = 0; c < conditions.size(); ++c) {
-    if (families.empty() || conditions[families.back().first].family != conditions[c].family) families.push_back({c, c});
+    const bool next = families.empty() || conditions[families.back().first].family != conditions[c].family;
+    if (next) families.push_back({c, c});
     families.back().second = c + 1;
   }
   return families;
@@ -164,10 +155,48 @@ void Shares(std::span<const double> sums, std::pair<std::size_t, std::size_t> fa
   for (std::size_t c = family.first; c < family.second; ++c) shares[c] = total > 0 ? sums[c] / total : kNaN;
 }
 
+// Length of the bootstrap's blocks. What varies in a share s = S_c / S is, to first order, the sum of c_i - s e_i^2
+// over the log: the slowest of these decides, but for the time windows, which are as slow as the log.
+std::size_t BlockCells(const Conditions& conditions, const std::vector<double>& shares) {
+  double slowest = 1;
+  for (const auto& [first, last] : Families(conditions.list)) {
+    if (conditions.list[first].family == ConditionFamily::kTime) continue;
+    const std::size_t cells = conditions.columns[first].size();
+    std::vector<double> whole(cells), influence(cells);
+    for (std::size_t c = first; c < last; ++c) {
+      for (std::size_t i = 0; i < cells; ++i) whole[i] += conditions.columns[c][i];
+    }
+    for (std::size_t c = first; c < last; ++c) {
+      for (std::size_t i = 0; i < cells; ++i) influence[i] = conditions.columns[c][i] - shares[c] * whole[i];
+      slowest = std::fmax(slowest, CorrelationTime(influence, 1.0));
+    }
+  }
+  const double cells = static_cast<double>(conditions.columns.front().size());
+  return static_cast<std::size_t>(
+      std::max(1L, std::lround(std::clamp(kBlockCorrelationTimes * slowest, cells / 200, cells / 10))));
+}
+
 double Percentile(std::vector<double>* values, double part) {
   const auto at = static_cast<std::ptrdiff_t>(std::lround(part * static_cast<double>(values->size() - 1)));
   std::nth_element(values->begin(), values->begin() + at, values->end());
   return (*values)[static_cast<std::size_t>(at)];
+}
+
+// How much wider an interval is than the bootstrap's, for three small-sample effects: Student's t for the normal
+// distribution (Cornish-Fisher series), the variance of few draws, and the correlation cut where blocks meet (for an
+// AR(1) a part 1 / (2 kBlockCorrelationTimes) of the variance).
+double Widening(double blocks) {
+  const double free = std::max(2.0, blocks - 1), z = kNormal95;
+  const double student =
+      z + (std::pow(z, 3) + z) / (4 * free) + (5 * std::pow(z, 5) + 16 * std::pow(z, 3) + 3 * z) / (96 * free * free);
+  return student / z * std::sqrt((free + 1) / free) / std::sqrt(1 - 1 / (2 * kBlockCorrelationTimes));
+}
+
+// `bound` moved away from `share` by `factor` on the logistic scale, on which 0 and 1 stay where they are.
+double Widen(double share, double bound, double factor) {
+  if (!(share > 0 && share < 1 && bound > 0 && bound < 1)) return bound;
+  const double centre = std::log(share / (1 - share)), edge = std::log(bound / (1 - bound));
+  return 1 / (1 + std::exp(-(centre + factor * (edge - centre))));
 }
 
 void SetIntervals(const Conditions& conditions, std::size_t block, const ConditionOptions& options,
@@ -179,6 +208,7 @@ void SetIntervals(const Conditions& conditions, std::size_t block, const Conditi
     const std::span<double> row(&drawn[start], width);
     for (const auto& family : families) Shares(row, family, row);
   }
+  const double widening = Widening(static_cast<double>(conditions.columns.front().size()) / static_cast<double>(block));
   std::vector<double> values;
   for (std::size_t c = 0; c < width; ++c) {
     values.clear();
@@ -186,8 +216,9 @@ void SetIntervals(const Conditions& conditions, std::size_t block, const Conditi
       if (!std::isnan(drawn[start + c])) values.push_back(drawn[start + c]);
     }
     if (values.size() < 20) continue;
-    (*result)[c].low = Percentile(&values, kLow);
-    (*result)[c].high = Percentile(&values, kHigh);
+    ConditionShare& share = (*result)[c];
+    share.low = Widen(share.share_of_error, Percentile(&values, kLow), widening);
+    share.high = Widen(share.share_of_error, Percentile(&values, kHigh), widening);
   }
 }
 
@@ -225,11 +256,16 @@ std::vector<ConditionShare> LocateError(const ConditionInput& input, const Condi
   std::vector<ConditionShare> result;
   for (std::size_t c = 0; c < totals.size(); ++c) {
     const Condition& condition = conditions.list[c];
-    result.push_back({.signal = input.signal, .condition = condition.name, .share_of_error = totals[c],
-                      .share_of_time = condition.share_of_time, .low = kNaN, .high = kNaN, .family = condition.family});
+    result.push_back({.signal = input.signal,
+                      .condition = condition.name,
+                      .share_of_error = totals[c],
+                      .share_of_time = condition.share_of_time,
+                      .low = kNaN,
+                      .high = kNaN,
+                      .family = condition.family});
   }
   if (used_rows >= kFewestRowsForInterval && !result.empty()) {
-    SetIntervals(conditions, BlockCells(errors), options, &result);
+    SetIntervals(conditions, BlockCells(conditions, totals), options, &result);
   }
   std::erase_if(result, [](const ConditionShare& share) { return std::isnan(share.share_of_error); });
   return result;

@@ -25,7 +25,7 @@ constexpr double kColouredGain = 9;       // twice the log-likelihood, for two m
 
 // A quarter octave of the spectrum.
 struct Band {
-  double low_hz, high_hz;  // first and last bin
+  double low_hz, high_hz;   // first and last bin
   std::size_t first, last;  // bins first..last-1
   double density;           // mean over the bins
   double averages;          // independent periodograms behind it
@@ -48,13 +48,17 @@ std::vector<Band> MakeBands(const Spectrum& spectrum, double lowest_hz) {
   const double nyquist_hz = spectrum.bin_hz * static_cast<double>(spectrum.density.size() - 1);
   const auto end = static_cast<std::size_t>(kTopOfNyquist * nyquist_hz / spectrum.bin_hz) + 1;
   // Bins 0 and 1 hold what is left of mean and slope.
-  auto first = std::max<std::size_t>(2, static_cast<std::size_t>(std::ceil(lowest_hz / spectrum.bin_hz)));
+  auto first = std::max<std::size_t>(
+      2, static_cast<std::size_t>(std::ceil(std::min(lowest_hz, 2 * nyquist_hz) / spectrum.bin_hz)));
   while (first < end) {
     const auto wide = static_cast<std::size_t>(static_cast<double>(first) * std::exp2(0.25));
     const std::size_t last = std::min(end, std::max(first + 1, wide));
     Band band{.low_hz = static_cast<double>(first) * spectrum.bin_hz,
               .high_hz = static_cast<double>(last - 1) * spectrum.bin_hz,
-              .first = first, .last = last, .density = 0, .averages = 0};
+              .first = first,
+              .last = last,
+              .density = 0,
+              .averages = 0};
     const double bins = static_cast<double>(last - first);
     for (std::size_t k = first; k < last; ++k) band.density += spectrum.density[k] / bins;
     band.averages = spectrum.averages * std::max(1.0, bins / kHannWidth);
@@ -68,11 +72,10 @@ class DensityFitter {
  public:
   DensityFitter(std::vector<Band> bands, double dt_s) : bands_(std::move(bands)), dt_s_(dt_s) {}
 
-  // Best white plus coloured density for bands first..end.
-  Fit Best(std::size_t first) const {
+  // Best white plus coloured density for bands first..end, correlated no longer than `slowest_s`.
+  Fit Best(std::size_t first, double slowest_s) const {
     Fit best = White(first);
     const double white_cost = best.cost;
-    const double slowest_s = 1 / (2 * std::numbers::pi * bands_[first].low_hz);
     // Faster than 1.5 steps cannot be told from white.
     for (double tau_s = slowest_s; tau_s > 1.5 * dt_s_; tau_s /= std::numbers::sqrt2) {
       const Fit fit = Coloured(first, tau_s);
@@ -87,10 +90,16 @@ class DensityFitter {
 
   const std::vector<Band>& bands() const { return bands_; }
 
+  // The slowest noise whose corner lies within bands first..end.
+  double SlowestSeen(std::size_t first) const {
+    return std::max(4 * dt_s_, 1 / (2 * std::numbers::pi * bands_[first].low_hz));
+  }
+
  private:
   double MeanShape(const Band& band, double tau_s) const {
     return (Shape(band.low_hz, tau_s, dt_s_) + 4 * Shape((band.low_hz + band.high_hz) / 2, tau_s, dt_s_) +
-            Shape(band.high_hz, tau_s, dt_s_)) / 6;
+            Shape(band.high_hz, tau_s, dt_s_)) /
+           6;
   }
 
   double Cost(std::size_t first, const std::vector<double>& model) const {
@@ -135,7 +144,8 @@ class DensityFitter {
       }
       const double determinant = a11 * a22 - a12 * a12;
       if (!(determinant > 1e-12 * a11 * a22)) break;
-      Fit fit{.white = (a22 * b1 - a12 * b2) / determinant, .coloured = (a11 * b2 - a12 * b1) / determinant,
+      Fit fit{.white = (a22 * b1 - a12 * b2) / determinant,
+              .coloured = (a11 * b2 - a12 * b1) / determinant,
               .tau_s = tau_s};
       if (fit.white < 0) fit = {.white = 0, .coloured = b2 / a22, .tau_s = tau_s};
       if (fit.coloured < 0) fit = {.white = b1 / a11, .coloured = 0, .tau_s = tau_s};
@@ -150,12 +160,12 @@ class DensityFitter {
   double dt_s_;
 };
 
-// The lowest band without motion.
+// The lowest band without motion. What is foretold may rise all the way down as slow noise does.
 std::size_t LowestNoiseBand(const DensityFitter& fitter, std::size_t start) {
   std::size_t first = start;
   while (first > 0) {
     const Band& next = fitter.bands()[first - 1];
-    const double foretold = fitter.Density(fitter.Best(first), next);
+    const double foretold = fitter.Density(fitter.Best(first, fitter.SlowestSeen(0)), next);
     if (next.density > foretold * (kCoarseRise + kNoiseRise / std::sqrt(next.averages))) {
       // The motion's foot may reach into the band just taken.
       return first < start ? first + 1 : first;
@@ -169,9 +179,13 @@ std::size_t LowestNoiseBand(const DensityFitter& fitter, std::size_t start) {
 
 NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double> values, const NoiseOptions& options) {
   GS_CHECK(time_s.size() == values.size() && options.resolution >= 0 && options.motion_band_hz >= 0);
-  NoiseFloor floor{.white_std = kNaN, .coloured_std = kNaN, .correlation_time_s = kNaN,
-                   .quantisation_std = options.resolution / std::sqrt(12.0), .total_std = kNaN,
-                   .band_low_hz = kNaN, .band_high_hz = kNaN};
+  NoiseFloor floor{.white_std = kNaN,
+                   .coloured_std = kNaN,
+                   .correlation_time_s = kNaN,
+                   .quantisation_std = options.resolution / std::sqrt(12.0),
+                   .total_std = kNaN,
+                   .band_low_hz = kNaN,
+                   .band_high_hz = kNaN};
   const auto finite = std::count_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   if (static_cast<std::size_t>(finite) < kFewestRows) return floor;
   const std::vector<double> filled = FillGaps(values);
@@ -183,7 +197,8 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
   std::vector<Band> bands = MakeBands(spectrum, options.motion_band_hz);
   if (bands.size() < 2) return floor;
   floor.band_high_hz = bands.back().high_hz;
-  if (std::all_of(bands.begin(), bands.end(), [](const Band& band) { return band.density <= 0; })) {
+  const auto [low, high] = std::minmax_element(filled.begin(), filled.end());
+  if (*low == *high) {
     // A signal that does not change has no noise but the sensor's steps.
     floor.white_std = floor.coloured_std = 0;
     floor.total_std = floor.quantisation_std;
@@ -203,7 +218,7 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
     while (start + 2 < fitter.bands().size() && fitter.bands()[start].low_hz < kStartOfNyquist * nyquist_hz) ++start;
     first = LowestNoiseBand(fitter, start);
   }
-  const Fit fit = fitter.Best(first);
+  const Fit fit = fitter.Best(first, fitter.SlowestSeen(first));
   floor.band_low_hz = fitter.bands()[first].low_hz;
   floor.white_std = std::sqrt(fit.white / (2 * dt_s));
   floor.coloured_std = 0;

@@ -15,8 +15,9 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kLongestLag_s = 0.25;
-constexpr double kFlat = 1e-9;             // correlation that varies less than this has no peak
+constexpr double kFlat = 1e-9;  // correlation that varies less than this has no peak
 constexpr std::size_t kFewestRowsForLag = 8;
+constexpr double kGapSteps = 3;
 constexpr std::size_t kMostPointsPerRow = 4;  // resampling: a gap may not multiply the work
 
 // The rows that count.
@@ -82,48 +83,90 @@ double Pearson(std::span<const double> a, std::span<const double> b) {
   return std::isfinite(r) ? std::clamp(r, -1.0, 1.0) : kNaN;
 }
 
-// `values` at `count` points `step_s` apart from the first stamp, linear between rows, less their mean.
-std::vector<double> Resample(std::span<const double> time_s, std::span<const double> values, double step_s,
-                             std::size_t count) {
-  std::vector<double> result(count);
+// A signal on a uniform axis.
+struct Points {
+  std::vector<double> values;  // less their mean; zero where weight is zero
+  std::vector<double> weight;  // 1, or 0 in a gap; empty: 1 throughout
+};
+
+// `values` at `count` points `step_s` apart from the first stamp, linear between rows. `gaps`: where rows lie far apart
+// the points between them are left out.
+Points Resample(std::span<const double> time_s, std::span<const double> values, double step_s, std::size_t count,
+                bool gaps) {
+  Points points{.values = std::vector<double>(count), .weight = std::vector<double>(gaps ? count : 0, 1.0)};
   std::size_t row = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const double t = time_s.front() + static_cast<double>(i) * step_s;
     while (row + 2 < time_s.size() && time_s[row + 1] <= t) ++row;
-    const double part = (t - time_s[row]) / (time_s[row + 1] - time_s[row]);
-    result[i] = values[row] + std::clamp(part, 0.0, 1.0) * (values[row + 1] - values[row]);
+    const double length_s = time_s[row + 1] - time_s[row];
+    const double part = std::clamp((t - time_s[row]) / length_s, 0.0, 1.0);
+    points.values[i] = values[row] + part * (values[row + 1] - values[row]);
+    if (gaps && length_s > kGapSteps * step_s) points.weight[i] = 0;
   }
-  const double mean = Mean(result);
-  for (double& value : result) value -= mean;
-  return result;
+  double sum = 0, weight = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    sum += (gaps ? points.weight[i] : 1) * points.values[i];
+    weight += gaps ? points.weight[i] : 1;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    points.values[i] = (gaps ? points.weight[i] : 1) * (points.values[i] - sum / std::max(1.0, weight));
+  }
+  return points;
 }
 
-// Sums of the first i values and of their squares.
-struct RunningSums {
-  explicit RunningSums(std::span<const double> values) : sum(values.size() + 1), square(values.size() + 1) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      sum[i + 1] = sum[i] + values[i];
-      square[i + 1] = square[i] + values[i] * values[i];
-    }
-  }
-  std::vector<double> sum, square;
+std::vector<double> Squares(std::vector<double> values) {
+  for (double& value : values) value *= value;
+  return values;
+}
+
+// For each lag, sums over the pairs of points that overlap.
+struct OverlapSums {
+  std::vector<double> count, m, p, mm, pp;
 };
 
+// Without gaps the overlap is a stretch of each signal: differences of running sums.
+OverlapSums WholeOverlap(const std::vector<double>& measured, const std::vector<double>& predicted,
+                         std::size_t max_lag) {
+  const std::size_t n = measured.size(), lags = 2 * max_lag + 1;
+  const auto stretch_sums = [&](const std::vector<double>& values, bool is_measured) {
+    std::vector<double> running(n + 1), result(lags);
+    for (std::size_t i = 0; i < n; ++i) running[i + 1] = running[i] + values[i];
+    for (std::size_t j = 0; j < lags; ++j) {
+      const std::size_t cut = j > max_lag ? j - max_lag : max_lag - j;
+      const bool from_start = (j < max_lag) == is_measured;
+      result[j] = from_start ? running[n - cut] : running[n] - running[cut];
+    }
+    return result;
+  };
+  OverlapSums sums;
+  for (std::size_t j = 0; j < lags; ++j) {
+    sums.count.push_back(static_cast<double>(n - (j > max_lag ? j - max_lag : max_lag - j)));
+  }
+  sums.m = stretch_sums(measured, true);
+  sums.p = stretch_sums(predicted, false);
+  sums.mm = stretch_sums(Squares(measured), true);
+  sums.pp = stretch_sums(Squares(predicted), false);
+  return sums;
+}
+
 // Pearson's coefficient of measured[i + l] with predicted[i] over the overlap, for l = -max_lag..max_lag.
-std::vector<double> CorrelationByLag(std::span<const double> measured, std::span<const double> predicted,
-                                     std::size_t max_lag) {
-  const std::size_t n = measured.size();
-  std::vector<double> result = CrossCorrelation(measured, predicted, max_lag);
-  const RunningSums m(measured), p(predicted);
+std::vector<double> CorrelationByLag(const Points& measured, const Points& predicted, std::size_t max_lag) {
+  std::vector<double> result = CrossCorrelation(measured.values, predicted.values, max_lag);
+  OverlapSums sums;
+  if (measured.weight.empty()) {
+    sums = WholeOverlap(measured.values, predicted.values, max_lag);
+  } else {
+    sums.count = CrossCorrelation(measured.weight, predicted.weight, max_lag);
+    sums.m = CrossCorrelation(measured.values, predicted.weight, max_lag);
+    sums.p = CrossCorrelation(measured.weight, predicted.values, max_lag);
+    sums.mm = CrossCorrelation(Squares(measured.values), predicted.weight, max_lag);
+    sums.pp = CrossCorrelation(measured.weight, Squares(predicted.values), max_lag);
+  }
   for (std::size_t j = 0; j < result.size(); ++j) {
-    const std::size_t m_from = j > max_lag ? j - max_lag : 0;
-    const std::size_t p_from = j < max_lag ? max_lag - j : 0;
-    const std::size_t count = n - m_from - p_from;
-    const double rows = static_cast<double>(count);
-    const double m_sum = m.sum[m_from + count] - m.sum[m_from], p_sum = p.sum[p_from + count] - p.sum[p_from];
-    const double mm = m.square[m_from + count] - m.square[m_from] - m_sum * m_sum / rows;
-    const double pp = p.square[p_from + count] - p.square[p_from] - p_sum * p_sum / rows;
-    result[j] = mm > 0 && pp > 0 ? (result[j] - m_sum * p_sum / rows) / std::sqrt(mm * pp) : kNaN;
+    const double count = sums.count[j];
+    const double mm = sums.mm[j] - sums.m[j] * sums.m[j] / count, pp = sums.pp[j] - sums.p[j] * sums.p[j] / count;
+    const bool enough = count > static_cast<double>(kFewestRowsForLag) - 0.5 && mm > 0 && pp > 0;
+    result[j] = enough ? (result[j] - sums.m[j] * sums.p[j] / count) / std::sqrt(mm * pp) : kNaN;
   }
   return result;
 }
@@ -138,8 +181,12 @@ double BestLag(const Rows& rows) {
   const auto max_lag = static_cast<std::size_t>(std::min(kLongestLag_s, duration_s / 4) / step_s + 1e-6);
   if (count < kFewestRowsForLag || max_lag < 1) return kNaN;
 
-  const std::vector<double> by_lag = CorrelationByLag(Resample(rows.time_s, rows.measured, step_s, count),
-                                                      Resample(rows.time_s, rows.predicted, step_s, count), max_lag);
+  const bool gaps = std::adjacent_find(rows.time_s.begin(), rows.time_s.end(), [&](double from, double to) {
+                      return to - from > kGapSteps * step_s;
+                    }) != rows.time_s.end();
+  const std::vector<double> by_lag =
+      CorrelationByLag(Resample(rows.time_s, rows.measured, step_s, count, gaps),
+                       Resample(rows.time_s, rows.predicted, step_s, count, gaps), max_lag);
   // The greatest coefficient, the shorter lag when equal.
   double best = kNaN, least = kNaN;
   std::size_t peak = max_lag;
@@ -168,8 +215,14 @@ SignalScore ScoreSignal(std::string signal, std::span<const double> time_s, std:
   GS_CHECK(time_s.size() == measured.size() && time_s.size() == predicted.size() && resolution >= 0);
   GS_CHECK(std::all_of(time_s.begin(), time_s.end(), [](double t) { return std::isfinite(t); }));
   GS_CHECK(std::adjacent_find(time_s.begin(), time_s.end(), std::greater_equal<>()) == time_s.end());
-  SignalScore score{.signal = std::move(signal), .rmse = kNaN, .mae = kNaN, .nrmse = kNaN, .max = kNaN,
-                    .lag_s = kNaN, .correlation = kNaN, .samples = 0};
+  SignalScore score{.signal = std::move(signal),
+                    .rmse = kNaN,
+                    .mae = kNaN,
+                    .nrmse = kNaN,
+                    .max = kNaN,
+                    .lag_s = kNaN,
+                    .correlation = kNaN,
+                    .samples = 0};
   const Rows rows = UsedRows(time_s, measured, predicted);
   score.samples = rows.time_s.size();
   if (score.samples == 0) return score;

@@ -53,7 +53,8 @@ std::vector<double> FillGaps(std::span<const double> values) {
       std::fill(filled.begin(), filled.begin() + static_cast<std::ptrdiff_t>(i), values[i]);
     } else {
       const double slope = (values[i] - values[previous]) / static_cast<double>(i - previous);
-      for (std::size_t j = previous + 1; j < i; ++j) filled[j] = values[previous] + slope * static_cast<double>(j - previous);
+      for (std::size_t j = previous + 1; j < i; ++j)
+        filled[j] = values[previous] + slope * static_cast<double>(j - previous);
     }
     previous = i;
   }
@@ -68,7 +69,8 @@ std::vector<double> CrossCorrelation(std::span<const double> a, std::span<const 
   std::vector<double> result(2 * max_lag + 1, 0.0);
   if (n == 0) return result;
   const std::size_t whole = std::bit_ceil(n + 2 * max_lag + 1);
-  const std::size_t length = std::max<std::size_t>(4, std::min(whole, std::bit_ceil(std::max<std::size_t>(1024, 8 * max_lag))));
+  const std::size_t length =
+      std::max<std::size_t>(4, std::min(whole, std::bit_ceil(std::max<std::size_t>(1024, 8 * max_lag))));
   const std::size_t block = length - 2 * max_lag;
 
   Fft fft = HalfSpectrumFft();
@@ -162,7 +164,8 @@ Spectrum WelchSpectrum(std::span<const double> values, double step_s, std::size_
     fft.fwd(spectrum, piece);
     for (std::size_t k = 0; k < result.density.size(); ++k) {
       const bool single = k == 0 || k + 1 == result.density.size();
-      result.density[k] += std::norm(spectrum[k]) * (single ? 1 : 2) * step_s / window_power / static_cast<double>(count);
+      result.density[k] +=
+          std::norm(spectrum[k]) * (single ? 1 : 2) * step_s / window_power / static_cast<double>(count);
     }
   }
   // Neighbouring Hann periodograms, half overlapping, correlate by 1/36.

@@ -1,5 +1,5 @@
-// Fourier helpers of the comparison: correlation at limited lags, a signal split into frequency bands, smoothed spectra.
-// All take plain rows; none keeps state between calls.
+// Fourier helpers of the comparison: correlation at limited lags, a signal split into frequency bands, smoothed
+// spectra. All take plain rows; none keeps state between calls.
 #ifndef GAPSCOPE_COMPARE_SPECTRUM_H_
 #define GAPSCOPE_COMPARE_SPECTRUM_H_
 

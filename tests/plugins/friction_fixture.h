@@ -40,29 +40,30 @@ inline std::string Text(double value) {
   return text;
 }
 
-// The recipe of the plugin's README: rows that stop the joint within the step, whatever the step.
+// The recipe of the plugin's README: rows that stop the joint within the step, whatever the step. The damping is
+// divided by the impedance: 1/h would stop it 1e-4 too far, and give back energy.
 inline std::string StiffRow(double step_s) {
-  return "solimpfriction=\"0.9999 0.9999 0.001 0.5 2\" solreffriction=\"-1 " + Text(-1 / step_s) + "\"";
+  return "solimpfriction=\"0.9999 0.9999 0.001 0.5 2\" solreffriction=\"-1 " + Text(-0.9999 / step_s) + "\"";
 }
 
 // A wheel of inertia 0.01 kg m2 about y with an off-centre mass: gravity torque -m g l sin(q), hanging at 0.
 struct JointModel {
   double step_s = 0.001;
-  std::string integrator = "Euler", solver = "Newton", cone_and_flags;
+  std::string integrator = "Euler", solver = "Newton", flags = "";
   double inertia = 0.01;
   double mass = 0, length = 0;       // of the off-centre mass
-  std::string joint;                 // more attributes of the joint
+  std::string joint = "";                 // more attributes of the joint
   std::string row = "";              // solimpfriction ...; empty: StiffRow
   double frictionloss = 1e-9;
-  std::string config, numeric;       // of the plugin
+  std::string config = "", numeric = "";       // of the plugin
   bool with_plugin = true;
   bool turn = false;                 // gives the plugin its ACTUATOR compute
-  std::string actuators;
+  std::string actuators = "";
 
   std::string Xml() const {
     const std::string stiff = row.empty() ? StiffRow(step_s) : row;
     std::string xml = "<mujoco><compiler autolimits=\"true\" angle=\"radian\"/><option timestep=\"" + Text(step_s) + "\" integrator=\"" + integrator +
-                      "\" solver=\"" + solver + "\" gravity=\"0 0 -9.81\"><flag contact=\"disable\" " + cone_and_flags + "/></option>";
+                      "\" solver=\"" + solver + "\" gravity=\"0 0 -9.81\"><flag contact=\"disable\" " + flags + "/></option>";
     if (with_plugin) {
       xml += "<extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\"><config key=\"joint\" value=\"j\"/>" + config +
              "</instance></plugin></extension>";

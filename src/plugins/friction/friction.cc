@@ -42,22 +42,23 @@ const std::array<ParameterSpec, Friction::kKeyCount> Friction::kSpecs = {{
 
 std::unique_ptr<Friction> Friction::Create(const mjModel* m, int instance) {
   auto friction = std::make_unique<Friction>();
-  const std::string fault = friction->Resolve(m, instance);
-  // The live values of a finished model are the host's: only its structure is judged.
-  const bool usable = fault.empty() || (!IsCompiling(m) && friction->dof_ >= 0 && m->dof_frictionloss[friction->dof_] > 0);
-  if (!usable) {
-    if (Refuse(m, fault)) return nullptr;
+  const std::string structure = friction->ResolveStructure(m, instance);
+  const std::string values = friction->ResolveValues(m, instance);
+  if (!structure.empty()) {
+    if (Refuse(m, structure)) return nullptr;
     friction->inert_ = true;
+  } else if (!values.empty() && IsCompiling(m)) {  // the live values of a finished model are its host's
+    Refuse(m, values);
+    return nullptr;
   }
   return friction;
 }
 
-std::string Friction::Resolve(const mjModel* m, int instance) {
+std::string Friction::ResolveStructure(const mjModel* m, int instance) {
   state_address_ = m->plugin_stateadr[instance];
   if (std::string fault = ResolveJoint(m, instance, &joint_); !fault.empty()) return fault;
   dof_ = m->jnt_dofadr[joint_];
   angle_address_ = m->jnt_qposadr[joint_];
-  std::string fault = value_.Resolve(m, instance, kSpecs);
 
   const std::string_view load = ConfigText(m, instance, "load");
   if (load == "gearbox") load_ = Load::kGearbox;
@@ -69,18 +70,11 @@ std::string Friction::Resolve(const mjModel* m, int instance) {
   if (!model.empty() && model != "lugre" && model != "dry") {
     return Fault(m, instance, "model", std::string(model), "dry, lugre", "leave it out for dry");
   }
-  if (const std::string turn = CheckTurn(m, instance); fault.empty()) fault = turn;
-  if (!fault.empty()) return fault;
-
   const std::string joint_name(ConfigText(m, instance, "joint"));
   if (m->dof_frictionloss[dof_] <= 0 && model_ == Model::kDry) {
     return "plugin instance '" + InstanceName(m, instance) + "': joint '" + joint_name + "' has frictionloss " +
            std::to_string(m->dof_frictionloss[dof_]) +
            ", allowed above 0: without it the solver has no row to rewrite; set frictionloss=\"1e-9\" on the joint";
-  }
-  if (model_ == Model::kLugre && !(value_(m, kSigma0) > 0)) {
-    return Fault(m, instance, "sigma0_n_m_per_rad", std::to_string(value_(m, kSigma0)), "above 0 with model lugre",
-                 "set it, as a rule to 100-10000 times the friction in N m, or use model dry");
   }
   for (int other = 0; other < m->nplugin; ++other) {
     if (other != instance && m->plugin[other] == m->plugin[instance] && ConfigText(m, other, "joint") == joint_name) {
@@ -88,32 +82,40 @@ std::string Friction::Resolve(const mjModel* m, int instance) {
                    "the instance '" + InstanceName(m, other) + "' is on it too: put all terms in one");
     }
   }
+  return CheckTurn(m, instance);
+}
+
+std::string Friction::ResolveValues(const mjModel* m, int instance) {
+  if (std::string fault = value_.Resolve(m, instance, kSpecs); !fault.empty()) return fault;
+  if (model_ == Model::kLugre && !(value_(m, kSigma0) > 0)) {
+    return Fault(m, instance, "sigma0_n_m_per_rad", std::to_string(value_(m, kSigma0)), "above 0 with model lugre",
+                 "set it, as a rule to 100-10000 times the friction in N m, or use model dry");
+  }
   std::array<const char*, kKeyCount> keys;
   std::transform(kSpecs.begin(), kSpecs.end(), keys.begin(), [](const ParameterSpec& spec) { return spec.key; });
   return UnknownNumeric(m, instance, keys.data(), kKeyCount);
 }
 
 // Lists the joint's drives and this instance's own actuator elements. MuJoCo runs actuator plugins in the order of their
-// instances, so a motor plugin that comes later would be read before it has spoken.
+// instances, so a motor plugin that comes later has not spoken yet when this one's turn comes.
 std::string Friction::CheckTurn(const mjModel* m, int instance) {
   for (int i = 0; i < m->nactuator; ++i) {
     const int end = m->actuator_outadr[i] + m->actuator_outnum[i];
     if (m->actuator_plugin[i] == instance) {
-      has_turn_ = true;
       for (int out = m->actuator_outadr[i]; out < end; ++out) own_outputs_.push_back(out);
       continue;
     }
     const bool on_joint = m->actuator_trntype[i] == mjTRN_JOINT || m->actuator_trntype[i] == mjTRN_JOINTINPARENT;
     if (!on_joint || m->actuator_trnid[2 * i] == joint_) drives_.push_back(i);
   }
-  if (!has_turn_) return {};
   for (const int i : drives_) {
     const int other = m->actuator_plugin[i];
-    if (other > instance && m->plugin[other] != m->plugin[instance]) {
-      return "plugin instance '" + InstanceName(m, instance) + "': it stands before the actuator plugin instance '" +
-             InstanceName(m, other) + "' that drives its joint, allowed only after it; move its <plugin plugin=\"" +
-             kName + "\"> to the end of <extension>";
-    }
+    if (other <= instance || m->plugin[other] == m->plugin[instance]) continue;
+    last_in_turn_ = false;
+    if (own_outputs_.empty()) continue;
+    return "plugin instance '" + InstanceName(m, instance) + "': it stands before the actuator plugin instance '" +
+           InstanceName(m, other) + "' that drives its joint, allowed only after it; move its <plugin plugin=\"" + kName +
+           "\"> to the end of <extension>";
   }
   return {};
 }
@@ -259,7 +261,7 @@ void Friction::ComputePassive(const mjModel* m, mjData* d) const {
 
 void Friction::ComputeActuator(const mjModel* m, mjData* d) const {
   for (const int out : own_outputs_) d->actuator_force[out] = 0;
-  if (inert_ || model_ == Model::kLugre) return;
+  if (inert_ || !last_in_turn_ || model_ == Model::kLugre) return;
   const DryFriction law = Law(m);
   const bool loaded = law.load_coefficient != 0 || law.load_quadratic_per_n_m != 0;
   const bool directed = NeedsDirection(law);

@@ -54,7 +54,9 @@ class Friction {
   void Advance(const mjModel* m, mjData* d) const;
 
  private:
-  std::string Resolve(const mjModel* m, int instance);
+  // The faults of what stands in <config> and the model, and of numbers; empty when there is none.
+  std::string ResolveStructure(const mjModel* m, int instance);
+  std::string ResolveValues(const mjModel* m, int instance);
   std::string CheckTurn(const mjModel* m, int instance);
 
   State& StateOf(mjData* d) const { return *reinterpret_cast<State*>(d->plugin_state + state_address_); }
@@ -72,7 +74,7 @@ class Friction {
   int joint_ = -1, dof_ = -1, angle_address_ = -1, state_address_ = -1;
   Load load_ = Load::kMotor;
   Model model_ = Model::kDry;
-  bool has_turn_ = false;  // an actuator element gives it the ACTUATOR compute
+  bool last_in_turn_ = true;  // its ACTUATOR compute comes after those of the joint's drives
   bool inert_ = false;
   std::vector<int> drives_;      // actuators that may act on the joint
   std::vector<int> own_outputs_;  // force outputs of its own actuator elements

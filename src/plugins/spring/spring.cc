@@ -29,18 +29,26 @@ const std::array<ParameterSpec, Spring::kKeyCount> Spring::kSpecs = {{
 
 std::unique_ptr<Spring> Spring::Create(const mjModel* m, int instance) {
   auto spring = std::make_unique<Spring>();
-  const std::string fault = spring->Resolve(m, instance);
-  // The live values of a finished model are the host's: only its structure is judged.
-  const bool usable = fault.empty() || (!IsCompiling(m) && spring->dof_ >= 0);
-  if (!usable && Refuse(m, fault)) return nullptr;
+  const std::string structure = spring->ResolveStructure(m, instance);
+  const std::string values = spring->ResolveValues(m, instance);
+  if (!structure.empty()) {
+    if (Refuse(m, structure)) return nullptr;
+  } else if (!values.empty() && IsCompiling(m)) {  // the live values of a finished model are its host's
+    Refuse(m, values);
+    return nullptr;
+  }
   return spring;
 }
 
-std::string Spring::Resolve(const mjModel* m, int instance) {
+std::string Spring::ResolveStructure(const mjModel* m, int instance) {
   state_address_ = m->plugin_stateadr[instance];
   if (std::string fault = ResolveJoint(m, instance, &joint_); !fault.empty()) return fault;
   dof_ = m->jnt_dofadr[joint_];
   angle_address_ = m->jnt_qposadr[joint_];
+  return {};
+}
+
+std::string Spring::ResolveValues(const mjModel* m, int instance) {
   if (std::string fault = value_.Resolve(m, instance, kSpecs); !fault.empty()) return fault;
   std::array<const char*, kKeyCount> keys;
   std::transform(kSpecs.begin(), kSpecs.end(), keys.begin(), [](const ParameterSpec& spec) { return spec.key; });

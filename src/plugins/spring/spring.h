@@ -35,7 +35,8 @@ class Spring {
   void Advance(const mjModel* m, mjData* d) const;
 
  private:
-  std::string Resolve(const mjModel* m, int instance);
+  std::string ResolveStructure(const mjModel* m, int instance);
+  std::string ResolveValues(const mjModel* m, int instance);
   BristleState& StateOf(mjData* d) const { return *reinterpret_cast<BristleState*>(d->plugin_state + state_address_); }
   double Torque(const mjModel* m, double q) const;
 

@@ -64,6 +64,17 @@ TEST(FrictionLugreTest, SlidesAtTheLevel) {
   EXPECT_NEAR(d->qacc[0], (0.5 - kCoulomb) / kInertia, 1e-6);
 }
 
+// The gearbox's load is that of motor and gravity, never the friction itself, which would feed itself.
+TEST(FrictionLugreTest, LoadDoesNotCountOwnTorque) {
+  JointModel joint = Bristle(0.001, "Euler");
+  joint.config += Config("load", "gearbox") + Config("load_coefficient", 0.5);
+  const ModelPtr m = Compile(joint.Xml());
+  const DataPtr d(mj_makeData(m.get()));
+  d->ctrl[0] = 0.8;
+  for (int i = 0; i < 500; ++i) mj_step(m.get(), d.get());
+  EXPECT_NEAR(d->qacc[0], (0.8 - kCoulomb - 0.5 * 0.8) / kInertia, 1e-6);
+}
+
 // RK4 computes four times a step; the bristle settles once, so that the result converges to a fine Euler run.
 TEST(FrictionLugreTest, Rk4SettlesTheBristleOncePerStep) {
   const auto run = [](double h, const char* integrator) {

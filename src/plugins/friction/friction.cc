@@ -165,10 +165,9 @@ double Friction::ActuatorTorque(const mjModel* m, const mjData* d) const {
   return torque;
 }
 
-// Gravity, Coriolis, springs and applied forces at the joint; no damping, which is friction itself.
-double Friction::ExternalTorque(const mjModel* m, const mjData* d) const {
-  double passive = d->qfrc_passive[dof_] - d->qfrc_damper[dof_];
-  if (model_ == Model::kDry) passive -= ViscousTorque(m, d->qvel[dof_]);
+// Gravity, Coriolis, springs and applied forces at the joint; no damping and nothing of this plugin: that is friction.
+double Friction::ExternalTorque(mjData* d) const {
+  const double passive = d->qfrc_passive[dof_] - d->qfrc_damper[dof_] - StateOf(d).own_n_m;
   return passive - d->qfrc_bias[dof_] + d->qfrc_applied[dof_];
 }
 
@@ -256,6 +255,7 @@ void Friction::ComputePassive(const mjModel* m, mjData* d) const {
     const double bend = BendBristle(state.bristle.bend, shift, level / sigma0);
     torque -= level * bend + value_(m, kSigma1) * (speed - std::abs(speed) * bend);
   }
+  state.own_n_m = torque;
   d->qfrc_passive[dof_] += torque;
 }
 
@@ -267,7 +267,7 @@ void Friction::ComputeActuator(const mjModel* m, mjData* d) const {
   const bool directed = NeedsDirection(law);
   if (!loaded && !directed) return;
   const double drive = loaded ? ActuatorTorque(m, d) : 0;
-  const double external = loaded && load_ == Load::kGearbox ? ExternalTorque(m, d) : 0;
+  const double external = loaded && load_ == Load::kGearbox ? ExternalTorque(d) : 0;
   WriteRow(m, d, Level(m, law, d->qvel[dof_], drive, external, directed ? FreeAcceleration(m, d) : 0), false);
 }
 
@@ -282,7 +282,7 @@ void Friction::Advance(const mjModel* m, mjData* d) const {
     state.bristle.Settle(BendBristle(state.bristle.bend, shift, level / value_(m, kSigma0)), q, d->time);
   }
   state.drive_n_m = d->qfrc_actuator[dof_];
-  state.external_n_m = ExternalTorque(m, d);
+  state.external_n_m = ExternalTorque(d);
   state.free_acceleration_rad_per_s2 = d->qacc_smooth[dof_];
 }
 

@@ -39,6 +39,7 @@ class Friction {
     double drive_n_m;                   // torque of the joint's actuators in the last step
     double external_n_m;                // torque of gravity, springs and applied forces in the last step
     double free_acceleration_rad_per_s2;  // of the last step, without constraints
+    double own_n_m;                     // passive torque of this plugin in the last compute
     BristleState bristle;               // LuGre
   };
   static constexpr int kStateSize = sizeof(State) / sizeof(mjtNum);
@@ -64,7 +65,7 @@ class Friction {
   bool NeedsDirection(const DryFriction& law) const;
   double ViscousTorque(const mjModel* m, double speed) const;
   double ActuatorTorque(const mjModel* m, const mjData* d) const;
-  double ExternalTorque(const mjModel* m, const mjData* d) const;
+  double ExternalTorque(mjData* d) const;
   double FreeAcceleration(const mjModel* m, mjData* d) const;
   double Level(const mjModel* m, const DryFriction& law, double speed, double drive, double external,
                double free_acceleration) const;

@@ -56,10 +56,11 @@ inline std::string InstanceName(const mjModel* m, int instance) {
 template <int N>
 class LiveParameters {
  public:
-  // Resolves all parameters. Returns an empty text, or one that names the instance, the key, what was found, the
-  // allowed range and the cure.
+  // Resolves all parameters, whatever is wrong with some. Returns an empty text, or one for the first fault that names
+  // the instance, the key, what was found, the allowed range and the cure.
   std::string Resolve(const mjModel* m, int instance, const std::array<ParameterSpec, N>& specs) {
     const std::string name = InstanceName(m, instance);
+    std::string fault;
     for (int i = 0; i < N; ++i) {
       const ParameterSpec& spec = specs[i];
       value_[i] = spec.neutral;
@@ -70,17 +71,20 @@ class LiveParameters {
         value_[i] = m->numeric_data[address_[i]];
       } else if (const std::string_view text = ConfigText(m, instance, spec.key); !text.empty()) {
         if (!ParseNumber(text, &value_[i])) {
-          return "plugin instance '" + name + "': attribute '" + spec.key + "' is '" + std::string(text) +
-                 "', expected a number" + UnitText(spec);
+          value_[i] = spec.neutral;
+          if (fault.empty()) {
+            fault = "plugin instance '" + name + "': attribute '" + spec.key + "' is '" + std::string(text) +
+                    "', expected a number" + UnitText(spec);
+          }
         }
       }
-      if (!(value_[i] >= spec.min && value_[i] <= spec.max)) {
-        return "plugin instance '" + name + "': attribute '" + spec.key + "' is " + std::to_string(value_[i]) +
+      if (fault.empty() && !(value_[i] >= spec.min && value_[i] <= spec.max)) {
+        fault = "plugin instance '" + name + "': attribute '" + spec.key + "' is " + std::to_string(value_[i]) +
                ", allowed " + std::to_string(spec.min) + " to " + std::to_string(spec.max) + UnitText(spec) +
                "; leave it out for " + std::to_string(spec.neutral);
       }
     }
-    return {};
+    return fault;
   }
 
   // The current value of parameter i. No bounds are checked here: a tuner owns the live values.

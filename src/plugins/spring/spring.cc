@@ -1,3 +1,129 @@
+#include "src/plugins/spring/spring.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "src/plugins/common/refusal.h"
+
 namespace gapscope::plugins {
-void RegisterSpring() {}
+namespace {
+constexpr double kInf = kUnlimited;
+}  // namespace
+
+const std::array<ParameterSpec, Spring::kKeyCount> Spring::kSpecs = {{
+    {"stiffness_n_m_per_rad", "N m/rad", 0, 0, kInf},
+    {"rest_rad", "rad", 0, -kInf, kInf},
+    {"hysteresis_n_m", "N m", 0, 0, kInf},
+    {"hysteresis_rad", "rad", 0.05, 0, kInf},
+    {"cubic_n_m_per_rad3", "N m/rad^3", 0, -kInf, kInf},
+    {"gravity_n_m", "N m", 0, -kInf, kInf},
+    {"gravity_rest_rad", "rad", 0, -kInf, kInf},
+    {"bias_n_m", "N m", 0, -kInf, kInf},
+    {"cogging_n_m", "N m", 0, -kInf, kInf},
+    {"cogging_periods_per_rev", "1", 12, 0, kInf},
+    {"cogging_phase_rad", "rad", 0, -kInf, kInf},
+    {"cogging_second_n_m", "N m", 0, -kInf, kInf},
+    {"cogging_second_phase_rad", "rad", 0, -kInf, kInf},
+}};
+
+std::unique_ptr<Spring> Spring::Create(const mjModel* m, int instance) {
+  auto spring = std::make_unique<Spring>();
+  const std::string structure = spring->ResolveStructure(m, instance);
+  const std::string values = spring->ResolveValues(m, instance);
+  if (!structure.empty()) {
+    if (Refuse(m, structure)) return nullptr;
+  } else if (!values.empty() && IsCompiling(m)) {  // the live values of a finished model are its host's
+    Refuse(m, values);
+    return nullptr;
+  }
+  return spring;
+}
+
+std::string Spring::ResolveStructure(const mjModel* m, int instance) {
+  state_address_ = m->plugin_stateadr[instance];
+  if (std::string fault = ResolveJoint(m, instance, &joint_); !fault.empty()) return fault;
+  dof_ = m->jnt_dofadr[joint_];
+  angle_address_ = m->jnt_qposadr[joint_];
+  return {};
+}
+
+std::string Spring::ResolveValues(const mjModel* m, int instance) {
+  if (std::string fault = value_.Resolve(m, instance, kSpecs); !fault.empty()) return fault;
+  std::array<const char*, kKeyCount> keys;
+  std::transform(kSpecs.begin(), kSpecs.end(), keys.begin(), [](const ParameterSpec& spec) { return spec.key; });
+  return UnknownNumeric(m, instance, keys.data(), kKeyCount);
+}
+
+double Spring::Torque(const mjModel* m, double q) const {
+  const double e = q - value_(m, kRest);
+  double torque = value_(m, kBias) - (value_(m, kStiffness) + value_(m, kCubic) * e * e) * e;
+  if (const double gravity = value_(m, kGravity); gravity != 0) {
+    torque -= gravity * std::sin(q - value_(m, kGravityRest));
+  }
+  const double first = value_(m, kCogging), second = value_(m, kCoggingSecond);
+  if (first != 0 || second != 0) {
+    const double angle = value_(m, kCoggingPeriods) * q;
+    torque += first * std::sin(angle + value_(m, kCoggingPhase));
+    if (second != 0) torque += second * std::sin(2 * angle + value_(m, kCoggingSecondPhase));
+  }
+  return torque;
+}
+
+void Spring::ComputePassive(const mjModel* m, mjData* d) const {
+  if (dof_ < 0) return;
+  const double q = d->qpos[angle_address_];
+  double torque = Torque(m, q);
+  BristleState& state = StateOf(d);
+  const double shift = state.Displacement(q, d->time, m->opt.timestep);
+  if (const double height = value_(m, kHysteresis); height != 0) {
+    torque -= height * BendBristle(state.bend, shift, value_(m, kHysteresisAngle));
+  }
+  d->qfrc_passive[dof_] += torque;
+}
+
+void Spring::Advance(const mjModel* m, mjData* d) const {
+  if (dof_ < 0) return;
+  BristleState& state = StateOf(d);
+  const double q = d->qpos[angle_address_];
+  double bend = state.bend;
+  if (value_(m, kHysteresis) != 0) bend = BendBristle(bend, q - state.angle_rad, value_(m, kHysteresisAngle));
+  state.Settle(bend, q, d->time);
+}
+
+void RegisterSpring() {
+  static const auto attributes = [] {
+    std::array<const char*, Spring::kKeyCount + 1> names{};
+    std::transform(Spring::kSpecs.begin(), Spring::kSpecs.end(), names.begin(),
+                   [](const ParameterSpec& spec) { return spec.key; });
+    names[Spring::kKeyCount] = "joint";
+    return names;
+  }();
+  mjpPlugin plugin;
+  mjp_defaultPlugin(&plugin);
+  plugin.name = "gapscope.spring";
+  plugin.nattribute = static_cast<int>(attributes.size());
+  plugin.attributes = attributes.data();
+  plugin.capabilityflags = mjPLUGIN_PASSIVE;
+  plugin.nstate = +[](const mjModel*, int) { return Spring::kStateSize; };
+  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
+    auto spring = Spring::Create(m, instance);
+    if (!spring) return -1;
+    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(spring.release());
+    return 0;
+  };
+  plugin.destroy = +[](mjData* d, int instance) {
+    delete reinterpret_cast<Spring*>(d->plugin_data[instance]);
+    d->plugin_data[instance] = 0;
+  };
+  plugin.reset = +[](const mjModel*, mjtNum* state, void*, int) { std::fill_n(state, Spring::kStateSize, 0.0); };
+  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
+    reinterpret_cast<Spring*>(d->plugin_data[instance])->ComputePassive(m, d);
+  };
+  plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
+    reinterpret_cast<Spring*>(d->plugin_data[instance])->Advance(m, d);
+  };
+  mjp_registerPlugin(&plugin);
+}
+
 }  // namespace gapscope::plugins

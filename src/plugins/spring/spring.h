@@ -1,0 +1,49 @@
+// gapscope.spring: torque of one hinge or slide joint that depends on where the joint is, and a little on where it was.
+//
+//   torque = -k e - k3 e^3 - H s - G sin(q - q_g) + B + A sin(P q + a) + A2 sin(2 P q + a2),   e = q - rest
+//
+// with s in -1 .. 1 the bend of a Dahl bristle (../common/bristle.h), which makes a loop of half-height H that turns over
+// within a few `hysteresis_rad`. Stands for a cable, a spring that hardens, an unbalanced mass, a bias, cogging.
+// MuJoCo's own `stiffness` and `springref` do for a plain linear spring. Attributes: README.md in this folder.
+#ifndef GAPSCOPE_PLUGINS_SPRING_SPRING_H_
+#define GAPSCOPE_PLUGINS_SPRING_SPRING_H_
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <memory>
+
+#include "src/plugins/common/bristle.h"
+#include "src/plugins/common/parameters.h"
+
+namespace gapscope::plugins {
+
+class Spring {
+ public:
+  enum Key {
+    kStiffness, kRest, kHysteresis, kHysteresisAngle, kCubic, kGravity, kGravityRest, kBias, kCogging, kCoggingPeriods,
+    kCoggingPhase, kCoggingSecond, kCoggingSecondPhase, kKeyCount
+  };
+  static const std::array<ParameterSpec, kKeyCount> kSpecs;
+  static constexpr int kStateSize = sizeof(BristleState) / sizeof(mjtNum);
+
+  // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model does nothing.
+  static std::unique_ptr<Spring> Create(const mjModel* m, int instance);
+
+  void ComputePassive(const mjModel* m, mjData* d) const;
+  // Settles the bristle once per step, whatever the integrator.
+  void Advance(const mjModel* m, mjData* d) const;
+
+ private:
+  std::string ResolveStructure(const mjModel* m, int instance);
+  std::string ResolveValues(const mjModel* m, int instance);
+  BristleState& StateOf(mjData* d) const { return *reinterpret_cast<BristleState*>(d->plugin_state + state_address_); }
+  double Torque(const mjModel* m, double q) const;
+
+  LiveParameters<kKeyCount> value_;
+  int joint_ = -1, dof_ = -1, angle_address_ = -1, state_address_ = -1;
+};
+
+}  // namespace gapscope::plugins
+
+#endif  // GAPSCOPE_PLUGINS_SPRING_SPRING_H_

@@ -3,8 +3,10 @@
 //
 // A ring of samples (t, q, qdot, ctrl...) at the starts of past steps, and the sample of the step that is open now: the
 // engine's `compute` opens a step, `advance` closes it, so RK4's four computes make one sample. Times may be irregular.
-//   motion at t - D   cubic Hermite through (q, qdot) of the two samples around it, the present being the last one;
-//                     before the oldest sample q goes on linearly with its qdot (right after a reset: from now)
+//   motion at t - D   q by cubic Hermite through (q, qdot) of the two samples around it, the present being the last
+//                     one; qdot linearly (the cubic's own derivative swings within a step where the integrator's q and
+//                     qdot disagree by its O(h), and the gradient in D with it). Before the oldest sample q goes on
+//                     linearly with that sample's qdot; right after a reset that sample is the present
 //   command at t - D  zero-order hold of what was sent; over a step its exact mean on [t0 - D, t0 + h - D], so that a
 //                     delay of whole steps is exact and a delay in between has a gradient; before the oldest sample
 //                     the oldest command
@@ -133,9 +135,8 @@ class History {
     const double dt = b_t - a[0];
     if (!(dt > 0)) return b;
     const double s = (t - a[0]) / dt, r = 1 - s;
-    const double chord = (b.q - a[1]) / dt;
     return {r * r * (1 + 2 * s) * a[1] + s * s * (1 + 2 * r) * b.q + s * r * dt * (r * a[2] - s * b.qdot),
-            6 * s * r * chord + r * (1 - 3 * s) * a[2] + s * (1 - 3 * r) * b.qdot};
+            r * a[2] + s * b.qdot};
   }
 
   double* state_;

@@ -44,7 +44,7 @@ struct QubeConstants {
 };
 
 constexpr double kReferenceStep_s = 2e-5;
-// A rod is given 1e-10 kg m2 about itself, a third of a millionth of the arm's inertia: that is what is left over.
+// A rod is given 1e-10 kg m2 about itself, a quarter of a millionth of the inertia about the axis: that is what is left over.
 constexpr double kTolerance_rad = 2e-5;
 
 TEST(QubeModelTest, FollowsTheEquationsSwingingWidely) {

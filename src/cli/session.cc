@@ -20,6 +20,7 @@ void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
 void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects) {
   command.add_option("experiment", flags.experiment, "Experiment file (YAML)")->required();
   command.add_option("logs", flags.logs, "Hardware logs")->required();
+  command.add_option("--while", flags.while_column, "Use a log's rows until this column falls to zero (\"torque_enable\")");
   if (!effects) return;
   command.add_option("--with", flags.with, "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL]")->allow_extra_args(false);
   command.add_option("--set", flags.set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
@@ -41,6 +42,7 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
   Session session;
   session.pool = std::make_unique<ThreadPool>(common.jobs > 0 ? common.jobs : DefaultWorkers());
   GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));
+  if (!flags.while_column.empty()) session.experiment.replay.while_column = flags.while_column;
   GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
   GS_ASSIGN(session.model, Model::Build(session.experiment));
   if (!flags.with.empty()) {

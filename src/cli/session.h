@@ -34,6 +34,7 @@ struct ModelFlags {
   std::vector<std::string> with;    // EFFECT[@ON]
   std::vector<std::string> set;     // NAME=VALUE
   std::vector<std::string> params;  // YAML files of values
+  std::string while_column;         // over the experiment's own
 };
 // Adds EXPERIMENT LOG... and, where the command takes them, --with, --set, --params.
 void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects);

@@ -194,6 +194,7 @@ Status ReadReplay(const YAML::Node& node, const std::string& path, Experiment* e
   experiment->replay.mode = kModes[map.Choice("mode", {"free_run", "windows"}, 0)];
   experiment->replay.window_s = map.Number("window_s", experiment->replay.window_s);
   experiment->replay.start_s = map.Number("start_s", 0);
+  experiment->replay.while_column = map.Text("while", "");
   if (!(experiment->replay.window_s > 0) || experiment->replay.start_s < 0) {
     map.Fail(node, {.what = "'window_s' must be above and 'start_s' not below zero"});
   }

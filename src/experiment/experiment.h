@@ -67,7 +67,8 @@ enum class ReplayMode { kFreeRun, kWindows, kClosedLoop };
 struct ReplayDefaults {
   ReplayMode mode = ReplayMode::kFreeRun;
   double window_s = 1.0;
-  double start_s = 0;  // rows before this are left out (a rig that is still handled by hand, say)
+  std::string while_column;  // rows from the first one where this column is zero or missing on are left out; empty: all rows
+  double start_s = 0;        // rows before this are left out (a rig that is still handled by hand, say)
 };
 
 struct Experiment {

@@ -26,6 +26,33 @@ Error MissingColumn(const Log& log, const std::vector<std::string>& names, const
                .cure = nearest.empty() ? "name the right column in the experiment file" : "did you mean '" + nearest + "'?"};
 }
 
+// Leaves out what the experiment does not want: the first seconds, and what follows after the `while` column falls to zero. Time starts anew.
+Status CutTimeline(const Experiment& experiment, const Log& log, Timeline* timeline) {
+  const ReplayDefaults& replay = experiment.replay;
+  std::size_t first = 0, last = timeline->time_s.size();
+  while (first < last && timeline->time_s[first] < replay.start_s) ++first;
+  if (!replay.while_column.empty()) {
+    const Column* column = log.Find(replay.while_column);
+    if (!column) return MissingColumn(log, {replay.while_column}, "'while'");
+    std::size_t row = first;
+    while (row < last && std::abs(column->values[timeline->rows[row]]) > 0) ++row;
+    last = row;
+  }
+  if (last < first + 2) {
+    return Error{.what = "the log has fewer than two rows left", .where = log.path, .actual = std::to_string(timeline->time_s.back()) + " s in all",
+                 .cure = "see 'start_s' and 'while' of the experiment"};
+  }
+  if (last < timeline->time_s.size()) {
+    timeline->findings.push_back({.kind = "cut", .column = replay.while_column, .count = timeline->time_s.size() - last, .first_row = timeline->rows[last],
+                                  .text = std::to_string(timeline->time_s.size() - last) + " rows after '" + replay.while_column + "' fell to zero are left out"});
+  }
+  timeline->time_s = std::vector<double>(timeline->time_s.begin() + static_cast<std::ptrdiff_t>(first), timeline->time_s.begin() + static_cast<std::ptrdiff_t>(last));
+  timeline->rows = std::vector<std::size_t>(timeline->rows.begin() + static_cast<std::ptrdiff_t>(first), timeline->rows.begin() + static_cast<std::ptrdiff_t>(last));
+  const double shift = timeline->time_s.front();
+  for (double& t : timeline->time_s) t -= shift;
+  return Ok();
+}
+
 Result<std::map<std::string, double>> BindValues(const Experiment& experiment, const Log& log) {
   std::map<std::string, double> values;
   for (const auto& spec : experiment.values) {
@@ -58,19 +85,7 @@ Result<std::map<std::string, double>> BindValues(const Experiment& experiment, c
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path) {
   GS_ASSIGN(const Log log, ReadLog(log_path, experiment.read));
   GS_ASSIGN(Timeline timeline, BuildTimeline(log, experiment.timeline));
-  if (experiment.replay.start_s > 0) {
-    // Leave out the first seconds that the experiment does not want; time starts anew.
-    std::size_t first = 0;
-    while (first < timeline.time_s.size() && timeline.time_s[first] < experiment.replay.start_s) ++first;
-    if (first + 2 > timeline.time_s.size()) {
-      return Error{.what = "the log ends before replay.start_s", .where = log_path, .actual = std::to_string(timeline.time_s.back()) + " s",
-                   .allowed = "more than " + std::to_string(experiment.replay.start_s) + " s"};
-    }
-    const double shift = timeline.time_s[first];
-    timeline.time_s.erase(timeline.time_s.begin(), timeline.time_s.begin() + static_cast<std::ptrdiff_t>(first));
-    timeline.rows.erase(timeline.rows.begin(), timeline.rows.begin() + static_cast<std::ptrdiff_t>(first));
-    for (double& t : timeline.time_s) t -= shift;
-  }
+  GS_RETURN_IF_ERROR(CutTimeline(experiment, log, &timeline));
   Recording recording;
   recording.log_path = log_path;
   recording.findings = log.findings;

@@ -1,6 +1,8 @@
 #include "src/experiment/experiment.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <set>
@@ -18,6 +20,7 @@ std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, do
   if (!parsed.ok()) map.Fail(node, parsed.error());
   *factor = (parsed.ok() ? parsed.value().factor : 1) * map.Number("scale", 1);
   *offset = map.Number("add", 0);
+  if (!std::isfinite(*factor) || *factor == 0) map.Fail(node, {.what = "'scale' makes every value zero or infinite", .allowed = "a finite number other than 0"});
   return parsed.ok() ? parsed.value().si : "1";
 }
 
@@ -33,16 +36,13 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
     experiment->timeline.time_unit = kUnits[time_map.Choice("unit", {"auto", "s", "ms", "us", "ns"}, 0)];
     GS_RETURN_IF_ERROR(time_map.Finish());
   }
-  if (const YAML::Node companions = map.Child("companions"); companions.IsDefined()) {
-    for (const auto& item : companions) {
-      YamlMap companion(item, path, "a companion");
-      experiment->read.companions.push_back(
-          {companion.Text("find"), companion.Text("replace"), companion.Text("prefix", "")});
-      if (experiment->read.companions.back().find.empty()) {
-        companion.Fail(item, {.what = "'find' of a companion is empty"});
-      }
-      GS_RETURN_IF_ERROR(companion.Finish());
+  for (const YAML::Node& item : map.List("companions")) {
+    YamlMap companion(item, path, "a companion");
+    experiment->read.companions.push_back({companion.Text("find"), companion.Text("replace"), companion.Text("prefix", "")});
+    if (experiment->read.companions.back().find.empty()) {
+      companion.Fail(item, {.what = "'find' of a companion is empty"});
     }
+    GS_RETURN_IF_ERROR(companion.Finish());
   }
   if (const YAML::Node repair = map.Child("repair"); repair.IsDefined()) {
     YamlMap policy(repair, path, "'repair'");
@@ -52,6 +52,7 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
     experiment->timeline.reversed = kTime[policy.Choice("reversed", {"drop_rows", "error"}, 0)];
     experiment->timeline.missing = kMissing[policy.Choice("missing", {"hold", "drop_rows", "error"}, 0)];
     experiment->timeline.gap_factor = policy.Number("gap_factor", experiment->timeline.gap_factor);
+    if (!(experiment->timeline.gap_factor > 1)) policy.Fail(repair, {.what = "'gap_factor' is in median steps", .allowed = "> 1"});
     GS_RETURN_IF_ERROR(policy.Finish());
   }
   return map.Finish();
@@ -62,7 +63,8 @@ Status ReadValues(const YAML::Node& node, const std::string& path, Experiment* e
   YamlMap names(node, path, "'values'");
   for (const auto& pair : node) {
     if (!pair.first.IsScalar()) break;
-    const std::string name = pair.first.Scalar();
+    const std::string name = names.Name(pair.first);
+    if (names.failed()) break;
     YamlMap map(names.Child(name.c_str()), path, "the log value '" + name + "'");
     LogValue value{.name = name, .header = map.Text("header", ""), .column = map.Text("column", ""), .factor = 1};
     double offset = 0;
@@ -86,9 +88,8 @@ std::vector<std::string> ReadColumns(YamlMap& map, const YAML::Node& node, bool 
   return columns;
 }
 
-Status ReadCommands(const YAML::Node& node, const std::string& path, Experiment* experiment) {
-  if (!node.IsDefined()) return Ok();
-  for (const auto& item : node) {
+Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment) {
+  for (const YAML::Node& item : items) {
     YamlMap map(item, path, "a command");
     CommandSpec command;
     command.actuator = map.Text("actuator");
@@ -97,12 +98,10 @@ Status ReadCommands(const YAML::Node& node, const std::string& path, Experiment*
     command.columns = ReadColumns(map, item, !map.Has("default"));
     if (command.columns.empty()) command.optional = true;
     command.unit = ReadScaling(map, item, &command.factor, &command.offset);
-    GS_RETURN_IF_ERROR(map.Finish());
     for (const auto& other : experiment->commands) {
-      if (other.actuator == command.actuator) {
-        return Error{.what = "two commands drive the actuator '" + command.actuator + "'", .where = YamlPlace(path, item), .cure = "delete one"};
-      }
+      if (other.actuator == command.actuator) map.Fail(item, {.what = "two commands drive the actuator '" + command.actuator + "'", .cure = "delete one"});
     }
+    GS_RETURN_IF_ERROR(map.Finish());
     experiment->commands.push_back(std::move(command));
   }
   return Ok();
@@ -126,7 +125,14 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
       map.Fail(item, {.what = "the signal '" + spec.signal + "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
     }
-    ReadScaling(map, item, &spec.factor, &spec.offset);
+    const std::string unit = ReadScaling(map, item, &spec.factor, &spec.offset);
+    // "1": the column is in SI already.
+    const std::array<const char*, 3> fits[] = {{"rad", "m", "1"}, {"rad/s", "m/s", "1"}, {"N m", "N", "1"}};
+    const auto& units = fits[static_cast<std::size_t>(spec.kind)];
+    if (std::find(units.begin(), units.end(), unit) == units.end()) {
+      map.Fail(item, {.what = "the unit of the signal '" + spec.signal + "' does not fit its kind", .actual = "'" + map.Text("unit", "1") + "'",
+                      .allowed = std::string("units of ") + units[0] + " or " + units[1]});
+    }
     spec.resolution = map.Number("resolution", 0);
     spec.optional = map.Flag("optional", false);
     spec.scored = map.Flag("score", true);
@@ -137,12 +143,10 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
       if (!(spec.wrap_period > 0)) map.Fail(item, {.what = "'wrap' is the period to remove, in SI", .allowed = "> 0"});
     }
     if (spec.resolution < 0) map.Fail(item, {.what = "'resolution' is negative", .allowed = ">= 0"});
-    GS_RETURN_IF_ERROR(map.Finish());
     for (const auto& other : experiment->measured) {
-      if (other.signal == spec.signal) {
-        return Error{.what = "the signal '" + spec.signal + "' stands twice", .where = YamlPlace(path, item), .cure = "rename one"};
-      }
+      if (other.signal == spec.signal) map.Fail(item, {.what = "the signal '" + spec.signal + "' stands twice", .cure = "rename one"});
     }
+    GS_RETURN_IF_ERROR(map.Finish());
     experiment->measured.push_back(std::move(spec));
   }
   return Ok();
@@ -153,8 +157,12 @@ Status ReadParameters(const YAML::Node& node, const std::string& path, Experimen
   YamlMap names(node, path, "'parameters'");
   for (const auto& pair : node) {
     if (!pair.first.IsScalar()) break;
-    const std::string name = pair.first.Scalar();
+    const std::string name = names.Name(pair.first);
+    if (names.failed()) break;
     YamlMap map(names.Child(name.c_str()), path, "the parameter '" + name + "'");
+    for (const auto& value : experiment->values) {
+      if (value.name == name) map.Fail(pair.first, {.what = "the name '" + name + "' stands twice: a log value and a parameter", .cure = "rename one"});
+    }
     Parameter parameter{.name = name, .unit = map.Text("unit"), .doc = map.Text("doc", ""), .nominal = map.Number("nominal"), .low = 0, .high = 0,
                         .frozen = map.Flag("frozen", false)};
     const std::vector<double> bounds = map.NumberList("bounds", 2);
@@ -179,9 +187,7 @@ Status ReadSettings(const YAML::Node& node, const std::string& path, Experiment*
   for (const auto& pair : node) {
     if (!pair.first.IsScalar()) break;
     FieldSetting setting{.field = pair.first.Scalar(), .expressions = fields.TextList(pair.first.Scalar().c_str()), .where = YamlPlace(path, pair.first)};
-    if (setting.expressions.empty()) {
-      return Error{.what = "the field '" + setting.field + "' has no expression", .where = setting.where};
-    }
+    if (setting.expressions.empty()) fields.Fail(pair.first, {.what = "the field '" + setting.field + "' has no expression"});
     experiment->settings.push_back(std::move(setting));
   }
   return fields.Finish();
@@ -214,7 +220,9 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   }
   map.Text("doc", "");
   const std::string model = map.Text("model");
-  const YAML::Node log = map.Child("log"), values = map.Child("values"), commands = map.Child("commands"), measured = map.Child("measured"),
+  if (model.empty()) map.Fail(root, {.what = "'model' is empty", .allowed = "the path of an MJCF file"});
+  const std::vector<YAML::Node> commands = map.List("commands");
+  const YAML::Node log = map.Child("log"), values = map.Child("values"), measured = map.Child("measured"),
                    parameters = map.Child("parameters"), set = map.Child("set"), replay = map.Child("replay");
   GS_RETURN_IF_ERROR(map.Finish());
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "src/core/units.h"
+#include "src/log/text.h"
 
 namespace gapscope {
 namespace {
@@ -22,6 +23,19 @@ std::optional<double> AsNumber(const std::string& text) {
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (code != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+// muParser assigns to variables with '=', '+=' ...: not here.
+bool Assigns(const std::string& text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '=') continue;
+    if (i + 1 < text.size() && text[i + 1] == '=') {
+      ++i;
+      continue;
+    }
+    if (i == 0 || (text[i - 1] != '<' && text[i - 1] != '>' && text[i - 1] != '!')) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -41,6 +55,7 @@ Expression::~Expression() = default;
 Result<Expression> Expression::Parse(const std::string& text, const std::vector<std::string>& names, double* variables, const std::string& where) {
   auto impl = std::make_unique<Impl>();
   if (const auto number = AsNumber(text)) {
+    if (!std::isfinite(*number)) return Error{.what = "bad expression '" + text + "': not a finite number", .where = where};
     impl->constant = *number;
     return Expression(std::move(impl));
   }
@@ -51,6 +66,9 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
   if (text.size() > kMaxLength || std::count(text.begin(), text.end(), '(') > 64) {
     return Error{.what = "the expression is too long", .where = where, .allowed = std::to_string(kMaxLength) + " characters"};
   }
+  if (Assigns(text)) {
+    return Error{.what = "bad expression " + Quoted(text) + ": it assigns", .where = where, .cure = "compare with '==', or delete the '='"};
+  }
   impl->parser = std::make_unique<mu::Parser>();
   try {
     impl->parser->DefineNameChars(kNameChars);
@@ -58,11 +76,11 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
     for (std::size_t i = 0; i < names.size(); ++i) impl->parser->DefineVar(names[i], variables + i);
     impl->parser->SetExpr(text);
     impl->parser->Eval();
+    if (impl->parser->GetNumResults() != 1) return Error{.what = "bad expression " + Quoted(text) + ": several values", .where = where, .allowed = "one"};
   } catch (const mu::Parser::exception_type& e) {
     const std::string nearest = e.GetCode() == mu::ecUNASSIGNABLE_TOKEN ? Nearest(e.GetToken(), names) : "";
-    std::string message = e.GetMsg();
-    std::erase(message, '\n');
-    return Error{.what = "bad expression '" + text + "': " + message, .where = where, .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+    const std::string message = Quoted(e.GetMsg(), 200);
+    return Error{.what = "bad expression " + Quoted(text, 120) + ": " + message.substr(1, message.size() - 2), .where = where, .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
   }
   return Expression(std::move(impl));
 }

@@ -15,7 +15,7 @@ namespace gapscope {
 class Expression {
  public:
   // `names[i]` reads `variables[i]`, which must outlive the expression and not move. `where` is for errors. Errors: syntax, unknown name
-  // (with the nearest one), a value that is not finite.
+  // (with the nearest one), an assignment, several values, a number that is not finite.
   static Result<Expression> Parse(const std::string& text, const std::vector<std::string>& names, double* variables, const std::string& where);
 
   Expression(Expression&&) noexcept;

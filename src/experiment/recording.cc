@@ -42,6 +42,9 @@ Status CutTimeline(const Experiment& experiment, const Log& log, Timeline* timel
     return Error{.what = "the log has fewer than two rows left", .where = log.path, .actual = std::to_string(timeline->time_s.back()) + " s in all",
                  .cure = "see 'start_s' and 'while' of the experiment"};
   }
+  if (first > 0) {
+    timeline->findings.push_back({.kind = "cut", .column = "", .count = first, .first_row = timeline->rows[0], .text = std::to_string(first) + " rows before 'start_s' are left out"});
+  }
   if (last < timeline->time_s.size()) {
     timeline->findings.push_back({.kind = "cut", .column = replay.while_column, .count = timeline->time_s.size() - last, .first_row = timeline->rows[last],
                                   .text = std::to_string(timeline->time_s.size() - last) + " rows after '" + replay.while_column + "' fell to zero are left out"});
@@ -139,7 +142,7 @@ bool StartsAtRest(const Recording& recording, const Recording::Measured& measure
 }  // namespace
 
 LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row, double half_width_s) {
-  if (row == 0 && StartsAtRest(recording, measured)) return {measured.values[0], 0};
+  if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured)) return {measured.values[0], 0};
   const auto& t = recording.time_s;
   std::size_t first = row, last = row;
   while (first > 0 && t[row] - t[first - 1] <= half_width_s) --first;

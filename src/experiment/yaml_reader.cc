@@ -6,6 +6,7 @@
 
 #include "src/core/file.h"
 #include "src/core/units.h"
+#include "src/log/text.h"
 
 namespace gapscope {
 namespace {
@@ -19,9 +20,16 @@ std::string Join(const std::vector<std::string>& items) {
   return text;
 }
 
+// Whatever a hostile file holds, a message is one readable line.
+std::string OneLine(const std::string& text) {
+  constexpr std::size_t kLongest = 400;
+  const std::string quoted = Quoted(text, kLongest);
+  return quoted.size() == text.size() + 2 ? text : quoted;
+}
+
 std::optional<double> ParseFinite(const std::string& text) {
   double value = 0;
-  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0);
+  const char* begin = text.data() + (text.starts_with('+') && !text.starts_with("+-") ? 1 : 0);
   const auto [end, code] = std::from_chars(begin, text.data() + text.size(), value);
   if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
   return value;
@@ -32,7 +40,7 @@ bool NestsTooDeep(const std::string& bytes) {
   int flow = 0, deepest = 0;
   for (const char c : bytes) {
     if (c == '[' || c == '{') deepest = std::max(deepest, ++flow);
-    if (c == ']' || c == '}') --flow;
+    if ((c == ']' || c == '}') && flow > 0) --flow;
   }
   std::size_t line_start = 0, indent_levels = 0, dashes = 0;
   while (line_start < bytes.size()) {
@@ -57,7 +65,7 @@ std::string YamlPlace(const std::string& file, const YAML::Node& node) {
 Result<YAML::Node> ReadYaml(const std::string& path) {
   GS_ASSIGN(const std::string bytes, ReadFile(path));
   if (bytes.size() > kMaxBytes) {
-    return Error{.what = "too large for a YAML file", .where = path, .actual = std::to_string(bytes.size()) + " bytes",
+    return Error{.what = "too large for a YAML file", .where = path + ":1", .actual = std::to_string(bytes.size()) + " bytes",
                  .allowed = "at most " + std::to_string(kMaxBytes), .cure = "is this a log?"};
   }
   if (bytes.find('\0') != std::string::npos) {
@@ -68,14 +76,17 @@ Result<YAML::Node> ReadYaml(const std::string& path) {
                  .allowed = std::to_string(kMaxNesting) + " levels"};
   }
   try {
-    YAML::Node node = YAML::Load(bytes);
-    if (!node.IsDefined() || node.IsNull()) {
+    const std::vector<YAML::Node> documents = YAML::LoadAll(bytes);
+    if (documents.size() > 1) {
+      return Error{.what = "more than one document in the file", .where = YamlPlace(path, documents[1]), .cure = "delete what follows '---'"};
+    }
+    if (documents.empty() || !documents[0].IsDefined() || documents[0].IsNull()) {
       return Error{.what = "the file is empty", .where = path + ":1"};
     }
-    return node;
+    return documents[0];
   } catch (const YAML::Exception& e) {
-    return Error{.what = "not valid YAML: " + e.msg,
-                 .where = path + ":" + std::to_string(e.mark.line + 1) + ":" + std::to_string(e.mark.column + 1)};
+    const std::string place = e.mark.is_null() ? ":1:1" : ":" + std::to_string(e.mark.line + 1) + ":" + std::to_string(e.mark.column + 1);
+    return Error{.what = "not valid YAML: " + OneLine(e.msg), .where = path + place};
   }
 }
 
@@ -196,9 +207,34 @@ std::vector<double> YamlMap::NumberList(const char* key, std::size_t size) {
   return numbers;
 }
 
+std::vector<YAML::Node> YamlMap::List(const char* key) {
+  const YAML::Node node = Take(key);
+  if (!node.IsDefined()) return {};
+  if (!node.IsSequence()) {
+    Fail(node, {.what = std::string("'") + key + "' is not a list", .allowed = "items that begin with '- '"});
+    return {};
+  }
+  return {node.begin(), node.end()};
+}
+
+std::string YamlMap::Name(const YAML::Node& key) {
+  const std::string name = key.IsScalar() ? key.Scalar() : "";
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
+  const bool good = !name.empty() && is_letter(name[0]) && name != "pi" &&
+                    std::all_of(name.begin(), name.end(), [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '.'; });
+  if (!good) {
+    Fail(key, {.what = "not a name in " + what_, .actual = "'" + name + "'",
+               .allowed = "letters, digits, '_' and '.', a letter first, not 'pi': expressions use it"});
+  }
+  return name;
+}
+
 void YamlMap::Fail(const YAML::Node& at, Error error) {
   if (error_) return;
   if (error.where.empty()) error.where = YamlPlace(file_, at);
+  error.what = OneLine(error.what);
+  error.actual = OneLine(error.actual);
+  error.cure = OneLine(error.cure);
   error_ = std::move(error);
 }
 

@@ -27,9 +27,13 @@ class YamlMap {
   // One of `allowed`; the index is returned.
   std::size_t Choice(const char* key, const std::vector<std::string>& allowed, std::size_t fallback);
   YAML::Node Child(const char* key);                     // undefined node when absent
+  std::vector<YAML::Node> List(const char* key);         // the items; empty when absent, an error when it is no list
+  // A key of this map that expressions use as a name; an error when they cannot.
+  std::string Name(const YAML::Node& key);
   bool Has(const char* key);
 
   void Fail(const YAML::Node& at, Error error);
+  bool failed() const { return error_.has_value(); }
   Status Finish();
   const std::string& file() const { return file_; }
 
@@ -45,7 +49,7 @@ class YamlMap {
 // "file:line:column" of a node.
 std::string YamlPlace(const std::string& file, const YAML::Node& node);
 
-// Parses a file of at most 1 MB. Errors: unreadable, not YAML (with line and column), empty, aliases nested too deep.
+// Parses a file of at most 1 MB. Errors: unreadable, not YAML (with line and column), empty, several documents, nested too deep.
 Result<YAML::Node> ReadYaml(const std::string& path);
 
 }  // namespace gapscope

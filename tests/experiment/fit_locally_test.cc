@@ -1,0 +1,128 @@
+// The initial state of a replay: value and slope of a measured signal by a local quadratic fit.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "src/experiment/recording.h"
+
+namespace gapscope::testing {
+namespace {
+
+constexpr double kHalfWidth_s = 0.02;
+
+template <class F>
+Recording Sampled(int rows, double step_s, F&& f, double resolution = 0) {
+  Recording recording;
+  Recording::Measured measured;
+  measured.spec.resolution = resolution;
+  for (int k = 0; k < rows; ++k) {
+    recording.time_s.push_back(k * step_s);
+    const double y = f(k * step_s);
+    measured.values.push_back(resolution > 0 ? resolution * std::round(y / resolution) : y);
+  }
+  recording.measured.push_back(std::move(measured));
+  return recording;
+}
+
+LocalFit Fit(const Recording& r, std::size_t row) { return FitLocally(r, r.measured[0], row, kHalfWidth_s); }
+
+TEST(FitLocallyTest, AParabolaIsExactEverywhere) {
+  const auto y = [](double t) { return 1 - 2 * t + 3 * t * t; };
+  const Recording r = Sampled(200, 0.002, y);
+  for (const std::size_t row : {std::size_t{0}, std::size_t{1}, std::size_t{5}, std::size_t{100}, std::size_t{199}}) {
+    const double t = r.time_s[row];
+    const LocalFit fit = Fit(r, row);
+    EXPECT_NEAR(fit.value, y(t), 1e-12) << row;
+    EXPECT_NEAR(fit.slope, -2 + 6 * t, 1e-9) << row;
+  }
+}
+
+TEST(FitLocallyTest, IrregularStampsChangeNothing) {
+  Recording r = Sampled(60, 0.002, [](double) { return 0.0; });
+  double t = 0;
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    r.time_s[k] = t;
+    r.measured[0].values[k] = 0.5 + t - 4 * t * t;
+    t += k % 3 == 0 ? 0.0031 : 0.0007;
+  }
+  const LocalFit fit = Fit(r, 20);
+  EXPECT_NEAR(fit.value, 0.5 + r.time_s[20] - 4 * r.time_s[20] * r.time_s[20], 1e-12);
+  EXPECT_NEAR(fit.slope, 1 - 8 * r.time_s[20], 1e-9);
+}
+
+TEST(FitLocallyTest, ALogThatBeginsAtRestStartsAtRest) {
+  // Still for 12 ms, then off with 40 rad/s^2.
+  const Recording r = Sampled(200, 0.002, [](double t) { return 0.3 + (t > 0.012 ? 20 * (t - 0.012) * (t - 0.012) : 0); }, 1e-3);
+  const LocalFit fit = Fit(r, 0);
+  EXPECT_EQ(fit.value, r.measured[0].values[0]);
+  EXPECT_EQ(fit.slope, 0);
+}
+
+TEST(FitLocallyTest, NoiseWithoutMotionGivesMostlyRest) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 1e-3);
+  int moving = 0;
+  constexpr int kTrials = 400;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Recording r = Sampled(60, 0.002, [&](double) { return 0.2 + noise(random); });
+    const LocalFit fit = Fit(r, 30);
+    moving += fit.slope != 0;
+    EXPECT_NEAR(fit.value, 0.2, 5e-3);
+  }
+  // Two standard errors: about one in twenty.
+  EXPECT_LT(moving, kTrials / 10);
+  EXPECT_GT(moving, 0);
+}
+
+TEST(FitLocallyTest, TheSlopeOfANoisyRampIsUnbiased) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0, 1e-3);
+  double sum = 0;
+  constexpr int kTrials = 300;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const Recording r = Sampled(60, 0.002, [&](double t) { return 3 * t + noise(random); });
+    sum += Fit(r, 30).slope;
+  }
+  // 21 samples 2 ms apart: the slope's standard error is sigma / sqrt(sum t^2) = 1e-3 / (2e-3 sqrt(770)).
+  const double standard_error = 1e-3 / (2e-3 * std::sqrt(770.0));
+  EXPECT_NEAR(sum / kTrials, 3, 4 * standard_error / std::sqrt(kTrials));
+}
+
+TEST(FitLocallyTest, AQuantisedRampMoves) {
+  const Recording r = Sampled(60, 0.002, [](double t) { return 2 * t; }, 0.00307);
+  const LocalFit fit = Fit(r, 30);
+  EXPECT_NEAR(fit.slope, 2, 0.15);
+  EXPECT_NEAR(fit.value, 2 * r.time_s[30], 0.00307);
+}
+
+TEST(FitLocallyTest, MissingSamplesAreLeftOut) {
+  Recording r = Sampled(60, 0.002, [](double t) { return 1 + 2 * t; });
+  for (const std::size_t k : {25u, 28u, 30u, 33u}) r.measured[0].values[k] = NAN;
+  const LocalFit fit = Fit(r, 30);
+  EXPECT_NEAR(fit.value, 1 + 2 * r.time_s[30], 1e-12);
+  EXPECT_NEAR(fit.slope, 2, 1e-9);
+  for (double& y : r.measured[0].values) y = NAN;
+  EXPECT_EQ(Fit(r, 30).value, 0);
+  EXPECT_EQ(Fit(r, 0).slope, 0);
+}
+
+TEST(FitLocallyTest, AMissingFirstSampleAtRestIsNotNan) {
+  Recording r = Sampled(60, 0.002, [](double) { return 0.7; });
+  r.measured[0].values[0] = NAN;
+  EXPECT_NEAR(Fit(r, 0).value, 0.7, 1e-9);
+}
+
+TEST(FitLocallyTest, FewRowsAndSlowSampling) {
+  for (const int rows : {2, 3, 4, 7}) {
+    const Recording r = Sampled(rows, 0.5, [](double t) { return 1 + t; });
+    for (std::size_t row = 0; row < r.rows(); ++row) {
+      const LocalFit fit = Fit(r, row);
+      EXPECT_TRUE(std::isfinite(fit.value) && std::isfinite(fit.slope));
+      EXPECT_NEAR(fit.value, 1 + r.time_s[row], 1e-9) << rows << " " << row;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace gapscope::testing

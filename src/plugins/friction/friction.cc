@@ -42,6 +42,7 @@ const std::array<ParameterSpec, Friction::kKeyCount> Friction::kSpecs = {{
 
 std::unique_ptr<Friction> Friction::Create(const mjModel* m, int instance) {
   auto friction = std::make_unique<Friction>();
+  friction->scratch_ = std::make_unique<mjtNum[]>(2 * static_cast<std::size_t>(m->nv));
   const std::string structure = friction->ResolveStructure(m, instance);
   const std::string values = friction->ResolveValues(m, instance);
   if (!structure.empty()) {
@@ -173,9 +174,8 @@ double Friction::ExternalTorque(mjData* d) const {
 
 // The joint's acceleration without constraints: its sign tells which way the joint starts, other joints' pull included.
 double Friction::FreeAcceleration(const mjModel* m, mjData* d) const {
-  mj_markStack(d);
-  mjtNum* force = mj_stackAllocNum(d, m->nv);
-  mjtNum* acceleration = mj_stackAllocNum(d, m->nv);
+  mjtNum* const force = scratch_.get();
+  mjtNum* const acceleration = scratch_.get() + m->nv;
   for (int i = 0; i < m->nv; ++i) force[i] = d->qfrc_passive[i] - d->qfrc_bias[i] + d->qfrc_applied[i];
   for (int i = 0; i < m->nactuator; ++i) {
     const int end = m->actuator_outadr[i] + m->actuator_outnum[i];
@@ -196,9 +196,7 @@ double Friction::FreeAcceleration(const mjModel* m, mjData* d) const {
     }
   }
   mj_solveM(m, d, acceleration, force, 1);
-  const double result = acceleration[dof_];
-  mj_freeStack(d);
-  return result;
+  return acceleration[dof_];
 }
 
 double Friction::Level(const mjModel* m, const DryFriction& law, double speed, double drive, double external,

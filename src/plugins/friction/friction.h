@@ -78,6 +78,8 @@ class Friction {
   bool last_in_turn_ = true;  // its ACTUATOR compute comes after those of the joint's drives
   bool inert_ = false;
   std::vector<int> drives_;      // actuators that may act on the joint
+  // Two vectors of nv: an instance belongs to one mjData, and MuJoCo's stack calls do not link under AddressSanitizer.
+  std::unique_ptr<mjtNum[]> scratch_;
   std::vector<int> own_outputs_;  // force outputs of its own actuator elements
 };
 

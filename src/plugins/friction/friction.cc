@@ -97,8 +97,8 @@ std::string Friction::ResolveValues(const mjModel* m, int instance) {
   return UnknownNumeric(m, instance, keys.data(), kKeyCount);
 }
 
-// Lists the joint's drives and this instance's own actuator elements. MuJoCo runs actuator plugins in the order of their
-// instances, so a motor plugin that comes later has not spoken yet when this one's turn comes.
+// Lists the joint's drives and this instance's own actuator elements. MuJoCo runs actuator plugins in the order of
+// their instances, so a motor plugin that comes later has not spoken yet when this one's turn comes.
 std::string Friction::CheckTurn(const mjModel* m, int instance) {
   for (int i = 0; i < m->nactuator; ++i) {
     const int end = m->actuator_outadr[i] + m->actuator_outnum[i];
@@ -115,8 +115,8 @@ std::string Friction::CheckTurn(const mjModel* m, int instance) {
     last_in_turn_ = false;
     if (own_outputs_.empty()) continue;
     return "plugin instance '" + InstanceName(m, instance) + "': it stands before the actuator plugin instance '" +
-           InstanceName(m, other) + "' that drives its joint, allowed only after it; move its <plugin plugin=\"" + kName +
-           "\"> to the end of <extension>";
+           InstanceName(m, other) + "' that drives its joint, allowed only after it; move its <plugin plugin=\"" +
+           kName + "\"> to the end of <extension>";
   }
   return {};
 }
@@ -222,8 +222,8 @@ void Friction::WriteRow(const mjModel* m, mjData* d, double level, bool soften) 
     if (d->nA > 0) {
       // PGS solves with A + R, projected before this.
       const bool sparse = d->efc_AR_rownnz != nullptr;
-      const int at = sparse ? FindColumn(d->efc_AR_rownnz, d->efc_AR_rowadr, d->efc_AR_colind, row, row)
-                            : row * d->nefc + row;
+      const int at =
+          sparse ? FindColumn(d->efc_AR_rownnz, d->efc_AR_rowadr, d->efc_AR_colind, row, row) : row * d->nefc + row;
       if (at >= 0) d->efc_AR[at] += r - d->efc_R[row];
     }
     d->efc_R[row] = r;

@@ -32,13 +32,27 @@ namespace {
 // there would be seen a whole step late or not, and no difference quotient of a trajectory is smooth across that.
 Rig Everything(const std::string& integrator = "Euler") {
   return {.config = {{"law", "position"}, {"inputs", "target velocity feedforward enable"}, {"max_delay_s", "0.03"}},
-          .live = {{"kp", "60"}, {"kd", "4"}, {"command_delay_s", "0.0041"}, {"torque_delay_s", "0.0027"},
-                   {"time_constant_s", "0.004"}, {"second_time_constant_s", "0.0015"}, {"dead_zone", "0.3"},
-                   {"torque_limit_n_m", "5"}, {"power_w", "11"}, {"generating_power_w", "18"},
-                   {"peak_torque_n_m", "6"}, {"rated_speed_rad_per_s", "1"}, {"no_load_speed_rad_per_s", "7"},
-                   {"generating_factor", "1"}, {"sag_fraction", "0.2"}, {"sag_time_constant_s", "0.05"},
-                   {"droop_at_peak", "0.1"}, {"droop_reference_n_m", "9"}, {"asymmetry", "0.05"},
-                   {"efficiency_drive", "0.85"}, {"efficiency_backdrive", "0.85"}},
+          .live = {{"kp", "60"},
+                   {"kd", "4"},
+                   {"command_delay_s", "0.0041"},
+                   {"torque_delay_s", "0.0027"},
+                   {"time_constant_s", "0.004"},
+                   {"second_time_constant_s", "0.0015"},
+                   {"dead_zone", "0.3"},
+                   {"torque_limit_n_m", "5"},
+                   {"power_w", "11"},
+                   {"generating_power_w", "18"},
+                   {"peak_torque_n_m", "6"},
+                   {"rated_speed_rad_per_s", "1"},
+                   {"no_load_speed_rad_per_s", "7"},
+                   {"generating_factor", "1"},
+                   {"sag_fraction", "0.2"},
+                   {"sag_time_constant_s", "0.05"},
+                   {"droop_at_peak", "0.1"},
+                   {"droop_reference_n_m", "9"},
+                   {"asymmetry", "0.05"},
+                   {"efficiency_drive", "0.85"},
+                   {"efficiency_backdrive", "0.85"}},
           .option = "timestep='0.001' integrator='" + integrator + "'",
           .first = "actdim='3'",
           .actuators = 4,
@@ -107,8 +121,15 @@ TEST(MotorStateTest, TrajectoryHasAGradientInEveryLiveParameter) {
 
 TEST(MotorStateTest, ElectricalParametersHaveGradients) {
   const Rig rig{.config = {{"law", "duty"}},
-                .live = {{"duty_gain", "3"}, {"duty_damping", "0.1"}, {"duty_limit", "0.6"}, {"supply_v", "12"},
-                         {"kt", "1"}, {"ke", "1"}, {"resistance", "4"}, {"gear", "1.1"}, {"dead_zone", "0.05"}},
+                .live = {{"duty_gain", "3"},
+                         {"duty_damping", "0.1"},
+                         {"duty_limit", "0.6"},
+                         {"supply_v", "12"},
+                         {"kt", "1"},
+                         {"ke", "1"},
+                         {"resistance", "4"},
+                         {"gear", "1.1"},
+                         {"dead_zone", "0.05"}},
                 .damping = 0.1};
   const ModelPtr m = rig.Compile();
   const auto run = [&] {
@@ -134,7 +155,8 @@ TEST(MotorStateTest, SmoothInTheDelaysAcrossWholeSteps) {
   for (const std::string key : {"command_delay_s", "torque_delay_s"}) {
     // Smooth stages only, so that the delay's own smoothness shows.
     Rig rig{.config = {{"law", "position"}, {"max_delay_s", "0.03"}},
-            .live = {{"kp", "10"}, {"kd", "1"}, {key, "0"}}, .damping = 0.3};
+            .live = {{"kp", "10"}, {"kd", "1"}, {key, "0"}},
+            .damping = 0.3};
     const ModelPtr m = rig.Compile();
     const DataPtr d(mj_makeData(m.get()));
     const auto end = [&](double delay) {

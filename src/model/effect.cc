@@ -99,7 +99,7 @@ Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& struc
   if (places.empty()) {
     return Error{.what = "the effect '" + name + "' makes no sense in this model", .where = "--with " + text};
   }
-  if (on.empty()) return EffectUse{name, places.front()};
+  if (at == std::string::npos) return EffectUse{name, places.front()};
   if (std::find(places.begin(), places.end(), on) == places.end()) {
     return Error{.what = "the effect '" + name + "' cannot act there", .where = "--with " + text, .actual = "'" + on + "'", .allowed = Join(places)};
   }

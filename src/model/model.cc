@@ -82,6 +82,9 @@ Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, 
     if (!model->compiled_) {
       return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(structure.spec.get())), .where = experiment.model_path};
     }
+    if (!(model->compiled_->opt.timestep > 0)) {
+      return Error{.what = "the MJCF's time step is not positive", .where = experiment.model_path, .actual = std::to_string(model->compiled_->opt.timestep), .cure = "write <option timestep=\"0.002\"/>"};
+    }
     const DataPtr probe(mj_makeData(model->compiled_.get()));  // runs the plugins' own checks
     if (!probe) return Error{.what = "the model cannot be simulated", .where = experiment.model_path};
   } catch (const std::exception& e) {
@@ -260,7 +263,10 @@ bool ParameterWriter::Write(std::span<const double> values, const std::map<std::
     }
     derived = derived || bound.field->derived;
   }
-  for (int body = 1; body < target_->nbody; ++body) good = good && target_->body_mass[body] >= 0;
+  for (int body = 1; body < target_->nbody; ++body) {
+    good = good && target_->body_mass[body] >= 0;
+    for (int i = 0; i < 3; ++i) good = good && target_->body_inertia[3 * body + i] >= 0;
+  }
   if (!good) return false;
   WriteSplits();
   if (derived) mj_setConst(target_, data_);

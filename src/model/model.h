@@ -102,7 +102,7 @@ class ParameterWriter {
   ParameterWriter(const ParameterWriter&) = delete;
   ParameterWriter& operator=(const ParameterWriter&) = delete;
 
-  // Writes all settings. Returns false, having written what it could, when an expression is not finite or an inertia is not positive.
+  // Writes all settings. Returns false, having written what it could, when an expression is not finite or a mass or inertia is negative.
   bool Write(std::span<const double> values, const std::map<std::string, double>& log_values);
 
  private:

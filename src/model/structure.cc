@@ -245,6 +245,7 @@ Status Structure::FinishSplits() {
     std::copy_n(body->quat, 4, side->quat);
     side->alt = body->alt;
     side->mass = kTinyInertia;
+    std::fill_n(side->ipos, 3, 0.0);
     std::fill_n(side->inertia, 3, kTinyInertia);
     side->explicitinertial = 1;
     mjsJoint* turn = mjs_addJoint(side, nullptr);

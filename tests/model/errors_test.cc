@@ -1,0 +1,139 @@
+// What does not build says why, and where in which file.
+#include <gtest/gtest.h>
+
+#include "tests/model/synthetic.h"
+
+namespace gapscope::testing {
+namespace {
+
+constexpr const char* kRobot = R"(<mujoco>
+  <option><flag contact="disable"/></option>
+  <worldbody>
+    <body name="bar"><joint name="hinge" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
+    <body name="ball" pos="1 0 0"><joint name="ball" type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
+  </worldbody>
+  <actuator><motor name="motor" joint="hinge"/></actuator>
+</mujoco>)";
+constexpr const char* kYaml = R"(commands:
+  - {actuator: motor, column: u, unit: N m}
+measured:
+  - {signal: q, column: q, joint: hinge, unit: rad}
+parameters:
+  hinge.damping: {unit: N m s/rad, nominal: 0.1, bounds: [0, 1]}
+set:
+  joint/hinge/damping: hinge.damping
+)";
+
+std::string MessageOf(const std::string& mjcf, const std::string& yaml) {
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, mjcf, yaml);
+  const auto built = Model::Build(experiment);
+  return built.ok() ? "" : built.error().Text();
+}
+
+TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
+  EXPECT_EQ(MessageOf(kRobot, kYaml), "");
+  struct Case {
+    const char* from;
+    const char* to;
+    std::vector<const char*> says;
+  };
+  // The setting's key stands in line 9 (line 1 is "model:"), column 3.
+  const std::vector<Case> cases = {
+      {"{actuator: motor", "{actuator: moter", {"experiment.yaml", "actuator that the MJCF lacks", "did you mean 'motor'?"}},
+      {"joint: hinge,", "joint: hing,", {"experiment.yaml", "joint that the MJCF lacks", "did you mean 'hinge'?"}},
+      {"joint: hinge,", "joint: ball,", {"neither hinge nor slide"}},
+      {"joint: hinge, unit: rad", "actuator: moter, kind: torque", {"actuator that the MJCF lacks", "did you mean 'motor'?"}},
+      {"unit: rad", "unit: rad, offset: hinge.ofset", {"no such parameter", "'hinge.ofset'"}},
+      {"joint/hinge/damping:", "joint/hinge/dampin:", {"experiment.yaml:9:3:", "did you mean 'damping'?"}},
+      {"joint/hinge/damping:", "joint/hnge/damping:", {"experiment.yaml:9:3:", "did you mean 'hinge'?"}},
+      {"joint/hinge/damping:", "hinge damping:", {"experiment.yaml:9:3:", "not a field"}},
+      {"damping: hinge.damping", "damping: hinge.dampng", {"experiment.yaml:9:3:", "did you mean 'hinge.damping'?"}},
+      {"damping: hinge.damping", "damping: 2 * (hinge.damping", {"experiment.yaml:9:3:", "bad expression"}},
+      {"damping: hinge.damping", "damping: nan", {"experiment.yaml:9:3:", "bad expression"}},
+      {"damping: hinge.damping", "damping: [hinge.damping, \"0\"]", {"experiment.yaml:9:3:", "has 1 numbers", "2 expressions"}},
+      {"joint/hinge/damping:", "body/bar/inertia:", {"experiment.yaml:9:3:", "has 3 numbers", "1 expressions"}},
+  };
+  for (const Case& test : cases) {
+    const std::string message = MessageOf(kRobot, Replaced(kYaml, test.from, test.to));
+    ASSERT_NE(message, "") << "accepted: " << test.to;
+    for (const char* part : test.says) EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
+  }
+}
+
+TEST(BuildErrorsTest, TheMjcf) {
+  struct Case {
+    const char* from;
+    const char* to;
+    const char* says;
+  };
+  const std::vector<Case> cases = {
+      {"<mujoco>", "<mujoko>", "cannot read the MJCF"},
+      {"</mujoco>", "", "cannot read the MJCF"},
+      {"mass=\"1\"", "mass=\"-1\"", "mass"},
+      {"joint=\"hinge\"/>", "joint=\"nowhere\"/>", "nowhere"},
+      {"axis=\"0 1 0\"", "axis=\"0 0 0\"", "axis"},
+      {"<option>", "<option timestep=\"0\">", "timestep"},
+      {"<motor name=\"motor\" joint=\"hinge\"/>", "<plugin name=\"motor\" joint=\"hinge\" plugin=\"no.such\"/>", "plugin"},
+      {"<actuator><motor name=\"motor\" joint=\"hinge\"/></actuator>",
+       "<extension><plugin plugin=\"gapscope.motor\"/></extension><actuator><plugin name=\"motor\" joint=\"hinge\" plugin=\"gapscope.motor\"><config key=\"law\" value=\"magic\"/></plugin></actuator>", "law"},
+  };
+  for (const Case& test : cases) {
+    const std::string message = MessageOf(Replaced(kRobot, test.from, test.to), kYaml);
+    EXPECT_NE(message.find("robot.xml"), std::string::npos) << test.to << ": " << message;
+    EXPECT_NE(message.find(test.says), std::string::npos) << test.to << ": " << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+  }
+  EXPECT_NE(MessageOf("", kYaml).find("robot.xml"), std::string::npos);
+  EXPECT_NE(MessageOf(std::string("\x7f\0\x01", 3), kYaml).find("robot.xml"), std::string::npos);
+  const Scratch scratch;
+  Experiment experiment = MakeExperiment(scratch, kRobot, kYaml);
+  experiment.model_path = scratch.Path("none.xml");
+  const auto built = Model::Build(experiment);
+  ASSERT_FALSE(built.ok());
+  EXPECT_NE(built.error().Text().find("none.xml"), std::string::npos);
+}
+
+TEST(BuildErrorsTest, EffectUses) {
+  const Scratch scratch;
+  const auto model = MakeModel(MakeExperiment(scratch, kRobot, kYaml));
+  const auto message = [&](std::vector<std::string> texts) {
+    const auto uses = model->ParseEffects(texts);
+    return uses.ok() ? "" : uses.error().Text();
+  };
+  const auto uses = model->ParseEffects({"coulomb_friction", "torque_limit@motor", "sensor_delay@q"});
+  ASSERT_TRUE(uses.ok()) << uses.error().Text();
+  EXPECT_EQ(uses.value()[0], (EffectUse{"coulomb_friction", "hinge"}));
+  EXPECT_EQ(uses.value()[1].Text(), "torque_limit@motor");
+  EXPECT_NE(message({"coulomb_fricton"}).find("did you mean 'coulomb_friction'?"), std::string::npos);
+  EXPECT_NE(message({"coulomb_friction@hing"}).find("cannot act there"), std::string::npos);
+  EXPECT_NE(message({"coulomb_friction@motor"}).find("allowed: hinge"), std::string::npos) << message({"coulomb_friction@motor"});
+  EXPECT_NE(message({"spring_hardening"}).find("makes no sense"), std::string::npos);
+  EXPECT_NE(message({"torque_delay"}).find("makes no sense"), std::string::npos);  // not a servo
+  EXPECT_NE(message({"backlash", "backlash@hinge"}).find("stands twice"), std::string::npos);
+  for (const char* text : {"", "@", "@hinge", "coulomb_friction@", "coulomb_friction@@hinge", "coulomb_friction hinge", "\xff"}) {
+    EXPECT_NE(message({text}).find("--with"), std::string::npos) << text << ": " << message({text});
+  }
+}
+
+TEST(ParameterWriterTest, RefusesWhatIsNotFiniteOrNotPhysical) {
+  const Scratch scratch;
+  const std::string yaml = std::string(kYaml) + "  body/bar/mass: 1 - hinge.damping\n  body/bar/ipos: [\"1 / (hinge.damping - 0.5)\", \"0\", \"0\"]\n  body/bar/inertia: [\"0.01\", \"0.9 - hinge.damping\", \"0.01\"]\n";
+  const auto model = MakeModel(MakeExperiment(scratch, kRobot, yaml));
+  ASSERT_NE(model, nullptr);
+  const ModelPtr copy(mj_copyModel(nullptr, &model->compiled()));
+  const DataPtr data(mj_makeData(copy.get()));
+  ParameterWriter writer(*model, copy.get(), data.get());
+  EXPECT_TRUE(writer.Write(std::vector<double>{0.25}, {}));
+  EXPECT_EQ(copy->dof_damping[0], 0.25);
+  EXPECT_EQ(copy->body_mass[1], 0.75);
+  EXPECT_FALSE(writer.Write(std::vector<double>{0.5}, {})) << "1 / 0";
+  EXPECT_FALSE(writer.Write(std::vector<double>{NAN}, {}));
+  EXPECT_FALSE(writer.Write(std::vector<double>{INFINITY}, {}));
+  EXPECT_FALSE(writer.Write(std::vector<double>{1.5}, {})) << "a negative mass";
+  EXPECT_FALSE(writer.Write(std::vector<double>{0.95}, {})) << "a negative inertia";
+  EXPECT_TRUE(writer.Write(std::vector<double>{0.1}, {}));
+}
+
+}  // namespace
+}  // namespace gapscope::testing

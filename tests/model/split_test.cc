@@ -1,0 +1,105 @@
+// The inertia that a drive sees, and a joint split in a motor and a load side.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/model/synthetic.h"
+
+namespace gapscope::testing {
+namespace {
+
+// Two arms: the first one tilted inertial frame, off its hinge; a second body rides on it.
+constexpr const char* kRobot = R"(<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.0005" gravity="0 0 0" integrator="RK4"><flag contact="disable"/></option>
+  <worldbody>
+    <body name="arm">
+      <joint name="hinge" axis="0 0 1" pos="0.05 0 0" armature="0.004" damping="0.02"/>
+      <inertial pos="0.35 0.4 0" mass="2" diaginertia="0.03 0.02 0.01" euler="0 1.5707963267948966 0"/>
+      <body name="tip" pos="0.5 0 0"><joint name="slide" type="slide" axis="1 0 0" damping="1" stiffness="40"/><inertial pos="0 0 0" mass="0.3" diaginertia="0.001 0.001 0.001"/></body>
+    </body>
+  </worldbody>
+  <actuator><motor name="motor" joint="hinge"/><motor name="pusher" joint="slide"/></actuator>
+</mujoco>)";
+constexpr const char* kYaml = R"(commands:
+  - {actuator: motor, column: u, unit: N m}
+measured:
+  - {signal: q, column: q, joint: hinge, unit: rad}
+  - {signal: tau, column: tau, kind: torque, actuator: motor, optional: true}
+parameters:
+  arm.mass: {unit: kg, nominal: 2, bounds: [1, 3]}
+set:
+  body/arm/mass: arm.mass
+)";
+
+TEST(DrivenInertiaTest, HandNumbers) {
+  const Scratch scratch;
+  const auto model = MakeModel(MakeExperiment(scratch, kRobot, kYaml));
+  // A quarter turn about y carries the frame's x to -z: about z stands the first diagonal, 0.03. Arm (0.3, 0.4) from the hinge: 2 * 0.25.
+  EXPECT_NEAR(DrivenInertia(model->compiled(), 0), 0.004 + 0.03 + 2 * 0.25, 1e-12);
+  const auto joint = MakeModel(ShippedExperiment("joint"));
+  EXPECT_NEAR(DrivenInertia(joint->compiled(), 0), 0.159221308, 1e-12);
+  // Qube: rotor and hub on the axis, the arm a rod about its end; the pendulum it carries does not count.
+  const auto qube = MakeModel(ShippedExperiment("qube"));
+  EXPECT_NEAR(DrivenInertia(qube->compiled(), 0), 4.6e-6 + 0.095 * 0.085 * 0.085 / 3, 1e-10);
+}
+
+class SplitTest : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(SplitTest, ConservesTheInertiaWhateverTheShareAndTheMass) {
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, kRobot, kYaml);
+  const std::string use = std::string(GetParam()) + "@hinge";
+  const auto model = MakeModel(experiment, {{GetParam(), "hinge"}});
+  ASSERT_NE(model, nullptr);
+  const mjModel& m = model->compiled();
+  const int load = mj_name2id(&m, mjOBJ_JOINT, "hinge"), motor = mj_name2id(&m, mjOBJ_JOINT, "hinge.motor");
+  ASSERT_GE(motor, 0);
+  const ModelPtr copy(mj_copyModel(nullptr, &m));
+  const DataPtr data(mj_makeData(copy.get()));
+  ParameterWriter writer(*model, copy.get(), data.get());
+  for (const double share : {0.15, 0.5, 0.85}) {
+    for (const double mass : {1.0, 2.0, 3.0}) {
+      ASSERT_TRUE(writer.Write(ValuesWith(*model, {{use + ".motor_share", share}, {"arm.mass", mass}}), {}));
+      const double whole = 0.004 + 0.03 + mass * 0.25;
+      // The motor side's body holds 1e-9 itself.
+      EXPECT_NEAR(DrivenInertia(*copy, motor), share * whole, 1e-8);
+      EXPECT_NEAR(DrivenInertia(*copy, load), (1 - share) * whole, 1e-12);
+      // Writing twice moves nothing twice.
+      ASSERT_TRUE(writer.Write(ValuesWith(*model, {{use + ".motor_share", share}, {"arm.mass", mass}}), {}));
+      EXPECT_NEAR(DrivenInertia(*copy, load) + DrivenInertia(*copy, motor), whole, 1e-8);
+    }
+  }
+  // Both sides begin together, where the log says.
+  const Recording recording = MakeRecording(experiment, 50, 0.002, [](int, double) { return 0.0; });
+  Recording moved = recording;
+  for (double& q : moved.measured[0].values) q = 0.4;
+  const InitialState start = InitialStateAt(*model, moved, 0, model->Nominal());
+  EXPECT_EQ(start.qpos[static_cast<std::size_t>(m.jnt_qposadr[load])], 0.4);
+  EXPECT_EQ(start.qpos[static_cast<std::size_t>(m.jnt_qposadr[motor])], 0.4);
+}
+
+TEST_P(SplitTest, KeepsTheMomentumOfAPush) {
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, Replaced(Replaced(kRobot, "damping=\"0.02\"", ""), "<body name=\"tip\"", "<body name=\"tip\" childclass=\"main\""), kYaml);
+  const auto model = MakeModel(experiment, {{GetParam(), "hinge"}}, {{"hinge", {.torque_n_m = 1, .angle_rad = 0.05, .speed_rad_per_s = 1, .inertia_kg_m2 = 0.534}}});
+  ASSERT_NE(model, nullptr);
+  const mjModel& m = model->compiled();
+  const Recording recording = MakeRecording(experiment, 251, 0.002, [](int, double t) { return t < 0.1 ? 1.0 : 0.0; });
+  Simulator simulator(*model, 0);
+  ASSERT_TRUE(simulator.SetParameters(model->Nominal(), recording));
+  std::vector<double> predicted(recording.rows() * recording.measured.size());
+  ASSERT_EQ(simulator.Run(recording, {0, recording.rows()}, AtRest(*model), predicted).outcome, Outcome::kCompleted);
+  // Angular momentum about the hinge: the push's impulse, 1 N m for 0.1 s (the massed slide moves along with the arm).
+  mjtNum momentum = 0;
+  const mjData& d = simulator.data();
+  std::vector<mjtNum> product(static_cast<std::size_t>(m.nv));
+  mj_mulM(&simulator.mujoco_model(), &d, product.data(), d.qvel);
+  momentum = product[static_cast<std::size_t>(m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, "hinge")])] + product[static_cast<std::size_t>(m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, "hinge.motor")])];
+  EXPECT_NEAR(momentum, 0.1, 0.002);
+}
+
+INSTANTIATE_TEST_SUITE_P(Effects, SplitTest, ::testing::Values("backlash", "joint_compliance"), [](const auto& test) { return std::string(test.param); });
+
+}  // namespace
+}  // namespace gapscope::testing

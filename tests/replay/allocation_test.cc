@@ -1,0 +1,57 @@
+// After the first run, a run allocates nothing: neither through operator new nor through malloc, ours or MuJoCo's.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "tests/model/synthetic.h"
+
+namespace {
+std::atomic<long> g_news = 0;
+}  // namespace
+
+void* operator new(std::size_t size) {
+  ++g_news;
+  if (void* p = std::malloc(size)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+
+namespace gapscope::testing {
+namespace {
+
+TEST(AllocationTest, RunAllocatesNothing) {
+  for (const char* rig : {"joint", "qube", "xl330"}) {
+    const Experiment experiment = ShippedExperiment(rig);
+    const auto base = MakeModel(experiment);
+    std::vector<std::string> texts = {"command_delay", "coulomb_friction", "stribeck_friction", "actuator_lag", "sensor_delay"};
+    if (std::string(rig) == "xl330") texts = {"load_friction", "torque_delay", "sensor_delay"};
+    const auto uses = base->ParseEffects(texts);
+    ASSERT_TRUE(uses.ok()) << uses.error().Text();
+    const auto model = MakeModel(experiment, uses.value());
+    const Recording recording = MakeRecording(experiment, 200, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.3) : 1.0; }, ShippedLogValues(rig));
+    std::vector<double> values = model->Nominal();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (model->parameters()[i].name.find("delay_s") != std::string::npos) values[i] = 0.0031;
+    }
+    Simulator simulator(*model, 0);
+    std::vector<double> predicted(recording.rows() * recording.measured.size());
+    const InitialState start = AtRest(*model);
+    ASSERT_TRUE(simulator.SetParameters(values, recording));
+    (void)simulator.Run(recording, {0, recording.rows()}, start, predicted);
+    const long before = g_news;
+    const std::size_t in_use = mallinfo2().uordblks;
+    for (int i = 0; i < 5; ++i) (void)simulator.Run(recording, {static_cast<std::size_t>(10 * i), recording.rows()}, start, predicted);
+    EXPECT_EQ(g_news - before, 0) << rig;
+    EXPECT_EQ(mallinfo2().uordblks, in_use) << rig;
+  }
+  const long before = g_news;
+  delete new double(1);
+  EXPECT_GT(g_news, before) << "the counter counts";
+}
+
+}  // namespace
+}  // namespace gapscope::testing

@@ -1,0 +1,195 @@
+// Logs through a model: windows, workers, time step, a log against itself.
+#include "replay/replay.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include "tests/model/synthetic.h"
+
+namespace gapscope::testing {
+namespace {
+
+Recording Log(const Model& model, double amplitude, int rows = 600, double step_s = 0.002) {
+  return MakeRecording(model.experiment(), rows, step_s, [=](int c, double t) { return c == 0 ? Exciting(t, amplitude) : 0; });
+}
+
+// The log that the model itself would have made.
+Recording OwnLog(const Model& model, double amplitude, double step_s, int rows = 600) {
+  Recording recording = Log(model, amplitude, rows);
+  const auto predicted = Predict(model, recording, {}, nullptr, step_s);
+  for (std::size_t s = 0; s < predicted.size(); ++s) recording.measured[s].values = predicted[s];
+  return recording;
+}
+
+bool SameBytes(const std::vector<double>& a, const std::vector<double>& b) { return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0; }
+
+TEST(MakeWindowsTest, CoverEveryRowOnce) {
+  Recording r;
+  for (int k = 0; k < 1001; ++k) r.time_s.push_back(k * 0.01);
+  const auto free = MakeWindows(r, ReplayMode::kFreeRun, 1);
+  ASSERT_EQ(free.size(), 1u);
+  EXPECT_EQ(free[0].rows(), 1001u);
+  const auto windows = MakeWindows(r, ReplayMode::kWindows, 1);
+  ASSERT_EQ(windows.size(), 10u);
+  for (std::size_t i = 0; i < 10; ++i) {
+    EXPECT_EQ(windows[i].begin, 100 * i);
+    EXPECT_EQ(windows[i].end, 100 * i + 101);  // the next one starts on this one's last row
+  }
+  // 10 s in windows of 3 s: the rest of 1 s is too short and joins the last one.
+  const auto three = MakeWindows(r, ReplayMode::kWindows, 3);
+  ASSERT_EQ(three.size(), 3u);
+  EXPECT_EQ(three.back().begin, 600u);
+  EXPECT_EQ(three.back().end, 1001u);
+  // Longer than the log, and shorter than a sample.
+  EXPECT_EQ(MakeWindows(r, ReplayMode::kWindows, 100).size(), 1u);
+  EXPECT_EQ(MakeWindows(r, ReplayMode::kWindows, 1e-6).size(), 1000u);
+  // A gap longer than a window.
+  Recording gap;
+  gap.time_s = {0, 0.1, 0.2, 5, 5.1, 5.2};
+  std::size_t covered = 0;
+  for (const Window& w : MakeWindows(gap, ReplayMode::kWindows, 0.2)) {
+    EXPECT_GE(w.rows(), 2u);
+    EXPECT_EQ(w.begin, covered);
+    covered = w.end - 1;
+  }
+  EXPECT_EQ(covered, 5u);
+}
+
+class OwnLogTest : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(OwnLogTest, ReplaysWithoutError) {
+  const auto model = MakeModel(ShippedExperiment(GetParam()));
+  const double step_s = model->compiled().opt.timestep;
+  const Recording log = OwnLog(*model, 0.5, step_s);
+  ThreadPool pool(1);
+  const ReplayResult replay = Replay(*model, {log}, {.time_step_s = step_s}, pool);
+  EXPECT_EQ(replay.logs[0].outcome, Outcome::kCompleted);
+  // From rest at the initial pose the log's own first row is the initial state, to the bit.
+  EXPECT_EQ(ReplayError(replay.logs), 0);
+  for (const SignalTrace& signal : replay.logs[0].signals) EXPECT_TRUE(SameBytes(signal.measured, signal.predicted)) << signal.signal;
+  EXPECT_EQ(replay.steps, static_cast<std::size_t>(std::lround(599 * 0.002 / step_s)));
+  EXPECT_NEAR(replay.simulated_s, 599 * 0.002, 1e-12);
+  // Windows start from a local fit of the log: small errors, no more.
+  const ReplayResult windows = Replay(*model, {log}, {.mode = ReplayMode::kWindows, .window_s = 0.2, .time_step_s = step_s}, pool);
+  EXPECT_EQ(windows.logs[0].windows, 6u);
+  EXPECT_LT(ReplayError(windows.logs), 0.05);
+  EXPECT_TRUE(std::isnan(windows.logs[0].signals[0].predicted[0])) << "a window's first row says nothing about the model";
+}
+
+INSTANTIATE_TEST_SUITE_P(Rigs, OwnLogTest, ::testing::Values("joint", "qube", "flexjoint", "flexlink"), [](const auto& test) { return std::string(test.param); });
+
+TEST(ReplayTest, SameBytesForAnyNumberOfWorkers) {
+  const auto model = MakeModel(ShippedExperiment("qube"));
+  std::vector<Recording> logs;
+  for (const double amplitude : {0.3, 0.6, 1.1}) {
+    logs.push_back(Log(*model, amplitude, 300 + static_cast<int>(100 * amplitude)));
+    for (std::size_t k = 0; k < logs.back().rows(); ++k) {
+      logs.back().measured[0].values[k] = 0.1 * std::sin(0.02 * static_cast<double>(k));
+      logs.back().measured[1].values[k] = 0.2 * std::cos(0.05 * static_cast<double>(k));
+    }
+  }
+  for (const ReplayMode mode : {ReplayMode::kFreeRun, ReplayMode::kWindows}) {
+    std::vector<ReplayResult> results;
+    for (const int jobs : {1, 2, 7}) {
+      ThreadPool pool(jobs);
+      results.push_back(Replay(*model, logs, {.mode = mode, .window_s = 0.05}, pool));
+    }
+    for (std::size_t i = 1; i < results.size(); ++i) {
+      EXPECT_EQ(results[i].time_step_s, results[0].time_step_s);
+      EXPECT_EQ(results[i].time_step_error, results[0].time_step_error);
+      EXPECT_EQ(results[i].steps, results[0].steps);
+      for (std::size_t l = 0; l < logs.size(); ++l) {
+        for (std::size_t s = 0; s < 2; ++s) EXPECT_TRUE(SameBytes(results[i].logs[l].signals[s].predicted, results[0].logs[l].signals[s].predicted));
+      }
+    }
+  }
+}
+
+TEST(ReplayTest, ADivergedLogDoesNotSpoilTheOthers) {
+  const auto model = MakeModel(ShippedExperiment("qube"));
+  Recording good = OwnLog(*model, 0.5, 0), bad = good;
+  for (double& u : bad.commands[0].values) u = 1e12;
+  ThreadPool pool(2);
+  const ReplayResult replay = Replay(*model, {bad, good}, {.time_step_s = model->compiled().opt.timestep}, pool);
+  EXPECT_EQ(replay.logs[0].outcome, Outcome::kDiverged);
+  EXPECT_EQ(replay.logs[0].diverged_windows, 1u);
+  EXPECT_EQ(replay.logs[1].outcome, Outcome::kCompleted);
+  EXPECT_EQ(ReplayError({replay.logs[1]}), 0);
+  EXPECT_TRUE(std::isinf(ReplayError(replay.logs)));
+}
+
+TEST(ReplayTest, ParametersThatMakeNoModelAreADivergence) {
+  const auto model = MakeModel(ShippedExperiment("qube"));
+  const Recording log = OwnLog(*model, 0.5, 0);
+  std::vector<double> values = model->Nominal();
+  values[static_cast<std::size_t>(model->IndexOf("motor.resistance"))] = 0;
+  ThreadPool pool(1);
+  const ReplayResult replay = Replay(*model, {log}, {.time_step_s = 0.002, .values = values}, pool);
+  EXPECT_EQ(replay.logs[0].outcome, Outcome::kDiverged);
+  EXPECT_TRUE(std::isnan(replay.logs[0].signals[0].predicted[10]));
+}
+
+TEST(ReplayErrorTest, HandNumbers) {
+  LogReplay log;
+  log.signals.push_back({.signal = "a", .measured = {0, 2, 0, 2}, .predicted = {1, 3, 1, 3}});             // RMSE 1, deviation 1
+  log.signals.push_back({.signal = "b", .measured = {0, 4, 0, 4}, .predicted = {0, 4, 0, 4}});             // 0
+  log.signals.push_back({.signal = "c", .scored = false, .measured = {0, 1, 0, 1}, .predicted = {9, 9, 9, 9}});
+  EXPECT_DOUBLE_EQ(ReplayError({log}), std::sqrt(0.5));
+  log.signals[1].predicted = {NAN, 6, 2, NAN};  // two rows of error 2, deviation 2
+  EXPECT_DOUBLE_EQ(ReplayError({log}), 1);
+  LogReplay exact = log;
+  for (auto& signal : exact.signals) signal.predicted = signal.measured;
+  EXPECT_DOUBLE_EQ(ReplayError({log, exact}), std::sqrt(0.5));
+  EXPECT_TRUE(std::isnan(ReplayError({})));
+  log.outcome = Outcome::kDiverged;
+  EXPECT_TRUE(std::isinf(ReplayError({log})));
+}
+
+TEST(ChooseTimeStepTest, HalvesOnlyWhileItMatters) {
+  // Euler on a spring gains energy: first order in the step.
+  const Scratch scratch;
+  const auto rig = [&](const char* integrator) {
+    return MakeExperiment(scratch,
+                          std::string("<mujoco><option timestep=\"0.01\" gravity=\"0 0 0\" integrator=\"") + integrator +
+                              "\"><flag contact=\"disable\"/></option><worldbody><body><joint name=\"hinge\" axis=\"0 0 1\" stiffness=\"2\"/><inertial pos=\"0 0 0\" mass=\"1\" "
+                              "diaginertia=\"0.02 0.02 0.02\"/></body></worldbody><actuator><motor name=\"motor\" joint=\"hinge\"/></actuator></mujoco>",
+                          "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, unit: rad}\n");
+  };
+  ThreadPool pool(1);
+  const auto choose = [&](const char* integrator) {
+    const auto model = MakeModel(rig(integrator));
+    Recording log = OwnLog(*model, 0.3, 1e-4, 300);
+    for (double& q : log.measured[0].values) q *= 1.1;  // some true error
+    log.measured[0].values[0] = 0;
+    return ChooseTimeStep(*model, {log}, {}, pool);
+  };
+  const TimeStep euler = choose("Euler"), rk4 = choose("RK4");
+  EXPECT_LT(euler.step_s, 0.01);
+  EXPECT_GE(euler.step_s, 0.01 / 32);
+  // The log's own stamps are 2 ms apart: a longer step cannot be.
+  EXPECT_GE(rk4.step_s, euler.step_s);
+  const auto model = MakeModel(rig("RK4"));
+  const Recording log = OwnLog(*model, 0.3, 1e-4, 300);
+  const double error = ReplayError(Replay(*model, {log}, {.time_step_s = rk4.step_s}, pool).logs);
+  EXPECT_LT(error, 1e-3);
+}
+
+TEST(EstimateScalesTest, TheRigsOwnSize) {
+  const auto model = MakeModel(ShippedExperiment("joint"));
+  const Recording log = OwnLog(*model, 0.5, 0);
+  const ScaleTable table = EstimateScales(*model, {log});
+  ASSERT_TRUE(table.contains("joint") && table.contains("motor"));
+  const Scales& s = table.at("joint");
+  EXPECT_NEAR(s.inertia_kg_m2, 0.159221308, 1e-9);
+  EXPECT_NEAR(s.angle_rad, Largest(log.measured[0].values), 0.05);
+  EXPECT_NEAR(s.speed_rad_per_s, Largest(log.measured[1].values), 0.2 * Largest(log.measured[1].values));
+  EXPECT_NEAR(s.torque_n_m, Largest(log.measured[2].values), 0.5 * Largest(log.measured[2].values));
+  EXPECT_NEAR(s.sample_s, 0.002, 1e-12);
+  EXPECT_NEAR(table.at("motor").command, Largest(log.commands[0].values), 1e-12);
+}
+
+}  // namespace
+}  // namespace gapscope::testing

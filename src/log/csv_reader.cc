@@ -83,12 +83,7 @@ class BodyReader {
       const std::size_t columns = columns_.size();
       bool skip_line = false;
       while (true) {
-        if (c == columns) {
-          if (!IsExtraFieldEmpty(p)) return WrongCount(line_start);
-          trailing_.Add(row_, line_);
-          p = LineEnd(p);
-          break;
-        }
+        if (c == columns) return WrongCount(line_start);
         double value = 0;
         auto [q, failure] = std::from_chars(p, end_, value);
         const char* stop = q;
@@ -157,7 +152,6 @@ class BodyReader {
   }
   std::string_view LineText(const char* start) const { return {start, static_cast<std::size_t>(LineEnd(start) - start)}; }
   bool IsHeaderAgain(const char* start) const { return LineText(start) == dialect_.header_text; }
-  bool IsExtraFieldEmpty(const char* p) const { return p == end_ || IsEnd(*p); }
 
   std::string Here(std::size_t column) const { return fmt::format("{}:{}, column {}", path_, line_, dialect_.names[column]); }
 

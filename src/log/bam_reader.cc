@@ -162,7 +162,7 @@ class Handler : public nlohmann::json_sax<Json> {
     std::string_view text = failure.what();
     if (const auto at = text.find(": "); at != std::string_view::npos && text.find("parse error at") < at) text.remove_prefix(at + 2);
     if (const auto at = text.find("] "); text.starts_with('[') && at != std::string_view::npos) text.remove_prefix(at + 2);
-    const bool ended = text.find("unexpected end of input") != std::string_view::npos;
+    const bool ended = position > bytes_.size() || text.find("unexpected end of input") != std::string_view::npos;
     const bool range = text.find("number overflow") != std::string_view::npos;
     error = Error{.what = range ? "a number too large" : "not valid JSON", .where = At(path_, Original(position > 0 ? position - 1 : 0)),
                   .actual = Quoted(text, 160), .allowed = range ? "at most 1.8e308 in size" : "",

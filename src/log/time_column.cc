@@ -25,9 +25,10 @@ constexpr std::array kUnitWords = {
     UnitWord{"ns", "ns"},     UnitWord{"nsec", "ns"},   UnitWord{"nanos", "ns"},  UnitWord{"nanoseconds", "ns"},
     UnitWord{"min", "min"},   UnitWord{"minutes", "min"},
 };
-constexpr std::array<std::string_view, 14> kTimeWords = {"t",       "time",         "timestamp",   "timestamps",   "time_stamp",
+constexpr std::array<std::string_view, 18> kTimeWords = {"t",       "time",         "timestamp",   "timestamps",   "time_stamp",
                                                          "stamp",   "elapsed",      "elapsed_time", "elapsedtime", "sim_time",
-                                                         "simtime", "header.stamp", "clock",       "log_time"};
+                                                         "simtime", "header.stamp", "clock",       "log_time",
+                                                         "zeit",    "temps",        "tiempo",      "tempo"};
 
 std::optional<double> SecondsPer(std::string_view unit) {
   if (unit == "s") return 1;
@@ -159,7 +160,8 @@ Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted) 
   }
   if (std::none_of(found->values.begin(), found->values.end(), [](double t) { return std::isfinite(t); })) {
     return Error{.what = "the time column '" + found->name + "' holds no number at all", .where = log.Where(0),
-                 .actual = fmt::format("{} rows without a stamp", found->values.size()), .allowed = "a stamp in every row", .cure = ""};
+                 .actual = fmt::format("{} rows without a stamp", found->values.size()), .allowed = "a stamp in every row",
+                 .cure = "name another time column in the experiment file: log: {time: {column: NAME, unit: s}}"};
   }
   return found;
 }

@@ -100,18 +100,20 @@ void UnwrapCounter(double median, const std::string& column, Stamps* stamps, std
   }
 }
 
-// Where the clock starts again: back to (about) the start of the stretch, and for several rows.
+// Where the clock starts again: back to (about) the start of the stretch, below several rows before and for several rows
+// to come. (A single stamp far ahead or far back is neither.)
 std::vector<std::size_t> FindResets(const Stamps& stamps) {
   std::vector<std::size_t> resets;
-  double first = stamps.front().raw;
-  for (std::size_t k = 1; k < stamps.size(); ++k) {
-    const double before = stamps[k - 1].raw;
-    if (stamps[k].raw >= before || stamps[k].raw - first > 0.1 * (before - first) || k + kResetRows > stamps.size()) continue;
+  std::size_t begin = 0;
+  for (std::size_t k = kResetRows; k + kResetRows <= stamps.size(); ++k) {
+    const double before = stamps[k - 1].raw, first = stamps[begin].raw;
+    if (stamps[k].raw >= before || stamps[k].raw - first > 0.1 * (before - first)) continue;
+    if (k < begin + kResetRows || stamps[k].raw > stamps[k - kResetRows].raw) continue;
     bool stays = true;
     for (std::size_t j = k; j < k + kResetRows; ++j) stays &= stamps[j].raw < before && (j == k || stamps[j].raw >= stamps[j - 1].raw);
     if (!stays) continue;
     resets.push_back(k);
-    first = stamps[k].raw;
+    begin = k;
   }
   return resets;
 }

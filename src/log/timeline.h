@@ -18,13 +18,13 @@ enum class MissingRepair { kError, kDropRows, kHold };   // NaN in a column that
 enum class WrapRepair { kKeep, kUnwrap };                // an encoder angle that jumps by a whole turn
 
 struct TimelineOptions {
-  std::string time_column;      // empty: the first column named like a time ("time_s", "t", "timestamp", "__time", ...)
-  std::string time_unit;        // "s", "ms", "us", "ns"; empty: from the name, then from the size of the steps
+  std::string time_column = {};  // empty: the first column named like a time ("time_s", "t", "timestamp", "__time", ...)
+  std::string time_unit = {};    // "s", "ms", "us", "ns"; empty: from the name, then from the size of the steps
   TimeRepair repeated = TimeRepair::kDropRows;
   TimeRepair reversed = TimeRepair::kDropRows;
   // For rows without a stamp kHold means kDropRows: a time cannot be held.
   MissingRepair missing = MissingRepair::kHold;
-  std::vector<std::string> required;  // with missing = kDropRows: rows with NaN in any of these columns are dropped
+  std::vector<std::string> required = {};  // with missing = kDropRows: rows with NaN in any of these columns are dropped
   double gap_factor = 5;        // a step longer than this many median steps is reported as a gap
 };
 

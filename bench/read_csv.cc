@@ -1,6 +1,8 @@
 // How fast a CSV log is read, against the least that any reader must do: one pass of std::from_chars over the same
 // bytes. Both on one core, in the same run, the file in the page cache; rates in 10^6 bytes per second.
 //   bench_read_csv [--megabytes N] [--repeats N] [--json FILE]
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <chrono>
@@ -13,8 +15,6 @@
 #include <random>
 #include <string>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "src/core/file.h"
 #include "src/log/csv_reader.h"
@@ -30,8 +30,9 @@ std::string MakeCsv(std::size_t bytes) {
   csv.reserve(bytes + 200);
   for (std::size_t k = 0; csv.size() < bytes; ++k) {
     const double t = 0.004 * static_cast<double>(k), u = std::clamp(2 * noise(random), -5.0, 5.0);
-    fmt::format_to(std::back_inserter(csv), "{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", t, u, u, 0.00306796158 * std::round(100 * noise(random)),
-                   0.00306796158 * std::round(300 * noise(random)), noise(random), 3 * noise(random));
+    fmt::format_to(std::back_inserter(csv), "{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", t, u, u,
+                   0.00306796158 * std::round(100 * noise(random)), 0.00306796158 * std::round(300 * noise(random)),
+                   noise(random), 3 * noise(random));
   }
   return csv;
 }
@@ -72,7 +73,8 @@ int main(int argc, char** argv) {
     if (flag == "--json") json = argv[k + 1];
   }
   const std::string csv = MakeCsv(megabytes * 1'000'000);
-  const std::string path = (std::filesystem::temp_directory_path() / fmt::format("gapscope_bench_{}.csv", std::random_device{}())).string();
+  const std::string path =
+      (std::filesystem::temp_directory_path() / fmt::format("gapscope_bench_{}.csv", std::random_device{}())).string();
   if (!gapscope::WriteFile(path, csv).ok()) return 2;
 
   volatile double sink = 0;
@@ -90,8 +92,10 @@ int main(int argc, char** argv) {
   if (json.empty()) return 0;
   const std::string text = fmt::format(
       "{{\"schema\": \"gapscope.bench/1\", \"rows\": [\n"
-      "  {{\"name\": \"read_csv.mb_per_s\", \"value\": {0:.1f}, \"low\": {0:.1f}, \"high\": {0:.1f}, \"target\": 150, \"better\": \"higher\"}},\n"
-      "  {{\"name\": \"read_csv_vs_from_chars\", \"value\": {1:.3f}, \"low\": {1:.3f}, \"high\": {1:.3f}, \"target\": 0.5, \"better\": \"higher\"}}]}}\n",
+      "  {{\"name\": \"read_csv.mb_per_s\", \"value\": {0:.1f}, \"low\": {0:.1f}, \"high\": {0:.1f}, \"target\": 150, "
+      "\"better\": \"higher\"}},\n"
+      "  {{\"name\": \"read_csv_vs_from_chars\", \"value\": {1:.3f}, \"low\": {1:.3f}, \"high\": {1:.3f}, \"target\": "
+      "0.5, \"better\": \"higher\"}}]}}\n",
       size / whole_s, plain_s / whole_s);
   return gapscope::WriteFile(json, text).ok() ? 0 : 2;
 }

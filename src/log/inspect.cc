@@ -44,7 +44,8 @@ bool IsConstant(const ChannelReport& report) { return !(report.maximum > report.
 bool IsPositionUnit(const std::string& unit) { return unit == "rad" || unit == "m"; }
 bool IsSpeedUnit(const std::string& unit) { return unit == "rad/s" || unit == "m/s"; }
 
-UniformSignal ResampleUniform(const std::vector<double>& time_s, const std::vector<double>& values, double step_s, bool hold, std::size_t most) {
+UniformSignal ResampleUniform(const std::vector<double>& time_s, const std::vector<double>& values, double step_s,
+                              bool hold, std::size_t most) {
   std::vector<double> t, x;
   for (std::size_t k = 0; k < values.size(); ++k) {
     if (!std::isfinite(values[k])) continue;
@@ -73,8 +74,8 @@ UniformSignal ResampleUniform(const std::vector<double>& time_s, const std::vect
   return signal;
 }
 
-InspectReport Inspect(const Timeline& timeline, const std::vector<InspectChannel>& channels, const std::vector<Finding>& findings,
-                      std::size_t rows_in_log, const InspectOptions& options) {
+InspectReport Inspect(const Timeline& timeline, const std::vector<InspectChannel>& channels,
+                      const std::vector<Finding>& findings, std::size_t rows_in_log, const InspectOptions& options) {
   GS_CHECK(timeline.time_s.size() >= 2);
   InspectReport report;
   report.rows = timeline.time_s.size();

@@ -26,14 +26,14 @@ struct ChannelReport {
   std::string name, unit;
   ChannelRole role = ChannelRole::kMeasured;
   double minimum = 0, maximum = 0, mean = 0, deviation = 0;  // NaN: no value at all
-  double quantisation_step = 0;  // 0: none found
-  double noise = 0;              // standard deviation of white noise, estimated
-  double saturation_share = 0;   // of rows
-  double missing_share = 0;      // of rows
+  double quantisation_step = 0;                              // 0: none found
+  double noise = 0;                                          // standard deviation of white noise, estimated
+  double saturation_share = 0;                               // of rows
+  double missing_share = 0;                                  // of rows
 };
 
-// By how much a measured channel follows a command: the shift of the largest |cross-correlation|, refined by a parabola.
-// Of a position this is the lag of the motion, of which the dead time is a part only.
+// By how much a measured channel follows a command: the shift of the largest |cross-correlation|, refined by a
+// parabola. Of a position this is the lag of the motion, of which the dead time is a part only.
 struct DelayReport {
   std::string command, measured;
   double delay_s = 0;      // positive: the measured channel is later
@@ -53,20 +53,20 @@ struct CommandExcitation {
   double bandwidth_95_hz = 0;    // 95 % of the power lies below
   double peak_hz = 0;
   double range = 0;
-  double amplitude_ratio = 0;    // 90th to 10th percentile of the half-cycles' peaks; 1: one amplitude
+  double amplitude_ratio = 0;  // 90th to 10th percentile of the half-cycles' peaks; 1: one amplitude
   std::size_t half_cycles = 0;
 };
 
 // Where a measured position or speed goes, for channels in rad, m, rad/s or m/s.
 struct MotionCoverage {
   std::string name;
-  double range = 0;               // largest minus smallest value
-  double speed_max = 0;           // units per second; 99.9th percentile
-  std::size_t reversals = 0;      // changes of direction
-  double moving_share = 0;        // of time, above the speed that noise and counts feign
-  double rest_share = 0;          // 1 - moving_share
-  double slow_share = 0;          // of time, moving below 10 % of speed_max
-  double positive_share = 0;      // of the moving time
+  double range = 0;           // largest minus smallest value
+  double speed_max = 0;       // units per second; 99.9th percentile
+  std::size_t reversals = 0;  // changes of direction
+  double moving_share = 0;    // of time, above the speed that noise and counts feign
+  double rest_share = 0;      // 1 - moving_share
+  double slow_share = 0;      // of time, moving below 10 % of speed_max
+  double positive_share = 0;  // of the moving time
 };
 
 struct InspectReport {
@@ -88,12 +88,13 @@ struct InspectReport {
 struct InspectOptions {
   double longest_delay_s = 0.5;  // range of the search; never more than a quarter of the log
   std::size_t fewest_rows = 50;
-  double most_missing = 0.1;     // share of rows of a channel without a value, or of the log's rows lost to repairs
+  double most_missing = 0.1;  // share of rows of a channel without a value, or of the log's rows lost to repairs
 };
 
 // `findings`: all that was found before (reading, timeline, extraction). Every channel must have the timeline's length.
-InspectReport Inspect(const Timeline& timeline, const std::vector<InspectChannel>& channels, const std::vector<Finding>& findings,
-                      std::size_t rows_in_log, const InspectOptions& options = {});
+InspectReport Inspect(const Timeline& timeline, const std::vector<InspectChannel>& channels,
+                      const std::vector<Finding>& findings, std::size_t rows_in_log,
+                      const InspectOptions& options = {});
 
 }  // namespace gapscope
 

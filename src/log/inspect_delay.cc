@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-
 #include <unsupported/Eigen/FFT>
 
 #include "src/log/inspect_parts.h"
@@ -38,7 +37,8 @@ BestShift FindDelay(const UniformSignal& x, const UniformSignal& y, double longe
   BestShift best;
   const std::size_t count = std::min(x.values.size(), y.values.size());
   if (count < 4) return best;
-  const auto longest = static_cast<std::ptrdiff_t>(std::min(longest_s / x.step_s, static_cast<double>((count - 1) / 3)));
+  const auto longest =
+      static_cast<std::ptrdiff_t>(std::min(longest_s / x.step_s, static_cast<double>((count - 1) / 3)));
   const auto margin = static_cast<std::size_t>(longest);
   std::size_t size = 1;
   while (size < count + margin + 1) size *= 2;
@@ -62,7 +62,8 @@ BestShift FindDelay(const UniformSignal& x, const UniformSignal& y, double longe
   const auto at = [&](std::ptrdiff_t shift) {
     const auto first = static_cast<std::size_t>(longest + shift);
     const double scale = energy_x * (energy_y[first + count - 2 * margin] - energy_y[first]);
-    const auto place = static_cast<std::size_t>((shift + static_cast<std::ptrdiff_t>(size)) % static_cast<std::ptrdiff_t>(size));
+    const auto place =
+        static_cast<std::size_t>((shift + static_cast<std::ptrdiff_t>(size)) % static_cast<std::ptrdiff_t>(size));
     // Where y rests its correlation is rounding.
     return scale > 1e-12 * energy_x * energy_y.back() ? r[place] / std::sqrt(scale) : 0.0;
   };

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
-
 #include <unsupported/Eigen/FFT>
 
 #include "src/log/inspect_parts.h"
@@ -34,7 +33,8 @@ Spectrum PowerSpectrum(const UniformSignal& signal) {
   std::vector<double> windowed(size, 0);
   for (std::size_t k = 0; k < count && largest > 0; ++k) {
     // Hann's window keeps strong lines from leaking over the bands.
-    const double window = 0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(count));
+    const double window =
+        0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(count));
     windowed[k] = window * (signal.values[k] - mean) / largest;
   }
   Eigen::FFT<double> fft;
@@ -109,7 +109,8 @@ CommandExcitation MeasureExcitation(const InspectChannel& command, const std::ve
   return result;
 }
 
-MotionCoverage MeasureCoverage(const InspectChannel& channel, const ChannelReport& report, const std::vector<double>& time_s, double step_s) {
+MotionCoverage MeasureCoverage(const InspectChannel& channel, const ChannelReport& report,
+                               const std::vector<double>& time_s, double step_s) {
   MotionCoverage coverage{.name = channel.name};
   coverage.range = report.maximum - report.minimum;
   const UniformSignal signal = ResampleUniform(time_s, channel.values, step_s, false);

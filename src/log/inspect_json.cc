@@ -15,7 +15,11 @@ std::string Clean(const std::string& text) {
 }
 
 Json ToJson(const Finding& finding) {
-  return {{"kind", finding.kind}, {"column", Clean(finding.column)}, {"count", finding.count}, {"first_row", finding.first_row}, {"text", Clean(finding.text)}};
+  return {{"kind", finding.kind},
+          {"column", Clean(finding.column)},
+          {"count", finding.count},
+          {"first_row", finding.first_row},
+          {"text", Clean(finding.text)}};
 }
 
 Json ToJson(const ChannelReport& channel) {
@@ -33,13 +37,17 @@ Json ToJson(const ChannelReport& channel) {
 }
 
 Json ToJson(const DelayReport& delay) {
-  return {{"command", Clean(delay.command)}, {"measured", Clean(delay.measured)}, {"delay_s", delay.delay_s}, {"correlation", delay.correlation},
+  return {{"command", Clean(delay.command)},
+          {"measured", Clean(delay.measured)},
+          {"delay_s", delay.delay_s},
+          {"correlation", delay.correlation},
           {"reliable", delay.reliable}};
 }
 
 Json ToJson(const CommandExcitation& command) {
   Json bands = Json::array();
-  for (const auto& band : command.bands) bands.push_back({{"low_hz", band.low_hz}, {"high_hz", band.high_hz}, {"share", band.share}});
+  for (const auto& band : command.bands)
+    bands.push_back({{"low_hz", band.low_hz}, {"high_hz", band.high_hz}, {"share", band.share}});
   return {{"command", Clean(command.name)},
           {"range", command.range},
           {"bandwidth_95_hz", command.bandwidth_95_hz},
@@ -50,14 +58,10 @@ Json ToJson(const CommandExcitation& command) {
 }
 
 Json ToJson(const MotionCoverage& motion) {
-  return {{"signal", Clean(motion.name)},
-          {"range", motion.range},
-          {"speed_max", motion.speed_max},
-          {"reversals", motion.reversals},
-          {"moving_share", motion.moving_share},
-          {"rest_share", motion.rest_share},
-          {"slow_share", motion.slow_share},
-          {"positive_share", motion.positive_share}};
+  return {{"signal", Clean(motion.name)},        {"range", motion.range},
+          {"speed_max", motion.speed_max},       {"reversals", motion.reversals},
+          {"moving_share", motion.moving_share}, {"rest_share", motion.rest_share},
+          {"slow_share", motion.slow_share},     {"positive_share", motion.positive_share}};
 }
 
 template <class T>

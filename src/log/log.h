@@ -22,7 +22,7 @@ struct Column {
 
 // Something that was noticed or repaired while reading: never silent, always counted.
 struct Finding {
-  std::string kind;    // "missing", "repeated_stamp", "time_reversal", "gap", "saturation", "wrap", ...
+  std::string kind;         // "missing", "repeated_stamp", "time_reversal", "gap", "saturation", "wrap", ...
   std::string column = {};  // empty: the whole row
   std::size_t count = 0;
   std::size_t first_row = 0;  // row index of the first one, 0-based
@@ -68,9 +68,9 @@ struct ReadOptions {
   std::vector<Companion> companions = {};
 };
 
-// Reads a log. Errors name file and line (and column): absent, empty, binary, UTF-16, no header, wrong number of fields,
-// not a number, unterminated quote, endless line, invalid JSON, unequal companion, more than 10^9 values. Companions
-// whose rows differ by one are cut to the shorter file (Finding "companion_rows").
+// Reads a log. Errors name file and line (and column): absent, empty, binary, UTF-16, no header, wrong number of
+// fields, not a number, unterminated quote, endless line, invalid JSON, unequal companion, more than 10^9 values.
+// Companions whose rows differ by one are cut to the shorter file (Finding "companion_rows").
 Result<Log> ReadLog(const std::string& path, const ReadOptions& options);
 
 }  // namespace gapscope

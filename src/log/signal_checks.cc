@@ -38,6 +38,13 @@ GridFit FitGrid(const std::vector<double>& steps, double step, double most) {
   return fit;
 }
 
+// Does a signal that came by `before` and `last` to `limit` and stayed there for `length` rows look cut off? At a
+// smooth turning point v = a t^2 seen in counts, speed there (2 a h) times stay (2 h) is 4 counts, since a h^2 is one.
+bool IsCutOff(double before, double last, double limit, std::size_t length, double step) {
+  const double speed = std::abs(limit - before) / 2;
+  return std::abs(limit - last) > 1.5 * step && speed * static_cast<double>(length) > 8 * step;
+}
+
 }  // namespace
 
 Wraps FindWraps(const std::vector<double>& values, double period) {
@@ -99,7 +106,6 @@ Saturation FindSaturation(const std::vector<double>& values) {
   found.high = levels.back();
   if (levels.size() <= kSaturationLevels) return found;
   const double step = QuantisationStep(values);
-  const double entry = 1.5 * step;
 
   for (const double limit : {found.high, found.low}) {
     std::size_t rows = 0, first = 0;
@@ -111,18 +117,21 @@ Saturation FindSaturation(const std::vector<double>& values) {
       }
       const std::size_t begin = k;
       while (k < values.size() && values[k] == limit) ++k;
-      if (k - begin < kSaturationRun) continue;
+      const std::size_t length = k - begin;
+      if (length < kSaturationRun) continue;
       if (rows == 0) first = begin;
-      rows += k - begin;
-      // One count is how a signal at rest arrives; a longer last step means that it was on its way further.
-      cut_off |= begin > 0 && std::abs(values[begin - 1] - limit) > entry;
-      cut_off |= k < values.size() && std::abs(values[k] - limit) > entry;
+      rows += length;
+      if (begin >= 2 && k + 1 < values.size()) {
+        cut_off |= IsCutOff(values[begin - 2], values[begin - 1], limit, length, step) &&
+                   IsCutOff(values[k + 1], values[k], limit, length, step);
+      }
     }
     if (rows == 0 || !cut_off) continue;
     if (found.count == 0 || first < found.first) found.first = first;
     found.count += rows;
     (limit == found.high ? found.at_high : found.at_low) = true;
   }
+  if (static_cast<double>(found.count) > kSaturationMost * static_cast<double>(values.size())) return {};
   return found;
 }
 

@@ -22,10 +22,12 @@ void Unwrap(double period, std::vector<double>* values);
 // about P between the two ends? Counts those jumps.
 Wraps FindUndeclaredWraps(const std::vector<double>& values, double period);
 
-// Rows in runs of kSaturationRun or more at exactly the largest or smallest value of a signal that has more than
-// kSaturationLevels levels and enters or leaves such a run by more than 1.5 of its counts: it is cut off, not at rest.
+// Rows in runs of kSaturationRun or more at exactly the largest (or smallest) value, for a signal that has more than
+// kSaturationLevels levels. At least one of the runs must be entered and left faster than a smooth
+// turning point would be, and the rows must not be more than kSaturationMost of all: that is a pattern of set-points.
 inline constexpr std::size_t kSaturationRun = 5;
 inline constexpr std::size_t kSaturationLevels = 10;
+inline constexpr double kSaturationMost = 0.75;
 struct Saturation {
   std::size_t count = 0, first = 0;
   double low = 0, high = 0;  // the smallest and the largest value

@@ -1,8 +1,7 @@
 // Broken bam JSON files: each is refused with file and line, what was found and a cure; none brings the program down.
-#include <cstring>
-#include <regex>
-
 #include <fmt/format.h>
+
+#include <cstring>
 
 #include "tests/log/log_fixture.h"
 
@@ -84,19 +83,26 @@ std::vector<Broken> Table() {
       {"key twice in an entry", head + "{\"timestamp\": 0.1, \"timestamp\": 0.2}]}", ":2:", "a key twice in entry 1"},
       {"key twice in the header", "{\"kp\": 1, \"kp\": 2, \"entries\": []}", ":1:", "twice in the header"},
       {"arrays 100000 deep", Times(100'000, "["), ":1:", "not a bam log"},
-      {"arrays 100000 deep in the header", "{\"a\": " + Times(100'000, "[") + Times(100'000, "]") + "}", ":1:", "nested too deeply"},
+      {"arrays 100000 deep in the header", "{\"a\": " + Times(100'000, "[") + Times(100'000, "]") + "}",
+       ":1:", "nested too deeply"},
       {"objects 100000 deep in the header", Times(100'000, "{\"a\":"), ":1:", "nested too deeply"},
       {"arrays 100000 deep in an entry", head + "{\"a\": " + Times(100'000, "["), ":2:", "nested data"},
       {"endless text", "{\"a\": \"" + std::string(4 << 20, 'x'), ":1:", "cut off"},
       {"endless number", "{\"a\": " + std::string(1 << 20, '9') + "}", ":1:", "too large"},
-      {"entries without common keys", head + SparseEntries(900) + "," + SparseEntries(1200) + "]}", ":2:", "too many different keys"},
+      {"entries without common keys", head + SparseEntries(900) + "," + SparseEntries(1200) + "]}",
+       ":2:", "too many different keys"},
       {"no time", head + "{\"position\": 1}, {\"position\": 2}]}", ":2", "no time column"},
-      {"time all null", head + "{\"timestamp\": null, \"a\": 1},{\"timestamp\": null, \"a\": 1}]}", ":2", "holds no number"},
-      {"everything NaN", head + "{\"timestamp\": NaN, \"a\": NaN},{\"timestamp\": NaN, \"a\": NaN}]}", ":2", "holds no number"},
-      {"column all NaN", head + "{\"timestamp\": 0, \"a\": NaN},\n{\"timestamp\": 1, \"a\": NaN}]}", ":2, column a", "without any value"},
+      {"time all null", head + "{\"timestamp\": null, \"a\": 1},{\"timestamp\": null, \"a\": 1}]}", ":2",
+       "holds no number"},
+      {"everything NaN", head + "{\"timestamp\": NaN, \"a\": NaN},{\"timestamp\": NaN, \"a\": NaN}]}", ":2",
+       "holds no number"},
+      {"column all NaN", head + "{\"timestamp\": 0, \"a\": NaN},\n{\"timestamp\": 1, \"a\": NaN}]}", ":2, column a",
+       "without any value"},
       {"one entry", head + entry + "]}", ":2, column timestamp", "fewer than two rows"},
-      {"stamps going back", head + "{\"timestamp\": 2, \"a\": 1},\n{\"timestamp\": -1, \"a\": 1}]}", ":2, column timestamp", "fewer than two rows"},
-      {"stamps in the wrong unit", "{\"entries\": [{\"time_s\": 0, \"a\": 1},{\"time_s\": 1e9, \"a\": 2}]}", ":1, column time_s", "makes no sense"},
+      {"stamps going back", head + "{\"timestamp\": 2, \"a\": 1},\n{\"timestamp\": -1, \"a\": 1}]}",
+       ":2, column timestamp", "fewer than two rows"},
+      {"stamps in the wrong unit", "{\"entries\": [{\"time_s\": 0, \"a\": 1},{\"time_s\": 1e9, \"a\": 2}]}",
+       ":1, column time_s", "makes no sense"},
       {"CSV in a JSON file", "time_s,voltage_v\n0,1\n", ":1:", "not valid JSON"},
   };
 }
@@ -105,14 +111,13 @@ TEST(BamHostileTest, EachIsRefusedWithFileAndLine) {
   const TempFolder folder;
   const auto table = Table();
   EXPECT_GE(table.size(), 40u);
-  const std::regex with_line("\\.json:[0-9]+");
   for (const auto& broken : table) {
     const std::string path = folder.Write("broken.json", broken.bytes);
     const auto error = FirstError(path);
     ASSERT_TRUE(error) << broken.name;
     const std::string text = error->Text();
-    EXPECT_TRUE(std::regex_search(text, with_line)) << broken.name << ": " << text;
-    EXPECT_EQ(text.substr(0, path.size() + std::strlen(broken.where)), path + broken.where) << broken.name << ": " << text;
+    EXPECT_EQ(text.substr(0, path.size() + std::strlen(broken.where)), path + broken.where)
+        << broken.name << ": " << text;
     EXPECT_NE(text.find(broken.says), std::string::npos) << broken.name << ": " << text;
     EXPECT_LT(text.size(), 1500u) << broken.name;
     EXPECT_EQ(text.find('\n'), std::string::npos) << broken.name;

@@ -1,10 +1,10 @@
 #include "src/log/bam_reader.h"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cstring>
 #include <random>
-
-#include <fmt/format.h>
 
 #include "tests/log/log_fixture.h"
 
@@ -54,7 +54,8 @@ TEST(BamReaderTest, MissingKeysAndNullsAreMissingValues) {
 }
 
 TEST(BamReaderTest, PythonsNaNIsMissing) {
-  const Log log = Read(R"({"note": "NaN \" Infinity", "entries": [{"t": 0, "x": NaN}, {"t":1, "x":-Infinity}, {"t":2, "x":Infinity}, {"t":3, "x":-3}]})");
+  const Log log = Read(
+      R"({"note": "NaN \" Infinity", "entries": [{"t": 0, "x": NaN}, {"t":1, "x":-Infinity}, {"t":2, "x":Infinity}, {"t":3, "x":-3}]})");
   EXPECT_EQ(log.header_text.at("note"), "NaN \" Infinity");
   EXPECT_EQ(FindFinding(log.findings, "missing", "x")->count, 3u);
   EXPECT_EQ(FindFinding(log.findings, "infinite")->count, 2u);
@@ -68,7 +69,8 @@ TEST(BamReaderTest, PlacesStayRightBehindNaN) {
 }
 
 TEST(BamReaderTest, NestedHeaderIsReportedAndIgnored) {
-  const Log log = Read(R"({"gains": {"p": [1, 2, {"deep": true}]}, "list": [[]], "kp": 2, "entries": [{"t": 0, "x": 1}]})");
+  const Log log =
+      Read(R"({"gains": {"p": [1, 2, {"deep": true}]}, "list": [[]], "kp": 2, "entries": [{"t": 0, "x": 1}]})");
   EXPECT_EQ(log.header, (std::map<std::string, double>{{"kp", 2}}));
   EXPECT_TRUE(FindFinding(log.findings, "ignored_header", "gains"));
   EXPECT_TRUE(FindFinding(log.findings, "ignored_header", "list"));
@@ -96,7 +98,8 @@ TEST(BamReaderTest, RoundTripsRandomTables) {
         } while (!std::isfinite(x));
         table[order[i]][r] = x;
         char text[64];
-        bytes += fmt::format("{}\"c{}\": {}", i ? ", " : "", order[i], std::string(text, std::to_chars(text, text + sizeof text, x).ptr));
+        bytes += fmt::format("{}\"c{}\": {}", i ? ", " : "", order[i],
+                             std::string(text, std::to_chars(text, text + sizeof text, x).ptr));
       }
       bytes += random() % 3 ? "}" : "}\n";
     }

@@ -1,8 +1,7 @@
 // Broken CSV files: each is refused with file and line, what was found and a cure; none brings the program down.
-#include <cstring>
-#include <regex>
-
 #include <fmt/format.h>
+
+#include <cstring>
 
 #include "tests/log/log_fixture.h"
 
@@ -14,8 +13,8 @@ using namespace std::string_literals;
 struct Broken {
   const char* name;
   std::string bytes;
-  const char* where;   // behind the path
-  const char* says;    // part of the message
+  const char* where;  // behind the path
+  const char* says;   // part of the message
 };
 
 std::string Rows(int count, const std::string& row) {
@@ -63,11 +62,15 @@ std::vector<Broken> Table() {
       {"lone sign", head + "0,1\n1,+\n", ":3, column voltage_v", "not a number"},
       {"exponent without digits", head + "0,1\n1,1e\n", ":3, column voltage_v", "not a number"},
       {"hexadecimal", head + "0,1\n1,0x1F\n", ":3, column voltage_v", "not a number"},
-      {"Unicode minus", head + "0,1\n1,\xE2\x88\x92" "5\n", ":3, column voltage_v", "not a number"},
+      {"Unicode minus",
+       head + "0,1\n1,\xE2\x88\x92"
+              "5\n",
+       ":3, column voltage_v", "not a number"},
       {"invalid UTF-8 in a row", head + "0,1\n1,\xFF\xFE\x80\n", ":3, column voltage_v", "\\xff"},
       {"invalid UTF-8 in a name", "time_s,angle [\xB0]\n0,1\n1,2\n", ":1", "not UTF-8"},
       {"dates", "time,x\n2026-01-15 10:28:10.1,1\n2026-01-15 10:28:10.2,2\n", ":2, column time", "is this a date"},
-      {"clock times", "time,x\n10:28:10.1,1\n10:28:10.2,2\n10:28:10.3,2\n10:28:10.4,2\n", ":2, column time", "is this a date"},
+      {"clock times", "time,x\n10:28:10.1,1\n10:28:10.2,2\n10:28:10.3,2\n10:28:10.4,2\n", ":2, column time",
+       "is this a date"},
       {"overflow", head + "0,1\n1,1e999\n", ":3, column voltage_v", "too large"},
       {"negative overflow", head + "0,1\n1,-1e400\n", ":3, column voltage_v", "too large"},
       {"overflow of digits", head + "0,1\n1," + std::string(400, '9') + "\n", ":3, column voltage_v", "too large"},
@@ -89,7 +92,8 @@ std::vector<Broken> Table() {
       {"endless line of names in columns", Rows(600'000, "ab,"), ":1", "line without end"},
       {"too many columns", Rows(20'000, "a,") + "b\n1\n", ":1", "too many columns"},
       {"endless row", head + Rows(700'000, "1,") + "\n", ":2", "line without end"},
-      {"endless row far below", head + Rows(60, "0,1\n") + Rows(1'000'000, "1,") + "\n", ":62", "wrong number of fields"},
+      {"endless row far below", head + Rows(60, "0,1\n") + Rows(1'000'000, "1,") + "\n", ":62",
+       "wrong number of fields"},
       {"no time column", "voltage_v,position_rad\n0,1\n1,2\n", ":1", "no time column"},
       {"time all nan", head + "nan,1\nnan,2\n", ":2", "holds no number"},
       {"everything nan", head + "nan,nan\nnan,nan\n", ":2", "holds no number"},
@@ -113,14 +117,13 @@ TEST(CsvHostileTest, EachIsRefusedWithFileAndLine) {
   const TempFolder folder;
   const auto table = Table();
   EXPECT_GE(table.size(), 40u);
-  const std::regex with_line("\\.csv:[0-9]+");
   for (const auto& broken : table) {
     const std::string path = folder.Write("broken.csv", broken.bytes);
     const auto error = FirstError(path);
     ASSERT_TRUE(error) << broken.name;
     const std::string text = error->Text();
-    EXPECT_TRUE(std::regex_search(text, with_line)) << broken.name << ": " << text;
-    EXPECT_EQ(text.substr(0, path.size() + std::strlen(broken.where)), path + broken.where) << broken.name << ": " << text;
+    EXPECT_EQ(text.substr(0, path.size() + std::strlen(broken.where)), path + broken.where)
+        << broken.name << ": " << text;
     EXPECT_NE(text.find(broken.says), std::string::npos) << broken.name << ": " << text;
     EXPECT_LT(text.size(), 1500u) << broken.name;
     EXPECT_EQ(text.find('\n'), std::string::npos) << broken.name;
@@ -144,7 +147,8 @@ TEST(CsvHostileTest, UnitsOfTheCallerAreChecked) {
   ASSERT_TRUE(log.ok());
   const auto bad = BuildTimeline(log.value(), {.time_column = "clk", .time_unit = "furlong"});
   ASSERT_FALSE(bad.ok());
-  EXPECT_NE(bad.error().Text().find("log.csv:1, column clk: 'furlong' is not a unit of time"), std::string::npos) << bad.error().Text();
+  EXPECT_NE(bad.error().Text().find("log.csv:1, column clk: 'furlong' is not a unit of time"), std::string::npos)
+      << bad.error().Text();
   const auto absent = BuildTimeline(log.value(), {.time_column = "clok"});
   ASSERT_FALSE(absent.ok());
   EXPECT_NE(absent.error().Text().find("did you mean 'clk'?"), std::string::npos) << absent.error().Text();

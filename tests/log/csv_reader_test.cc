@@ -1,5 +1,7 @@
 #include "src/log/csv_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <clocale>
@@ -7,8 +9,6 @@
 #include <cstring>
 #include <limits>
 #include <random>
-
-#include <fmt/format.h>
 
 #include "tests/log/log_fixture.h"
 
@@ -75,7 +75,11 @@ std::vector<Good> GoodTable() {
       {"degree sign", "t [s],x [\xC2\xB0]\n0,1.5\n0.5,-2\n", {"t", "x"}, {"s", "\xC2\xB0"}, {t, x}},
       {"row of units", "t,x\ns,V\n0,1.5\n0.5,-2\n", {"t", "x"}, {"s", "V"}, {t, x}},
       {"row of units in brackets", "t,x\n[s],[rad/s]\n0,1.5\n0.5,-2\n", {"t", "x"}, {"s", "rad/s"}, {t, x}},
-      {"Simulink Data Inspector", "time,x\n,Type: double\nUnit: s,Unit: V\n,Interp: linear\n0,1.5\n0.5,-2\n", {"time", "x"}, {"s", "V"}, {t, x}},
+      {"Simulink Data Inspector",
+       "time,x\n,Type: double\nUnit: s,Unit: V\n,Interp: linear\n0,1.5\n0.5,-2\n",
+       {"time", "x"},
+       {"s", "V"},
+       {t, x}},
       {"true and false", "t,x\n0,true\n0.5,FALSE\n", {"t", "x"}, {}, {t, {1, 0}}},
       {"missing values", "t,x,y\n0,,nan\n0.5,NaN,NA\n", {"t", "x", "y"}, {}, {t, {kNaN, kNaN}, {kNaN, kNaN}}},
       {"more missing values", "t,x,y\n0,null,-\n0.5,None,\"\"\n", {"t", "x", "y"}, {}, {t, {kNaN, kNaN}, {kNaN, kNaN}}},
@@ -90,7 +94,11 @@ std::vector<Good> GoodTable() {
       {"pandas index", ",t,x\n7,0,1.5\n8,0.5,-2\n", {"column_1", "t", "x"}, {}, {{7, 8}, t, x}},
       {"duplicate names", "t,x,x\n0,1.5,3\n0.5,-2,4\n", {"t", "x", "x"}, {}, {t, x, {3, 4}}},
       {"header again", "t,x\n0,1.5\nt,x\n0.5,-2\n", {"t", "x"}, {}, {t, x}},
-      {"a column of words", "t,x,mode\n0,1.5,idle\n0.5,-2,run\n1,0,run\n", {"t", "x", "mode"}, {}, {{0, 0.5, 1}, {1.5, -2, 0}, {kNaN, kNaN, kNaN}}},
+      {"a column of words",
+       "t,x,mode\n0,1.5,idle\n0.5,-2,run\n1,0,run\n",
+       {"t", "x", "mode"},
+       {},
+       {{0, 0.5, 1}, {1.5, -2, 0}, {kNaN, kNaN, kNaN}}},
       {"one row", "t,x\n0,1.5\n", {"t", "x"}, {}, {{0}, {1.5}}},
       {"form of decimal point", "t,x\n0.,1.5\n.5,-2.\n", {"t", "x"}, {}, {t, x}},
   };
@@ -117,16 +125,11 @@ TEST(CsvReaderTest, ReportsWhatItDidNotTakeLiterally) {
     const char* column;
     std::size_t count, first_row;
   } rows[] = {
-      {"t;x\n0;1,5\n0,5;-2\n", "decimal_comma", "", 2, 0},
-      {"t,x\n0,1\n1,\n2,nan\n", "missing", "x", 2, 1},
-      {"t,x\n0,1\n1,inf\n", "infinite", "x", 1, 1},
-      {"t,x\n0,1\n# a\n// b\n1,2\n", "comment", "", 2, 1},
-      {"t,x,x\n0,1,2\n", "duplicate_name", "x", 1, 0},
-      {"t,x\n0,1\nt,x\n1,2\n", "repeated_header", "", 1, 1},
-      {"t,x\n0,1\n1,2,\n", "trailing_delimiter", "", 1, 1},
-      {"t,x,\n0,1,\n1,2,\n", "trailing_delimiter", "", 3, 0},
-      {",t\n0,1\n", "unnamed_column", "column_1", 1, 0},
-      {"t,m\n0,a\n1,b\n2,c\n", "text_column", "m", 3, 0},
+      {"t;x\n0;1,5\n0,5;-2\n", "decimal_comma", "", 2, 0},  {"t,x\n0,1\n1,\n2,nan\n", "missing", "x", 2, 1},
+      {"t,x\n0,1\n1,inf\n", "infinite", "x", 1, 1},         {"t,x\n0,1\n# a\n// b\n1,2\n", "comment", "", 2, 1},
+      {"t,x,x\n0,1,2\n", "duplicate_name", "x", 1, 0},      {"t,x\n0,1\nt,x\n1,2\n", "repeated_header", "", 1, 1},
+      {"t,x\n0,1\n1,2,\n", "trailing_delimiter", "", 1, 1}, {"t,x,\n0,1,\n1,2,\n", "trailing_delimiter", "", 3, 0},
+      {",t\n0,1\n", "unnamed_column", "column_1", 1, 0},    {"t,m\n0,a\n1,b\n2,c\n", "text_column", "m", 3, 0},
       {"# t,x\n0,1\n", "header_comment", "", 1, 0},
   };
   for (const auto& row : rows) {

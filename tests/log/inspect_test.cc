@@ -1,10 +1,9 @@
 #include "src/log/inspect.h"
 
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
-
-#include <nlohmann/json.hpp>
 
 #include "src/log/inspect_json.h"
 #include "src/log/inspect_parts.h"
@@ -28,7 +27,8 @@ std::vector<double> Sample(const Timeline& timeline, const std::function<double(
 }
 
 bool Says(const std::vector<std::string>& sentences, const std::string& part) {
-  return std::any_of(sentences.begin(), sentences.end(), [&](const auto& s) { return s.find(part) != std::string::npos; });
+  return std::any_of(sentences.begin(), sentences.end(),
+                     [&](const auto& s) { return s.find(part) != std::string::npos; });
 }
 
 double Chirp(double t) { return t < 0 ? 0 : std::sin(kTurn * (0.2 * t + 0.25 * t * t)); }  // 0.2 to 5.2 Hz in 10 s
@@ -36,9 +36,11 @@ double Chirp(double t) { return t < 0 ? 0 : std::sin(kTurn * (0.2 * t + 0.25 * t
 TEST(InspectTest, DelayIsFoundBetweenSamples) {
   const Timeline timeline = RegularTimeline(2500, 0.004);
   for (const double delay_s : {0.0, 0.004, 0.0137, 0.05}) {
-    const InspectReport report =
-        Inspect(timeline, {{"u", "V", ChannelRole::kCommand, Sample(timeline, Chirp)},
-                           {"y", "rad", ChannelRole::kMeasured, Sample(timeline, [&](double t) { return 0.5 * Chirp(t - delay_s); })}}, {}, 2500);
+    const InspectReport report = Inspect(
+        timeline,
+        {{"u", "V", ChannelRole::kCommand, Sample(timeline, Chirp)},
+         {"y", "rad", ChannelRole::kMeasured, Sample(timeline, [&](double t) { return 0.5 * Chirp(t - delay_s); })}},
+        {}, 2500);
     ASSERT_EQ(report.delays.size(), 1u);
     EXPECT_NEAR(report.delays[0].delay_s, delay_s, 0.0002) << delay_s;
     EXPECT_GT(report.delays[0].correlation, 0.99);
@@ -48,17 +50,20 @@ TEST(InspectTest, DelayIsFoundBetweenSamples) {
 
 TEST(InspectTest, OppositeSignIsReported) {
   const Timeline timeline = RegularTimeline(2500, 0.004);
-  const InspectReport report =
-      Inspect(timeline, {{"target", "rad", ChannelRole::kCommand, Sample(timeline, Chirp)},
-                         {"position", "rad", ChannelRole::kMeasured, Sample(timeline, [](double t) { return -Chirp(t - 0.01); })}}, {}, 2500);
+  const InspectReport report = Inspect(
+      timeline,
+      {{"target", "rad", ChannelRole::kCommand, Sample(timeline, Chirp)},
+       {"position", "rad", ChannelRole::kMeasured, Sample(timeline, [](double t) { return -Chirp(t - 0.01); })}},
+      {}, 2500);
   EXPECT_LT(report.delays[0].correlation, -0.95);
   EXPECT_TRUE(Says(report.verdict, "is a sign wrong?"));
 }
 
 TEST(InspectTest, SineHasItsPowerInItsDecade) {
   const Timeline timeline = RegularTimeline(5000, 0.002);
-  const auto excitation = MeasureExcitation({"u", "V", ChannelRole::kCommand, Sample(timeline, [](double t) { return 2 * std::sin(kTurn * 3 * t); })},
-                                            timeline.time_s, timeline.median_step_s);
+  const auto excitation = MeasureExcitation(
+      {"u", "V", ChannelRole::kCommand, Sample(timeline, [](double t) { return 2 * std::sin(kTurn * 3 * t); })},
+      timeline.time_s, timeline.median_step_s);
   EXPECT_NEAR(excitation.peak_hz, 3, 0.1);
   EXPECT_NEAR(excitation.bandwidth_95_hz, 3, 0.25);
   double sum = 0;
@@ -81,7 +86,8 @@ TEST(InspectTest, CoverageCountsReversalsAndRest) {
     const double x = t < 5 ? 1 - std::cos(kTurn * 0.4 * t) : 0;
     return kTurn / 4096 * std::round(x * 4096 / kTurn);
   };
-  const InspectReport report = Inspect(timeline, {{"q", "rad", ChannelRole::kMeasured, Sample(timeline, angle)}}, {}, 5000);
+  const InspectReport report =
+      Inspect(timeline, {{"q", "rad", ChannelRole::kMeasured, Sample(timeline, angle)}}, {}, 5000);
   ASSERT_EQ(report.coverage.size(), 1u);
   EXPECT_EQ(report.coverage[0].reversals, 3u);
   EXPECT_NEAR(report.coverage[0].rest_share, 0.5, 0.03);
@@ -93,16 +99,22 @@ TEST(InspectTest, CoverageCountsReversalsAndRest) {
 TEST(InspectTest, VerdictNamesWhatIsMissing) {
   const Timeline timeline = RegularTimeline(2000, 0.005);
   // A ramp: one direction, one speed, a slow command.
-  const InspectReport ramp = Inspect(timeline, {{"u", "V", ChannelRole::kCommand, Sample(timeline, [](double t) { return 0.1 * t; })},
-                                                {"q", "rad", ChannelRole::kMeasured, Sample(timeline, [](double t) { return 0.5 * t; })}}, {}, 2000);
+  const InspectReport ramp =
+      Inspect(timeline,
+              {{"u", "V", ChannelRole::kCommand, Sample(timeline, [](double t) { return 0.1 * t; })},
+               {"q", "rad", ChannelRole::kMeasured, Sample(timeline, [](double t) { return 0.5 * t; })}},
+              {}, 2000);
   EXPECT_TRUE(ramp.fit);
   EXPECT_TRUE(Says(ramp.verdict, "no reversal of 'q': Coulomb friction and a bias cannot be told apart"));
   EXPECT_TRUE(Says(ramp.verdict, "no content of 'u' above"));
   EXPECT_TRUE(Says(ramp.verdict, "no slow motion of 'q'"));
   EXPECT_TRUE(Says(ramp.verdict, "never at rest"));
 
-  const InspectReport sine = Inspect(timeline, {{"u", "V", ChannelRole::kCommand, Sample(timeline, [](double t) { return std::sin(6 * t); })},
-                                                {"q", "rad", ChannelRole::kMeasured, Sample(timeline, [](double t) { return std::sin(6 * t - 0.3); })}}, {}, 2000);
+  const InspectReport sine =
+      Inspect(timeline,
+              {{"u", "V", ChannelRole::kCommand, Sample(timeline, [](double t) { return std::sin(6 * t); })},
+               {"q", "rad", ChannelRole::kMeasured, Sample(timeline, [](double t) { return std::sin(6 * t - 0.3); })}},
+              {}, 2000);
   EXPECT_TRUE(Says(sine.verdict, "one amplitude of 'u'"));
   EXPECT_FALSE(Says(sine.verdict, "no reversal"));
 }
@@ -119,9 +131,15 @@ TEST(InspectTest, UnfitWithReasons) {
     const char* reason;
   } rows[] = {
       {{{"u", "V", ChannelRole::kCommand, wave}}, 200, "no measured channel"},
-      {{{"u", "V", ChannelRole::kCommand, wave}, {"q", "rad", ChannelRole::kMeasured, zero}}, 200, "no measured channel moves"},
-      {{{"u", "V", ChannelRole::kCommand, holes}, {"q", "rad", ChannelRole::kMeasured, wave}}, 200, "'u' has no value in 25.0 %"},
-      {{{"u", "V", ChannelRole::kCommand, wave}, {"q", "rad", ChannelRole::kMeasured, wave}}, 400, "dropped by repairs"},
+      {{{"u", "V", ChannelRole::kCommand, wave}, {"q", "rad", ChannelRole::kMeasured, zero}},
+       200,
+       "no measured channel moves"},
+      {{{"u", "V", ChannelRole::kCommand, holes}, {"q", "rad", ChannelRole::kMeasured, wave}},
+       200,
+       "'u' has no value in 25.0 %"},
+      {{{"u", "V", ChannelRole::kCommand, wave}, {"q", "rad", ChannelRole::kMeasured, wave}},
+       400,
+       "dropped by repairs"},
   };
   for (const auto& row : rows) {
     const InspectReport report = Inspect(timeline, row.channels, {}, row.rows_in_log);
@@ -129,7 +147,8 @@ TEST(InspectTest, UnfitWithReasons) {
     EXPECT_TRUE(Says(report.unfit_because, row.reason)) << row.reason;
   }
   const Timeline few = RegularTimeline(5, 0.005);
-  EXPECT_FALSE(Inspect(few, {{"q", "rad", ChannelRole::kMeasured, Sample(few, [](double t) { return t; })}}, {}, 5).fit);
+  EXPECT_FALSE(
+      Inspect(few, {{"q", "rad", ChannelRole::kMeasured, Sample(few, [](double t) { return t; })}}, {}, 5).fit);
 }
 
 TEST(InspectTest, SurvivesNaNHugeAndTinyValues) {
@@ -145,7 +164,8 @@ TEST(InspectTest, SurvivesNaNHugeAndTinyValues) {
         if (kind == 2) return 5e-324 * static_cast<double>(random() % 5);
         return kind == 3 ? 1e300 * std::sin(9 * t) : std::sin(9 * t);
       });
-      channels.push_back({std::to_string(c), c % 2 ? "rad" : "V", c % 2 ? ChannelRole::kMeasured : ChannelRole::kCommand, std::move(values)});
+      channels.push_back({std::to_string(c), c % 2 ? "rad" : "V",
+                          c % 2 ? ChannelRole::kMeasured : ChannelRole::kCommand, std::move(values)});
     }
     const InspectReport report = Inspect(timeline, channels, {}, 60);
     EXPECT_FALSE(ToJson(report, "log.csv").dump().empty());
@@ -164,8 +184,10 @@ TEST(InspectTest, ResamplingKeepsSamplesAndHoldsCommands) {
 
 TEST(InspectTest, JsonHoldsTheReport) {
   const Timeline timeline = RegularTimeline(500, 0.01);
-  const InspectReport report = Inspect(timeline, {{"u", "V", ChannelRole::kCommand, Sample(timeline, Chirp)},
-                                                  {"q\xFF", "rad", ChannelRole::kMeasured, Sample(timeline, Chirp)}}, {{"gap", "t", 2, 7, "two gaps"}}, 500);
+  const InspectReport report = Inspect(timeline,
+                                       {{"u", "V", ChannelRole::kCommand, Sample(timeline, Chirp)},
+                                        {"q\xFF", "rad", ChannelRole::kMeasured, Sample(timeline, Chirp)}},
+                                       {{"gap", "t", 2, 7, "two gaps"}}, 500);
   const auto json = ToJson(report, "log.csv");
   EXPECT_EQ(json["log"], "log.csv");
   EXPECT_EQ(json["time"]["rows"], 500);

@@ -38,7 +38,8 @@ class TempFolder {
   std::filesystem::path path_;
 };
 
-inline const Finding* FindFinding(const std::vector<Finding>& findings, const std::string& kind, const std::string& column = "") {
+inline const Finding* FindFinding(const std::vector<Finding>& findings, const std::string& kind,
+                                  const std::string& column = "") {
   for (const auto& finding : findings) {
     if (finding.kind == kind && (column.empty() || finding.column == column)) return &finding;
   }

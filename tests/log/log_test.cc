@@ -21,7 +21,8 @@ class CompanionTest : public testing::Test {
  protected:
   Result<Log> Read(const std::string& own, const std::string& other) {
     folder_.Write("data_desired_1.csv", other);
-    return ReadLog(folder_.Write("data_measured_1.csv", own), {.companions = {{"data_measured", "data_desired", "desired."}}});
+    return ReadLog(folder_.Write("data_measured_1.csv", own),
+                   {.companions = {{"data_measured", "data_desired", "desired."}}});
   }
   TempFolder folder_;
 };

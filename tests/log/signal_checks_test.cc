@@ -17,7 +17,8 @@ std::vector<double> Make(int count, const std::function<double(int)>& f) {
 }
 
 TEST(SignalChecksTest, QuantisationOfAnEncoder) {
-  for (const double step : {2 * std::numbers::pi / 2048, 0.0015339807878856412, 0.229 * 2 * std::numbers::pi / 60, 1.0}) {
+  for (const double step :
+       {2 * std::numbers::pi / 2048, 0.0015339807878856412, 0.229 * 2 * std::numbers::pi / 60, 1.0}) {
     const auto values = Make(2000, [&](int k) { return step * std::round(300 * std::sin(0.01 * k)); });
     EXPECT_NEAR(QuantisationStep(values), step, 1e-6 * step);
   }
@@ -25,7 +26,8 @@ TEST(SignalChecksTest, QuantisationOfAnEncoder) {
 
 TEST(SignalChecksTest, QuantisationWithOffsetAndRoundingInTheFile) {
   const double step = 0.00306796;
-  const auto values = Make(2000, [&](int k) { return std::round((0.0123 + step * std::round(80 * std::sin(0.01 * k))) * 1e7) / 1e7; });
+  const auto values =
+      Make(2000, [&](int k) { return std::round((0.0123 + step * std::round(80 * std::sin(0.01 * k))) * 1e7) / 1e7; });
   EXPECT_NEAR(QuantisationStep(values), step, 1e-3 * step);
 }
 
@@ -52,6 +54,19 @@ TEST(SignalChecksTest, RestOnACountIsNotSaturation) {
   // A quantised position that comes to rest at its largest value, one count at a time.
   const auto values = Make(600, [](int k) { return 0.01 * std::round(100 * (1 - std::exp(-0.02 * k))); });
   EXPECT_EQ(FindSaturation(values).count, 0u);
+}
+
+TEST(SignalChecksTest, TurningPointsInCountsAreNotSaturation) {
+  for (const double speed : {0.005, 0.02, 0.05}) {
+    const auto values = Make(3000, [&](int k) { return 0.00153 * std::round(std::sin(speed * k) / 0.00153); });
+    EXPECT_EQ(FindSaturation(values).count, 0u) << speed;
+  }
+}
+
+TEST(SignalChecksTest, SetPointsAreNotSaturation) {
+  // A ramp to a target that is held to the end, and a square wave with ramped flanks.
+  EXPECT_EQ(FindSaturation(Make(600, [](int k) { return std::min(1.0, 0.01 * k); })).count, 0u);
+  EXPECT_EQ(FindSaturation(Make(900, [](int k) { return std::clamp(10 * std::sin(0.02 * k), -1.0, 1.0); })).count, 0u);
 }
 
 TEST(SignalChecksTest, SquareWaveIsNotSaturation) {

@@ -13,7 +13,8 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRounding = 1e-12;
 
-Timeline Build(const std::vector<double>& stamps, const TimelineOptions& options = {}, const std::string& name = "time_s") {
+Timeline Build(const std::vector<double>& stamps, const TimelineOptions& options = {},
+               const std::string& name = "time_s") {
   const auto timeline = BuildTimeline(MakeLog({{name, stamps}}), options);
   EXPECT_TRUE(timeline.ok()) << (timeline.ok() ? "" : timeline.error().Text());
   return timeline.ok() ? timeline.value() : Timeline{};
@@ -80,7 +81,8 @@ TEST(TimelineTest, UnitFromNameHeadingCallerDateOrStep) {
     ASSERT_TRUE(timeline.ok()) << row.name << " " << timeline.error().Text();
     EXPECT_EQ(timeline.value().time_unit, row.unit) << row.name << " step " << row.step;
     EXPECT_NEAR(timeline.value().median_step_s, row.step_s, 1e-9) << row.name << " step " << row.step;
-    EXPECT_EQ(FindFinding(timeline.value().findings, "time_unit") != nullptr, row.guessed) << row.name << " step " << row.step;
+    EXPECT_EQ(FindFinding(timeline.value().findings, "time_unit") != nullptr, row.guessed)
+        << row.name << " step " << row.step;
   }
 }
 
@@ -106,7 +108,9 @@ TEST(TimelineTest, TimeColumnByName) {
     ASSERT_TRUE(timeline.ok()) << row.found;
     EXPECT_EQ(timeline.value().time_column, row.found);
   }
-  EXPECT_FALSE(BuildTimeline(MakeLog({{"torque", Regular(9, 1)}, {"theta", Regular(9, 1)}, {"target", Regular(9, 1)}}), {}).ok());
+  EXPECT_FALSE(
+      BuildTimeline(MakeLog({{"torque", Regular(9, 1)}, {"theta", Regular(9, 1)}, {"target", Regular(9, 1)}}), {})
+          .ok());
 }
 
 TEST(TimelineTest, StatedUnitThatLooksWrongIsReported) {
@@ -243,7 +247,7 @@ TEST_F(ExtractTest, ScalesAndHolds) {
   const auto values = Extract({kNaN, 1, kNaN, kNaN, 4}, {.factor = 2, .offset = 1});
   ASSERT_TRUE(values.ok());
   EXPECT_EQ(values.value(), (std::vector<double>{3, 3, 3, 3, 9}));
-  ExpectFinding(findings_, "missing", 3, 0);
+  ExpectFinding(findings_, "held", 3, 0);
 }
 
 TEST_F(ExtractTest, MissingUnderErrorNamesTheLine) {

@@ -45,24 +45,6 @@ struct Coordinate {
   double ToValue(double search) const;
 };
 
-// Residuals and Jacobian of a point, kept to test what one more column would explain (see FitProblem::TestColumn).
-struct Snapshot {
-  double cost = 0;
-  std::vector<Eigen::VectorXd> residuals;   // per window, weighted
-  std::vector<Eigen::MatrixXd> jacobians;   // per window: y, then the window's states
-  Linearization linearization;
-  bool valid = false;
-};
-
-// What a column would do to the cost, with all of y and the states free to answer it (score test; Rao, Proc. Cambridge Phil. Soc. 44, 1948).
-struct ColumnTest {
-  double drop = 0;       // of the cost, at the best scale in [0, 2]
-  double scale = 0;      // that scale
-  double absorbed = 1;   // share of the column that y and the states can imitate: near 1 it cannot be seen in these logs
-  Eigen::VectorXd dy;    // how y answers at that scale
-  bool valid = false;
-};
-
 class Journal;
 
 // One candidate solution.
@@ -80,6 +62,24 @@ struct Linearization {
   std::vector<Eigen::MatrixXd> state_gain;  // dx_w = state_step - state_gain dy
   std::vector<Eigen::VectorXd> state_step;
   bool valid = false;                       // false: the point cannot be simulated
+};
+
+// Residuals and Jacobian of a point, kept to test what one more column would explain (see FitProblem::TestColumn).
+struct Snapshot {
+  double cost = 0;
+  std::vector<Eigen::VectorXd> residuals;   // per window, weighted
+  std::vector<Eigen::MatrixXd> jacobians;   // per window: y, then the window's states
+  Linearization linearization;
+  bool valid = false;
+};
+
+// What a column would do to the cost, with all of y and the states free to answer it (score test; Rao, Proc. Cambridge Phil. Soc. 44, 1948).
+struct ColumnTest {
+  double drop = 0;       // of the cost, at the best scale in [0, 2]
+  double scale = 0;      // that scale
+  double absorbed = 1;   // share of the column that y and the states can imitate: near 1 it cannot be seen in these logs
+  Eigen::VectorXd dy;    // how y answers at that scale
+  bool valid = false;
 };
 
 class FitProblem {

@@ -125,11 +125,11 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
       map.Fail(item, {.what = "the signal '" + spec.signal + "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
     }
-    const std::string unit = ReadScaling(map, item, &spec.factor, &spec.offset);
+    spec.unit = ReadScaling(map, item, &spec.factor, &spec.offset);
     // "1": the column is in SI already.
     const std::array<const char*, 3> fits[] = {{"rad", "m", "1"}, {"rad/s", "m/s", "1"}, {"N m", "N", "1"}};
     const auto& units = fits[static_cast<std::size_t>(spec.kind)];
-    if (std::find(units.begin(), units.end(), unit) == units.end()) {
+    if (std::find(units.begin(), units.end(), spec.unit) == units.end()) {
       map.Fail(item, {.what = "the unit of the signal '" + spec.signal + "' does not fit its kind", .actual = "'" + map.Text("unit", "1") + "'",
                       .allowed = std::string("units of ") + units[0] + " or " + units[1]});
     }

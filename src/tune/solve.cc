@@ -65,12 +65,13 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
       result.termination = Termination::kNotSimulated;
       return result;
     }
-    bool accepted = false, small = false;
+    bool accepted = false, small = false, undamped = false;
     while (damping <= kMostDamping && !Late(options.deadline)) {
       const FitPoint trial = problem.Move(result.point, at, BoundedStep(at, result.point, problem.low(), problem.high(), damping));
       const double cost = problem.Cost(trial);
       if (cost < result.cost) {
-        small = result.cost - cost < options.tolerance * result.cost && damping <= kSmallDamping;
+        small = result.cost - cost < options.tolerance * result.cost;
+        undamped = damping <= kSmallDamping;
         result.point = trial;
         result.cost = cost;
         damping = std::max(damping * 0.1, kLeastDamping);
@@ -90,7 +91,8 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
       damping = std::min(damping, 1e-2);
       continue;
     }
-    if (accepted && ++quiet < 2) continue;
+    // A small step means the bottom when it was hardly damped, or when it happens again and again (a narrow valley).
+    if (accepted && ++quiet < (undamped ? 1 : 3)) continue;
     result.termination = accepted || result.iterations > 0 ? Termination::kConverged : Termination::kStalled;
     ++result.iterations;
     return result;

@@ -27,7 +27,7 @@ struct Progress {
 struct SolveOptions {
   Optimizer optimizer = Optimizer::kLevenbergMarquardt;
   int max_iterations = 60;       // of LM; NLopt: evaluations = 20 times that
-  double tolerance = 1e-5;       // stop when an undamped step lowers the cost by less than this share
+  double tolerance = 1e-4;       // stop when a step lowers the cost by less than this share
   double coarse_step = 0.05, fine_step = 0.01;  // finite differences, in search coordinates: first coarse, once converged fine
   Deadline deadline;
   unsigned long seed = 0;

@@ -130,7 +130,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     problem->set_journal(journal.get());
     FitPoint point = random ? *random : problem->Start();
     SolveResult found = Solve(*problem, point, options.solve);
-    if (options.huber > 0 && found.termination != Termination::kNotSimulated) {
+    if (options.objective != Objective::kBoth && options.huber > 0 && found.termination != Termination::kNotSimulated) {
       problem->UpdateRobustScale(found.point);
       found = Solve(*problem, found.point, options.solve);
     }

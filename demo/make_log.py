@@ -17,8 +17,8 @@ COUNT_RAD = 2 * math.pi / 2048
 
 
 def voltage(t):
-    """A sweep from 6 Hz down to 0.2 Hz that fades in."""
-    phase = 2 * math.pi * (6.0 * t - 0.5 * (6.0 - 0.2) * t * t / END_S)
+    """A sweep from 6 Hz down to 0.8 Hz that fades in."""
+    phase = 2 * math.pi * (6.0 * t - 0.5 * (6.0 - 0.8) * t * t / END_S)
     return 1.5 * min(1.0, t / 0.5) * math.sin(phase)
 
 

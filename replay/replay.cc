@@ -157,7 +157,10 @@ TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& record
     trial.time_step_s = step;
     return ReplayError(Replay(model, recordings, trial, pool).logs);
   };
-  TimeStep chosen{.step_s = model.compiled().opt.timestep, .error_change = 0};
+  // One step per sample where that is fine enough: stamps are landed on in any case.
+  double sample = 0;
+  for (const auto& recording : recordings) sample = std::max(sample, recording.timeline.median_step_s);
+  TimeStep chosen{.step_s = std::max(model.compiled().opt.timestep, sample), .error_change = 0};
   double error = error_at(chosen.step_s);
   for (int halving = 0;; ++halving) {
     const double finer = error_at(chosen.step_s / 2);

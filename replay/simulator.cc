@@ -75,6 +75,11 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
 Simulator::Simulator(const Model& model, double max_step_s)
     : model_(model), mujoco_(CopyForReplay(model.compiled())), data_(mj_makeData(mujoco_.get())), writer_(model, mujoco_.get(), data_.get()),
       max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep), values_(model.Nominal()), held_(model.command_actuators().size(), 0) {
+  // Friction rows written for "as stiff as the step allows" (solref -1 -1/h) follow the step that is really used.
+  for (int dof = 0; dof < mujoco_->nv; ++dof) {
+    mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
+    if (solref[0] == -1) solref[1] = -0.9999 / max_step_s_;
+  }
   for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
 }
 

@@ -49,7 +49,6 @@ class Simulator {
   // before that stamp's command acts; NaN after a divergence. A signal's delay and offset parameters are applied.
   RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted);
 
-  void set_max_step_s(double step) { max_step_s_ = step; }
   // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next SetParameters.
   void set_shift_s(double shift) { shift_s_ = shift; }
   const mjModel& mujoco_model() const { return *mujoco_; }

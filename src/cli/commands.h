@@ -14,6 +14,7 @@ using Run = std::function<Result<int>()>;
 void AddInit(CLI::App& program, Run& run);
 void AddInspect(CLI::App& program, Run& run);
 void AddReplay(CLI::App& program, Run& run);
+void AddTune(CLI::App& program, Run& run);
 
 }  // namespace gapscope::cli
 

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
   cli::AddInit(program, run);
   cli::AddInspect(program, run);
   cli::AddReplay(program, run);
+  cli::AddTune(program, run);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -1,18 +1,18 @@
 #include "src/log/bam_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <unordered_map>
 #include <vector>
-
-#include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "src/log/text.h"
 
@@ -106,7 +106,8 @@ class Handler : public nlohmann::json_sax<Json> {
     }
     if (depth_ == 0) return NotAnObject("a text");
     if (depth_ == 1) return NoFlatEntry("the text " + Quoted(text));
-    return Fail(fmt::format("not a number in {}", Place()), Quoted(text), "a number, true, false or null", "write numbers without quotes");
+    return Fail(fmt::format("not a number in {}", Place()), Quoted(text), "a number, true, false or null",
+                "write numbers without quotes");
   }
 
   bool key(string_t& name) override {
@@ -118,7 +119,9 @@ class Handler : public nlohmann::json_sax<Json> {
     if (!Deeper()) return false;
     if (skip_depth_ > 0) return true;
     if (in_entries_) {
-      if (depth_ == 2) return Fail(fmt::format("nested data in {}", Place()), "an object", "a number, true, false or null", "one key per number");
+      if (depth_ == 2)
+        return Fail(fmt::format("nested data in {}", Place()), "an object", "a number, true, false or null",
+                    "one key per number");
       StartEntry();
     } else if (depth_ == 1) {
       return SkipNested();
@@ -160,34 +163,49 @@ class Handler : public nlohmann::json_sax<Json> {
   bool parse_error(std::size_t position, const std::string&, const Json::exception& failure) override {
     // The library's text repeats the position, then says what it wanted.
     std::string_view text = failure.what();
-    if (const auto at = text.find(": "); at != std::string_view::npos && text.find("parse error at") < at) text.remove_prefix(at + 2);
-    if (const auto at = text.find("] "); text.starts_with('[') && at != std::string_view::npos) text.remove_prefix(at + 2);
-    const bool ended = text.find("unexpected end of input") != std::string_view::npos;
+    if (const auto at = text.find(": "); at != std::string_view::npos && text.find("parse error at") < at)
+      text.remove_prefix(at + 2);
+    if (const auto at = text.find("] "); text.starts_with('[') && at != std::string_view::npos)
+      text.remove_prefix(at + 2);
+    const bool ended = position > bytes_.size() || text.find("unexpected end of input") != std::string_view::npos;
     const bool range = text.find("number overflow") != std::string_view::npos;
-    error = Error{.what = range ? "a number too large" : "not valid JSON", .where = At(path_, Original(position > 0 ? position - 1 : 0)),
-                  .actual = Quoted(text, 160), .allowed = range ? "at most 1.8e308 in size" : "",
-                  .cure = ended ? "the file was cut off: record it again, or close its brackets" : "check it: python3 -m json.tool FILE"};
+    error = Error{.what = range ? "a number too large" : "not valid JSON",
+                  .where = At(path_, Original(position > 0 ? position - 1 : 0)),
+                  .actual = Quoted(text, 160),
+                  .allowed = range ? "at most 1.8e308 in size" : "",
+                  .cure = ended ? "the file was cut off: record it again, or close its brackets"
+                                : "check it: python3 -m json.tool FILE"};
     return false;
   }
 
   // After the last event.
   Status Finish() {
     if (!entries_seen_) {
-      return Error{.what = "no array 'entries'", .where = At(path_, 1), .actual = HeaderKeys(), .allowed = "a bam log: header and \"entries\": [...]",
+      return Error{.what = "no array 'entries'",
+                   .where = At(path_, 1),
+                   .actual = HeaderKeys(),
+                   .allowed = "a bam log: header and \"entries\": [...]",
                    .cure = "is this a file of parameters, not a log?"};
     }
     if (rows_ == 0 || log_->columns.empty()) {
-      return Error{.what = "no samples", .where = At(path_, log_->header_line), .actual = fmt::format("{} entries without a value", rows_),
-                   .allowed = "one entry per sample", .cure = "was the recording stopped before anything was written?"};
+      return Error{.what = "no samples",
+                   .where = At(path_, log_->header_line),
+                   .actual = fmt::format("{} entries without a value", rows_),
+                   .allowed = "one entry per sample",
+                   .cure = "was the recording stopped before anything was written?"};
     }
     for (std::size_t c = 0; c < log_->columns.size(); ++c) {
       auto& column = log_->columns[c];
       column.values.resize(rows_, kNaN);
-      const auto missing = std::count_if(column.values.begin(), column.values.end(), [](double x) { return std::isnan(x); });
+      const auto missing =
+          std::count_if(column.values.begin(), column.values.end(), [](double x) { return std::isnan(x); });
       if (missing == 0) continue;
-      const auto first = std::find_if(column.values.begin(), column.values.end(), [](double x) { return std::isnan(x); }) - column.values.begin();
-      log_->findings.push_back({"missing", column.name, static_cast<std::size_t>(missing), static_cast<std::size_t>(first),
-                                fmt::format("no value in {} of {} entries (first: entry {})", missing, rows_, first + 1)});
+      const auto first =
+          std::find_if(column.values.begin(), column.values.end(), [](double x) { return std::isnan(x); }) -
+          column.values.begin();
+      log_->findings.push_back(
+          {"missing", column.name, static_cast<std::size_t>(missing), static_cast<std::size_t>(first),
+           fmt::format("no value in {} of {} entries (first: entry {})", missing, rows_, first + 1)});
     }
     return Ok();
   }
@@ -196,22 +214,29 @@ class Handler : public nlohmann::json_sax<Json> {
   TextPosition Original(std::size_t offset) const {
     TextPosition position = PositionOf(bytes_, offset);
     const std::size_t line_start = offset + 1 - std::min(position.column, offset + 1);
-    const auto grown = [&](std::size_t until) { return std::lower_bound(longer_.begin(), longer_.end(), until) - longer_.begin(); };
+    const auto grown = [&](std::size_t until) {
+      return std::lower_bound(longer_.begin(), longer_.end(), until) - longer_.begin();
+    };
     position.column -= std::min(position.column - 1, static_cast<std::size_t>(grown(offset) - grown(line_start)));
     return position;
   }
   std::size_t Offset() const { return static_cast<std::size_t>(reached - bytes_.data()); }
 
   bool Fail(std::string what, std::string actual, std::string allowed, std::string cure) {
-    error = Error{.what = std::move(what), .where = At(path_, Original(Offset() > 0 ? Offset() - 1 : 0)), .actual = std::move(actual),
-                  .allowed = std::move(allowed), .cure = std::move(cure)};
+    error = Error{.what = std::move(what),
+                  .where = At(path_, Original(Offset() > 0 ? Offset() - 1 : 0)),
+                  .actual = std::move(actual),
+                  .allowed = std::move(allowed),
+                  .cure = std::move(cure)};
     return false;
   }
   bool NotAnObject(const std::string& actual) {
-    return Fail("not a bam log", actual, "an object with a header and \"entries\": [...]", "wrap the samples: {\"entries\": [...]}");
+    return Fail("not a bam log", actual, "an object with a header and \"entries\": [...]",
+                "wrap the samples: {\"entries\": [...]}");
   }
   bool NoFlatEntry(const std::string& actual) {
-    return Fail(fmt::format("entry {} is not an object", rows_ + 1), actual, "{\"timestamp\": 0.01, \"position\": 0.2, ...}", "one object per sample");
+    return Fail(fmt::format("entry {} is not an object", rows_ + 1), actual,
+                "{\"timestamp\": 0.01, \"position\": 0.2, ...}", "one object per sample");
   }
   std::string Place() const { return fmt::format("entry {}, key {}", rows_ + 1, Quoted(key_)); }
   std::string HeaderKeys() const {
@@ -224,7 +249,8 @@ class Handler : public nlohmann::json_sax<Json> {
 
   bool Deeper() {
     if (++nesting_ <= kDeepest) return true;
-    return Fail("nested too deeply", fmt::format("level {}", nesting_), fmt::format("at most {} levels", kDeepest), "is this a log?");
+    return Fail("nested too deeply", fmt::format("level {}", nesting_), fmt::format("at most {} levels", kDeepest),
+                "is this a log?");
   }
   bool CheckHeaderKey() {
     if (header_keys_.insert(key_).second) return true;
@@ -233,7 +259,8 @@ class Handler : public nlohmann::json_sax<Json> {
   // Nested data in the header is of no use here, but no error.
   bool SkipNested() {
     if (!CheckHeaderKey()) return false;
-    log_->findings.push_back({"ignored_header", key_, 1, 0, "the header's " + Quoted(key_) + " is neither a number nor a text; ignored"});
+    log_->findings.push_back(
+        {"ignored_header", key_, 1, 0, "the header's " + Quoted(key_) + " is neither a number nor a text; ignored"});
     skip_depth_ = nesting_;
     return true;
   }
@@ -249,7 +276,8 @@ class Handler : public nlohmann::json_sax<Json> {
     line_ += static_cast<std::size_t>(std::count(from, here, '\n'));
     counted_ = here;
     if (rows_ == 0) log_->header_line = line_;
-    if (log_->lines.empty() || line_ != log_->lines.back().line + (rows_ - log_->lines.back().row)) log_->lines.push_back({rows_, line_});
+    if (log_->lines.empty() || line_ != log_->lines.back().line + (rows_ - log_->lines.back().row))
+      log_->lines.push_back({rows_, line_});
     next_column_ = 0;
   }
 
@@ -272,7 +300,8 @@ class Handler : public nlohmann::json_sax<Json> {
     }
     next_column_ = c + 1;
     auto& values = log_->columns[c].values;
-    if (values.size() > rows_) return Fail(fmt::format("a key twice in {}", Place()), "", "each key once", "delete one of them");
+    if (values.size() > rows_)
+      return Fail(fmt::format("a key twice in {}", Place()), "", "each key once", "delete one of them");
     values.resize(rows_, kNaN);
     values.push_back(value);
     ++values_;
@@ -282,11 +311,13 @@ class Handler : public nlohmann::json_sax<Json> {
   // Keys that come in few entries would make a table far larger than the file.
   bool AddColumn() {
     if (log_->columns.size() == kMostColumns) {
-      return Fail("too many different keys in the entries", std::to_string(kMostColumns + 1), fmt::format("at most {}", kMostColumns), "give all entries the same keys");
+      return Fail("too many different keys in the entries", std::to_string(kMostColumns + 1),
+                  fmt::format("at most {}", kMostColumns), "give all entries the same keys");
     }
     const std::size_t cells = (log_->columns.size() + 1) * rows_;
     if (cells > 10'000'000 && cells > 100 * values_) {
-      return Fail("the entries have too few keys in common", fmt::format("{} values in a table of {}", values_, cells), "", "give all entries the same keys");
+      return Fail("the entries have too few keys in common", fmt::format("{} values in a table of {}", values_, cells),
+                  "", "give all entries the same keys");
     }
     log_->columns.push_back({key_, "", {}});
     return true;
@@ -326,15 +357,20 @@ Result<Log> ReadBamJson(const std::string& path, std::string_view bytes) {
   try {
     const WatchedBytes first(bytes.data(), &handler.reached), last(bytes.data() + bytes.size(), &handler.reached);
     const bool complete = Json::sax_parse(first, last, &handler);
-    if (!complete && !handler.error) handler.error = Error{.what = "not valid JSON", .where = At(path, 1), .actual = "", .allowed = "", .cure = ""};
+    if (!complete && !handler.error)
+      handler.error = Error{.what = "not valid JSON", .where = At(path, 1), .actual = "", .allowed = "", .cure = ""};
   } catch (const Json::exception& failure) {
-    return Error{.what = "not valid JSON", .where = At(path, PositionOf(bytes, static_cast<std::size_t>(handler.reached - bytes.data()))),
-                 .actual = Quoted(failure.what(), 160), .allowed = "", .cure = ""};
+    return Error{.what = "not valid JSON",
+                 .where = At(path, PositionOf(bytes, static_cast<std::size_t>(handler.reached - bytes.data()))),
+                 .actual = Quoted(failure.what(), 160),
+                 .allowed = "",
+                 .cure = ""};
   }
   if (handler.error) return *handler.error;
   GS_RETURN_IF_ERROR(handler.Finish());
   if (infinities > 0) {
-    log.findings.push_back({"infinite", "", infinities, 0, fmt::format("'Infinity' in {} places; taken as missing", infinities)});
+    log.findings.push_back(
+        {"infinite", "", infinities, 0, fmt::format("'Infinity' in {} places; taken as missing", infinities)});
   }
   return log;
 }

@@ -1,10 +1,10 @@
 #include "src/log/csv_dialect.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <set>
-
-#include <fmt/format.h>
 
 #include "src/core/units.h"
 #include "src/log/csv_fields.h"
@@ -92,7 +92,8 @@ void SplitUnit(std::string_view heading, std::string* name, std::string* unit) {
 }
 
 std::string_view StripBrackets(std::string_view text) {
-  if (text.size() >= 2 && ((text.front() == '[' && text.back() == ']') || (text.front() == '(' && text.back() == ')'))) {
+  if (text.size() >= 2 &&
+      ((text.front() == '[' && text.back() == ']') || (text.front() == '(' && text.back() == ')'))) {
     return TrimBlanks(text.substr(1, text.size() - 2));
   }
   return text;
@@ -146,8 +147,11 @@ Result<Preamble> ReadPreamble(const std::string& path, std::string_view bytes) {
   for (; offset < bytes.size() && preamble.sample.size() < kSampleLines; ++number) {
     const Line line = LineAt(bytes, offset);
     if (line.text.size() > kLongestLine) {
-      return Error{.what = "a line without end", .where = At(path, number), .actual = fmt::format("{} bytes", line.text.size()),
-                   .allowed = fmt::format("at most {} bytes", kLongestLine), .cure = "is this a log in CSV, one row to a line?"};
+      return Error{.what = "a line without end",
+                   .where = At(path, number),
+                   .actual = fmt::format("{} bytes", line.text.size()),
+                   .allowed = fmt::format("at most {} bytes", kLongestLine),
+                   .cure = "is this a log in CSV, one row to a line?"};
     }
     const NumberedLine numbered{line.text, number, line.next};
     offset = line.next;
@@ -173,7 +177,10 @@ Result<Preamble> ReadPreamble(const std::string& path, std::string_view bytes) {
     }
   }
   if (!found) {
-    return Error{.what = "the log has comments only", .where = At(path, 1), .actual = "", .allowed = "a line of names and rows of numbers",
+    return Error{.what = "the log has comments only",
+                 .where = At(path, 1),
+                 .actual = "",
+                 .allowed = "a line of names and rows of numbers",
                  .cure = kHeaderCure};
   }
   return preamble;
@@ -187,45 +194,66 @@ bool HeaderFromComment(const Preamble& preamble, CsvDialect* dialect) {
   const std::vector<NumberedLine> rows = {preamble.header};
   const char delimiter = preamble.delimiter != '\0' ? preamble.delimiter : ChooseDelimiter(text, rows);
   const auto names = SplitLine(text, delimiter, nullptr);
-  if (names.size() < 2 || names.size() != CountFields(preamble.header.text, delimiter) || LooksLikeData(names)) return false;
+  if (names.size() < 2 || names.size() != CountFields(preamble.header.text, delimiter) || LooksLikeData(names))
+    return false;
   dialect->delimiter = delimiter;
   dialect->names = names;
   dialect->header_text = preamble.last_comment.text;
   dialect->header_line = preamble.last_comment.line;
   dialect->body_offset = preamble.last_comment.next;
   dialect->body_line = preamble.last_comment.line + 1;
-  dialect->findings.push_back({.kind = "header_comment", .column = "", .count = 1, .first_row = 0,
-                               .text = fmt::format("the columns' names were taken from the comment on line {}", dialect->header_line)});
+  dialect->findings.push_back(
+      {.kind = "header_comment",
+       .column = "",
+       .count = 1,
+       .first_row = 0,
+       .text = fmt::format("the columns' names were taken from the comment on line {}", dialect->header_line)});
   return true;
 }
 
 Status CheckNames(const std::string& path, CsvDialect* dialect) {
   const std::string where = At(path, dialect->header_line);
   if (dialect->names.size() < 2) {
-    return Error{.what = "the log has only one column", .where = where, .actual = Quoted(dialect->header_text),
-                 .allowed = "two or more columns, separated by ',', ';', tab or blanks", .cure = "check the separator"};
+    return Error{.what = "the log has only one column",
+                 .where = where,
+                 .actual = Quoted(dialect->header_text),
+                 .allowed = "two or more columns, separated by ',', ';', tab or blanks",
+                 .cure = "check the separator"};
   }
   if (dialect->names.size() > kMostColumns) {
-    return Error{.what = "too many columns", .where = where, .actual = std::to_string(dialect->names.size()),
-                 .allowed = fmt::format("at most {}", kMostColumns), .cure = "is this a log in CSV, one row to a line?"};
+    return Error{.what = "too many columns",
+                 .where = where,
+                 .actual = std::to_string(dialect->names.size()),
+                 .allowed = fmt::format("at most {}", kMostColumns),
+                 .cure = "is this a log in CSV, one row to a line?"};
   }
   std::set<std::string> seen;
   for (std::size_t c = 0; c < dialect->names.size(); ++c) {
     std::string& name = dialect->names[c];
     if (!IsUtf8(name)) {
-      return Error{.what = fmt::format("the name of column {} is not UTF-8", c + 1), .where = where, .actual = Quoted(name),
-                   .allowed = "UTF-8", .cure = "convert it: iconv -f WINDOWS-1252 -t UTF-8 FILE > log.csv"};
+      return Error{.what = fmt::format("the name of column {} is not UTF-8", c + 1),
+                   .where = where,
+                   .actual = Quoted(name),
+                   .allowed = "UTF-8",
+                   .cure = "convert it: iconv -f WINDOWS-1252 -t UTF-8 FILE > log.csv"};
     }
     const std::string heading = name;
     SplitUnit(heading, &name, &dialect->units[c]);
     if (name.empty()) {
       name = fmt::format("column_{}", c + 1);
-      dialect->findings.push_back({.kind = "unnamed_column", .column = name, .count = 1, .first_row = 0,
+      dialect->findings.push_back({.kind = "unnamed_column",
+                                   .column = name,
+                                   .count = 1,
+                                   .first_row = 0,
                                    .text = fmt::format("column {} has no name; it is called '{}'", c + 1, name)});
     }
     if (!seen.insert(name).second) {
-      dialect->findings.push_back({.kind = "duplicate_name", .column = name, .count = 1, .first_row = 0,
-                                   .text = fmt::format("column {} has the name '{}' of an earlier one; the first is used", c + 1, name)});
+      dialect->findings.push_back(
+          {.kind = "duplicate_name",
+           .column = name,
+           .count = 1,
+           .first_row = 0,
+           .text = fmt::format("column {} has the name '{}' of an earlier one; the first is used", c + 1, name)});
     }
   }
   return Ok();
@@ -262,14 +290,20 @@ Result<CsvDialect> DetectCsvDialect(const std::string& path, std::string_view by
   bool unterminated = false;
   dialect.names = SplitLine(header.text, dialect.delimiter, &unterminated);
   if (unterminated) {
-    return Error{.what = "a quote without its partner", .where = At(path, header.line), .actual = Quoted(header.text),
-                 .allowed = "\"name\" on one line, a quote inside written twice", .cure = "close the quote"};
+    return Error{.what = "a quote without its partner",
+                 .where = At(path, header.line),
+                 .actual = Quoted(header.text),
+                 .allowed = "\"name\" on one line, a quote inside written twice",
+                 .cure = "close the quote"};
   }
   std::size_t first_sample = 0;
   if (LooksLikeData(dialect.names)) {
     if (!HeaderFromComment(preamble, &dialect)) {
-      return Error{.what = "no line of column names", .where = At(path, header.line), .actual = Quoted(header.text),
-                   .allowed = "names before the first row of numbers", .cure = kHeaderCure};
+      return Error{.what = "no line of column names",
+                   .where = At(path, header.line),
+                   .actual = Quoted(header.text),
+                   .allowed = "names before the first row of numbers",
+                   .cure = kHeaderCure};
     }
   } else {
     dialect.header_text = header.text;
@@ -296,7 +330,10 @@ Result<CsvDialect> DetectCsvDialect(const std::string& path, std::string_view by
   }
   for (const auto& unit : dialect.units) {
     if (!IsUtf8(unit)) {
-      return Error{.what = "a unit is not UTF-8", .where = At(path, dialect.header_line), .actual = Quoted(unit), .allowed = "UTF-8",
+      return Error{.what = "a unit is not UTF-8",
+                   .where = At(path, dialect.header_line),
+                   .actual = Quoted(unit),
+                   .allowed = "UTF-8",
                    .cure = "convert it: iconv -f WINDOWS-1252 -t UTF-8 FILE > log.csv"};
     }
   }

@@ -14,8 +14,8 @@ namespace gapscope {
 struct CsvDialect {
   char delimiter = ',';  // ' ' stands for runs of blanks
   std::vector<std::string> names, units;
-  std::vector<bool> is_text;      // columns that hold words ("idle", "running") throughout the first rows
-  std::string_view header_text;   // the line of names as written, to recognise it when it comes again
+  std::vector<bool> is_text;     // columns that hold words ("idle", "running") throughout the first rows
+  std::string_view header_text;  // the line of names as written, to recognise it when it comes again
   std::size_t header_line = 1;
   std::size_t body_offset = 0, body_line = 1;  // where the first line after names and units begins
   std::vector<Finding> findings;

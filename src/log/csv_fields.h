@@ -13,8 +13,8 @@ namespace gapscope {
 inline constexpr char kBlanks = ' ';
 
 struct FieldText {
-  std::string_view text;   // trimmed, quotes taken off
-  std::size_t end = 0;     // offset behind the field: of the delimiter or the end of the line
+  std::string_view text;  // trimmed, quotes taken off
+  std::size_t end = 0;    // offset behind the field: of the delimiter or the end of the line
   bool quoted = false;
   bool unterminated = false;  // a quote without its partner on the same line, or text behind the closing quote
 };
@@ -26,10 +26,10 @@ FieldText FieldAt(std::string_view line, std::size_t offset, char delimiter);
 std::vector<std::string> SplitLine(std::string_view line, char delimiter, bool* unterminated);
 
 enum class FieldKind {
-  kNumber,     // also true and false, as 1 and 0
-  kMissing,    // empty, nan, NA, null ...
-  kInfinite,   // inf, written as such
-  kTooLarge,   // a number beyond the range of double
+  kNumber,    // also true and false, as 1 and 0
+  kMissing,   // empty, nan, NA, null ...
+  kInfinite,  // inf, written as such
+  kTooLarge,  // a number beyond the range of double
   kText,
 };
 struct FieldValue {

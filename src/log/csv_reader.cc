@@ -1,5 +1,7 @@
 #include "src/log/csv_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -7,8 +9,6 @@
 #include <optional>
 #include <utility>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "src/log/csv_dialect.h"
 #include "src/log/csv_fields.h"
@@ -30,16 +30,26 @@ struct Tally {
 class BodyReader {
  public:
   BodyReader(const std::string& path, std::string_view bytes, const CsvDialect& dialect, Log* log)
-      : path_(path), bytes_(bytes), dialect_(dialect), log_(log), end_(bytes.data() + bytes.size()), line_(dialect.body_line),
-        missing_(dialect.names.size()), infinite_(dialect.names.size()), words_(dialect.names.size()) {}
+      : path_(path),
+        bytes_(bytes),
+        dialect_(dialect),
+        log_(log),
+        end_(bytes.data() + bytes.size()),
+        line_(dialect.body_line),
+        missing_(dialect.names.size()),
+        infinite_(dialect.names.size()),
+        words_(dialect.names.size()) {}
 
   Status Read() {
     Reserve();
     const Status status = dialect_.delimiter == kBlanks ? ReadLines<true>() : ReadLines<false>();
     if (!status.ok()) return status;
     if (row_ == 0) {
-      return Error{.what = "no rows after the line of names", .where = At(path_, dialect_.header_line), .actual = "0 rows",
-                   .allowed = "one row of numbers per sample", .cure = "was the recording stopped before anything was written?"};
+      return Error{.what = "no rows after the line of names",
+                   .where = At(path_, dialect_.header_line),
+                   .actual = "0 rows",
+                   .allowed = "one row of numbers per sample",
+                   .cure = "was the recording stopped before anything was written?"};
     }
     if (decimal_comma_.count > 0) GS_RETURN_IF_ERROR(CheckNoDecimalPoint());
     Report();
@@ -83,12 +93,7 @@ class BodyReader {
       const std::size_t columns = columns_.size();
       bool skip_line = false;
       while (true) {
-        if (c == columns) {
-          if (!IsExtraFieldEmpty(p)) return WrongCount(line_start);
-          trailing_.Add(row_, line_);
-          p = LineEnd(p);
-          break;
-        }
+        if (c == columns) return WrongCount(line_start);
         double value = 0;
         auto [q, failure] = std::from_chars(p, end_, value);
         const char* stop = q;
@@ -155,16 +160,22 @@ class BodyReader {
     if (p == end_) return p;
     return *p == '\r' && p + 1 < end_ && p[1] == '\n' ? p + 2 : p + 1;
   }
-  std::string_view LineText(const char* start) const { return {start, static_cast<std::size_t>(LineEnd(start) - start)}; }
+  std::string_view LineText(const char* start) const {
+    return {start, static_cast<std::size_t>(LineEnd(start) - start)};
+  }
   bool IsHeaderAgain(const char* start) const { return LineText(start) == dialect_.header_text; }
-  bool IsExtraFieldEmpty(const char* p) const { return p == end_ || IsEnd(*p); }
 
-  std::string Here(std::size_t column) const { return fmt::format("{}:{}, column {}", path_, line_, dialect_.names[column]); }
+  std::string Here(std::size_t column) const {
+    return fmt::format("{}:{}, column {}", path_, line_, dialect_.names[column]);
+  }
 
   // A field that is not simply a number.
   Status SlowField(const FieldText& field, std::size_t c) {
     if (field.unterminated) {
-      return Error{.what = "a quote without its partner", .where = Here(c), .actual = Quoted(field.text), .allowed = "\"1.5\" on one line",
+      return Error{.what = "a quote without its partner",
+                   .where = Here(c),
+                   .actual = Quoted(field.text),
+                   .allowed = "\"1.5\" on one line",
                    .cure = "close the quote; was the file cut off?"};
     }
     const FieldValue value = ParseField(field.text, dialect_.delimiter != ',' || field.quoted);
@@ -182,7 +193,10 @@ class BodyReader {
         infinite_[c].Add(row_, line_);
         break;
       case FieldKind::kTooLarge:
-        return Error{.what = "a number too large", .where = Here(c), .actual = Quoted(field.text), .allowed = "at most 1.8e308 in size",
+        return Error{.what = "a number too large",
+                     .where = Here(c),
+                     .actual = Quoted(field.text),
+                     .allowed = "at most 1.8e308 in size",
                      .cure = "leave the field empty where the value is unknown"};
       case FieldKind::kText:
         if (!dialect_.is_text[c]) return NotANumber(field.text, c);
@@ -202,7 +216,10 @@ class BodyReader {
     } else if (std::any_of(text.begin(), text.end(), [](char k) { return k == ';' || k == '|'; })) {
       cure = "use one separator throughout the file";
     }
-    return Error{.what = "not a number", .where = Here(c), .actual = Quoted(text), .allowed = "a number, true, false, or nothing for a missing value",
+    return Error{.what = "not a number",
+                 .where = Here(c),
+                 .actual = Quoted(text),
+                 .allowed = "a number, true, false, or nothing for a missing value",
                  .cure = cure};
   }
 
@@ -219,9 +236,12 @@ class BodyReader {
     } else if (dialect_.delimiter == ',' && (fields == 2 * columns || fields == 2 * columns - 1)) {
       cure = "are these decimal commas? Export with ';' between the fields, or with decimal points";
     }
-    return Error{.what = "wrong number of fields", .where = At(path_, line_),
-                 .actual = fmt::format("{}{} fields: {}", head.size() < text.size() ? "more than " : "", fields, Quoted(text)),
-                 .allowed = fmt::format("{}, as on line {}", columns, dialect_.header_line), .cure = cure};
+    return Error{
+        .what = "wrong number of fields",
+        .where = At(path_, line_),
+        .actual = fmt::format("{}{} fields: {}", head.size() < text.size() ? "more than " : "", fields, Quoted(text)),
+        .allowed = fmt::format("{}, as on line {}", columns, dialect_.header_line),
+        .cure = cure};
   }
 
   // "1,5" in one place and "0.5" in another: one of them is not what it seems.
@@ -241,8 +261,10 @@ class BodyReader {
         among_numbers |= !dialect_.is_text[c] && fields[c].find('.') != std::string::npos;
       }
       if (!among_numbers) continue;
-      return Error{.what = "decimal points and decimal commas in one file", .where = At(path_, number),
-                   .actual = fmt::format("a point here, a comma on line {}", decimal_comma_.first_line), .allowed = "one of them throughout",
+      return Error{.what = "decimal points and decimal commas in one file",
+                   .where = At(path_, number),
+                   .actual = fmt::format("a point here, a comma on line {}", decimal_comma_.first_line),
+                   .allowed = "one of them throughout",
                    .cure = "export the log again with decimal points and without thousands separators"};
     }
     return Ok();
@@ -254,18 +276,26 @@ class BodyReader {
       if (tally.count > 0) findings.push_back({kind, column, tally.count, tally.first_row, std::move(text)});
     };
     add("decimal_comma", "", decimal_comma_,
-        fmt::format("{} numbers were read with a decimal comma (first: line {})", decimal_comma_.count, decimal_comma_.first_line));
-    add("comment", "", comments_, fmt::format("{} comment lines among the rows were skipped (first: line {})", comments_.count, comments_.first_line));
+        fmt::format("{} numbers were read with a decimal comma (first: line {})", decimal_comma_.count,
+                    decimal_comma_.first_line));
+    add("comment", "", comments_,
+        fmt::format("{} comment lines among the rows were skipped (first: line {})", comments_.count,
+                    comments_.first_line));
     add("repeated_header", "", headers_,
-        fmt::format("the line of names comes again {} times (first: line {}); skipped: were several recordings joined?", headers_.count, headers_.first_line));
+        fmt::format("the line of names comes again {} times (first: line {}); skipped: were several recordings joined?",
+                    headers_.count, headers_.first_line));
     add("trailing_delimiter", "", trailing_,
-        fmt::format("{} rows end with a separator and nothing behind it (first: line {}); ignored", trailing_.count, trailing_.first_line));
+        fmt::format("{} rows end with a separator and nothing behind it (first: line {}); ignored", trailing_.count,
+                    trailing_.first_line));
     for (std::size_t c = 0; c < columns_.size(); ++c) {
       const std::string& name = dialect_.names[c];
-      add("missing", name, missing_[c], fmt::format("no value in {} of {} rows (first: line {})", missing_[c].count, row_, missing_[c].first_line));
+      add("missing", name, missing_[c],
+          fmt::format("no value in {} of {} rows (first: line {})", missing_[c].count, row_, missing_[c].first_line));
       add("infinite", name, infinite_[c],
-          fmt::format("'inf' in {} of {} rows (first: line {}); taken as missing", infinite_[c].count, row_, infinite_[c].first_line));
-      add("text_column", name, words_[c], fmt::format("holds words in {} of {} rows; the column cannot be used", words_[c].count, row_));
+          fmt::format("'inf' in {} of {} rows (first: line {}); taken as missing", infinite_[c].count, row_,
+                      infinite_[c].first_line));
+      add("text_column", name, words_[c],
+          fmt::format("holds words in {} of {} rows; the column cannot be used", words_[c].count, row_));
     }
     DropEmptyLastColumn();
   }
@@ -276,7 +306,8 @@ class BodyReader {
     if (last < 2 || missing_[last].count != row_ || dialect_.names[last] != fmt::format("column_{}", last + 1)) return;
     log_->columns.pop_back();
     std::erase_if(log_->findings, [&](const Finding& f) { return f.column == dialect_.names[last]; });
-    log_->findings.push_back({"trailing_delimiter", "", row_ + 1, 0, "every line ends with a separator and nothing behind it; ignored"});
+    log_->findings.push_back(
+        {"trailing_delimiter", "", row_ + 1, 0, "every line ends with a separator and nothing behind it; ignored"});
   }
 
   const std::string& path_;

@@ -1,5 +1,5 @@
-// CSV as users have it: any of the usual delimiters, quotes, decimal commas, units in the header, comments, sparse rows.
-// One pass of std::from_chars over the bytes; what is not a plain number takes a slower way (csv_fields.h).
+// CSV as users have it: any of the usual delimiters, quotes, decimal commas, units in the header, comments, sparse
+// rows. One pass of std::from_chars over the bytes; what is not a plain number takes a slower way (csv_fields.h).
 #ifndef GAPSCOPE_LOG_CSV_READER_H_
 #define GAPSCOPE_LOG_CSV_READER_H_
 

@@ -1,11 +1,11 @@
 #include "src/log/log.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>
 #include <new>
-
-#include <fmt/format.h>
 
 #include "src/core/file.h"
 #include "src/log/bam_reader.h"
@@ -40,11 +40,18 @@ Result<Log> ReadOne(const std::string& path, LogFormat format) {
     try {
       return reader.read(path, bytes);
     } catch (const std::bad_alloc&) {
-      return Error{.what = "not enough memory for this log", .where = At(path, 1), .actual = fmt::format("{} bytes", bytes.size()),
-                   .allowed = "", .cure = "split it, or leave out columns"};
+      return Error{.what = "not enough memory for this log",
+                   .where = At(path, 1),
+                   .actual = fmt::format("{} bytes", bytes.size()),
+                   .allowed = "",
+                   .cure = "split it, or leave out columns"};
     }
   }
-  return Error{.what = "no reader for this format", .where = At(path, 1), .actual = "", .allowed = "auto, csv, bam_json", .cure = ""};
+  return Error{.what = "no reader for this format",
+               .where = At(path, 1),
+               .actual = "",
+               .allowed = "auto, csv, bam_json",
+               .cure = ""};
 }
 
 Result<std::string> CompanionPath(const std::string& path, const Companion& companion) {
@@ -52,8 +59,11 @@ Result<std::string> CompanionPath(const std::string& path, const Companion& comp
   std::string name = whole.filename().string();
   const std::size_t at = companion.find.empty() ? std::string::npos : name.rfind(companion.find);
   if (at == std::string::npos || companion.find == companion.replace) {
-    return Error{.what = "no name for the file that belongs to this log", .where = At(path, 1), .actual = Quoted(name, 200),
-                 .allowed = fmt::format("a name with {}, to be replaced by {}", Quoted(companion.find), Quoted(companion.replace)),
+    return Error{.what = "no name for the file that belongs to this log",
+                 .where = At(path, 1),
+                 .actual = Quoted(name, 200),
+                 .allowed = fmt::format("a name with {}, to be replaced by {}", Quoted(companion.find),
+                                        Quoted(companion.replace)),
                  .cure = "name the right log, or correct 'companions' in the experiment file"};
   }
   name.replace(at, companion.find.size(), companion.replace);
@@ -64,16 +74,19 @@ Result<std::string> CompanionPath(const std::string& path, const Companion& comp
 Status Join(const Companion& companion, Log other, Log* log) {
   const std::size_t own = log->rows(), theirs = other.rows();
   if (own > theirs + 1 || theirs > own + 1) {
-    return Error{.what = "two files that belong together have different numbers of rows", .where = At(log->path, log->header_line),
-                 .actual = fmt::format("{} rows here, {} in {}", own, theirs, other.path), .allowed = "equal numbers, or one more in one of them",
+    return Error{.what = "two files that belong together have different numbers of rows",
+                 .where = At(log->path, log->header_line),
+                 .actual = fmt::format("{} rows here, {} in {}", own, theirs, other.path),
+                 .allowed = "equal numbers, or one more in one of them",
                  .cure = "are they of the same run?"};
   }
   if (own != theirs) {
     const std::size_t rows = std::min(own, theirs);
     for (auto& column : log->columns) column.values.resize(rows);
     for (auto& column : other.columns) column.values.resize(rows);
-    log->findings.push_back({"companion_rows", "", 1, rows,
-                             fmt::format("{} rows here, {} in {}; the extra last row was cut off", own, theirs, other.path)});
+    log->findings.push_back(
+        {"companion_rows", "", 1, rows,
+         fmt::format("{} rows here, {} in {}; the extra last row was cut off", own, theirs, other.path)});
   }
   for (auto& column : other.columns) {
     column.name = companion.prefix + column.name;
@@ -107,7 +120,8 @@ const Column* Log::Find(std::string_view name) const {
   }
   for (const auto& column : columns) {
     if (column.unit.empty()) continue;
-    if (EqualApartFromBlanks(column.name + "[" + column.unit + "]", name) || EqualApartFromBlanks(column.name + "(" + column.unit + ")", name)) {
+    if (EqualApartFromBlanks(column.name + "[" + column.unit + "]", name) ||
+        EqualApartFromBlanks(column.name + "(" + column.unit + ")", name)) {
       return &column;
     }
   }
@@ -121,7 +135,8 @@ std::vector<std::string> Log::ColumnNames() const {
 }
 
 std::string Log::Where(std::size_t row) const {
-  const auto after = std::upper_bound(lines.begin(), lines.end(), row, [](std::size_t r, const LineAnchor& a) { return r < a.row; });
+  const auto after =
+      std::upper_bound(lines.begin(), lines.end(), row, [](std::size_t r, const LineAnchor& a) { return r < a.row; });
   if (after == lines.begin()) return At(path, header_line);
   const LineAnchor& anchor = *(after - 1);
   return At(path, anchor.line + (row - anchor.row));

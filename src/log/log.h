@@ -22,11 +22,11 @@ struct Column {
 
 // Something that was noticed or repaired while reading: never silent, always counted.
 struct Finding {
-  std::string kind;    // "missing", "repeated_stamp", "time_reversal", "gap", "saturation", "wrap", ...
-  std::string column;  // empty: the whole row
+  std::string kind;         // "missing", "repeated_stamp", "time_reversal", "gap", "saturation", "wrap", ...
+  std::string column = {};  // empty: the whole row
   std::size_t count = 0;
   std::size_t first_row = 0;  // row index of the first one, 0-based
-  std::string text;           // one sentence for the user, saying what was done about it
+  std::string text = {};      // one sentence for the user, saying what was done about it
 };
 
 // Row `row` stands on line `line` (1-based) of the file, and the rows after it on the lines after it, one each, up to
@@ -65,12 +65,12 @@ struct Companion {
 
 struct ReadOptions {
   LogFormat format = LogFormat::kAuto;
-  std::vector<Companion> companions;
+  std::vector<Companion> companions = {};
 };
 
-// Reads a log. Errors name file and line (and column): absent, empty, binary, UTF-16, no header, wrong number of fields,
-// not a number, unterminated quote, endless line, invalid JSON, unequal companion, more than 10^9 values. Companions
-// whose rows differ by one are cut to the shorter file (Finding "companion_rows").
+// Reads a log. Errors name file and line (and column): absent, empty, binary, UTF-16, no header, wrong number of
+// fields, not a number, unterminated quote, endless line, invalid JSON, unequal companion, more than 10^9 values.
+// Companions whose rows differ by one are cut to the shorter file (Finding "companion_rows").
 Result<Log> ReadLog(const std::string& path, const ReadOptions& options);
 
 }  // namespace gapscope

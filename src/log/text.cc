@@ -1,10 +1,10 @@
 #include "src/log/text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cstring>
-
-#include <fmt/format.h>
 
 namespace gapscope {
 namespace {
@@ -22,7 +22,9 @@ constexpr std::array kMagics = {
     Magic{"\x1f\x8b"sv, "gzip data", "unpack it first: gunzip FILE"},
     Magic{"PK\x03\x04"sv, "a ZIP archive (XLSX, NPZ, MLX ...)", kExport},
     Magic{"\x28\xb5\x2f\xfd"sv, "Zstandard data", "unpack it first: unzstd FILE"},
-    Magic{"\xfd" "7zXZ"sv, "XZ data", "unpack it first: unxz FILE"},
+    Magic{"\xfd"
+          "7zXZ"sv,
+          "XZ data", "unpack it first: unxz FILE"},
     Magic{"BZh"sv, "bzip2 data", "unpack it first: bunzip2 FILE"},
     Magic{"MATLAB 5.0 MAT-file"sv, "a MATLAB MAT file", "export it as CSV: writetable(timetable2table(tt), 'log.csv')"},
     Magic{"MATLAB 7.3 MAT-file"sv, "a MATLAB MAT file", "export it as CSV: writetable(timetable2table(tt), 'log.csv')"},
@@ -34,12 +36,17 @@ constexpr std::array kMagics = {
     Magic{"\x93NUMPY"sv, "a NumPy array", "export it as CSV: numpy.savetxt('log.csv', a, delimiter=',', header='t,x')"},
     Magic{"\x89PNG"sv, "a PNG picture", "name the log itself"},
     Magic{"%PDF"sv, "a PDF document", "name the log itself"},
-    Magic{"\x7f" "ELF"sv, "a program", "name the log itself"},
+    Magic{"\x7f"
+          "ELF"sv,
+          "a program", "name the log itself"},
 };
 
 Error Refused(std::string what, std::string where, std::string actual, std::string cure) {
-  return Error{.what = std::move(what), .where = std::move(where), .actual = std::move(actual),
-               .allowed = "text in ASCII or UTF-8", .cure = std::move(cure)};
+  return Error{.what = std::move(what),
+               .where = std::move(where),
+               .actual = std::move(actual),
+               .allowed = "text in ASCII or UTF-8",
+               .cure = std::move(cure)};
 }
 
 // UTF-16 without a mark: every other byte of the first ones is zero.
@@ -155,7 +162,8 @@ Status CheckText(const std::string& path, std::string_view bytes) {
     return Refused("the log is empty", start, fmt::format("{} bytes, none of them text", bytes.size()),
                    "was the recording stopped before anything was written?");
   }
-  const bool marked = bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF") || bytes.starts_with("\0\0\xFE\xFF"sv);
+  const bool marked =
+      bytes.starts_with("\xFF\xFE") || bytes.starts_with("\xFE\xFF") || bytes.starts_with("\0\0\xFE\xFF"sv);
   if (marked || LooksLikeUtf16(bytes)) {
     return Refused("the log is not in UTF-8", start, "UTF-16 or UTF-32 text",
                    "convert it: iconv -f UTF-16 -t UTF-8 FILE > log.csv");
@@ -173,8 +181,8 @@ Status CheckText(const std::string& path, std::string_view bytes) {
   for (std::size_t i = 0; i < head.size(); ++i) {
     const auto c = static_cast<unsigned char>(head[i]);
     if (c < 0x20 && c != '\t' && c != '\n' && c != '\r' && c != '\f') {
-      return Refused("the log is not text", At(path, PositionOf(bytes, i)), fmt::format("the control character \\x{:02x}", c),
-                     "is this a binary file? Export the log as CSV");
+      return Refused("the log is not text", At(path, PositionOf(bytes, i)),
+                     fmt::format("the control character \\x{:02x}", c), "is this a binary file? Export the log as CSV");
     }
   }
   return Ok();

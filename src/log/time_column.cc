@@ -1,12 +1,12 @@
 #include "src/log/time_column.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "src/core/units.h"
 #include "src/log/text.h"
@@ -18,16 +18,32 @@ struct UnitWord {
   std::string_view word, unit;
 };
 constexpr std::array kUnitWords = {
-    UnitWord{"s", "s"},       UnitWord{"sec", "s"},     UnitWord{"secs", "s"},    UnitWord{"second", "s"}, UnitWord{"seconds", "s"},
-    UnitWord{"ms", "ms"},     UnitWord{"msec", "ms"},   UnitWord{"millis", "ms"}, UnitWord{"milliseconds", "ms"},
-    UnitWord{"us", "us"},     UnitWord{"usec", "us"},   UnitWord{"micros", "us"}, UnitWord{"microseconds", "us"},
-    UnitWord{"\xC2\xB5s", "us"}, UnitWord{"\xCE\xBCs", "us"},
-    UnitWord{"ns", "ns"},     UnitWord{"nsec", "ns"},   UnitWord{"nanos", "ns"},  UnitWord{"nanoseconds", "ns"},
-    UnitWord{"min", "min"},   UnitWord{"minutes", "min"},
+    UnitWord{"s", "s"},
+    UnitWord{"sec", "s"},
+    UnitWord{"secs", "s"},
+    UnitWord{"second", "s"},
+    UnitWord{"seconds", "s"},
+    UnitWord{"ms", "ms"},
+    UnitWord{"msec", "ms"},
+    UnitWord{"millis", "ms"},
+    UnitWord{"milliseconds", "ms"},
+    UnitWord{"us", "us"},
+    UnitWord{"usec", "us"},
+    UnitWord{"micros", "us"},
+    UnitWord{"microseconds", "us"},
+    UnitWord{"\xC2\xB5s", "us"},
+    UnitWord{"\xCE\xBCs", "us"},
+    UnitWord{"ns", "ns"},
+    UnitWord{"nsec", "ns"},
+    UnitWord{"nanos", "ns"},
+    UnitWord{"nanoseconds", "ns"},
+    UnitWord{"min", "min"},
+    UnitWord{"minutes", "min"},
 };
-constexpr std::array<std::string_view, 14> kTimeWords = {"t",       "time",         "timestamp",   "timestamps",   "time_stamp",
-                                                         "stamp",   "elapsed",      "elapsed_time", "elapsedtime", "sim_time",
-                                                         "simtime", "header.stamp", "clock",       "log_time"};
+constexpr std::array<std::string_view, 18> kTimeWords = {
+    "t",       "time",         "timestamp",   "timestamps", "time_stamp", "stamp",
+    "elapsed", "elapsed_time", "elapsedtime", "sim_time",   "simtime",    "header.stamp",
+    "clock",   "log_time",     "zeit",        "temps",      "tiempo",     "tempo"};
 
 std::optional<double> SecondsPer(std::string_view unit) {
   if (unit == "s") return 1;
@@ -109,7 +125,8 @@ TimeUnit Guess(const Column& column) {
   for (const char* unit : {"s", "ms", "us", "ns"}) {
     const double factor = *SecondsPer(unit), stamp_s = steps->first * factor;
     if (stamp_s >= kYear2000_s && stamp_s < kYear2100_s) {
-      return {unit, factor, fmt::format("taken to be in {}, since its first value {:.10g} is then a date", unit, steps->first)};
+      return {unit, factor,
+              fmt::format("taken to be in {}, since its first value {:.10g} is then a date", unit, steps->first)};
     }
   }
   const char* unit = steps->median < 1 ? "s" : steps->median < 500 ? "ms" : steps->median < 5e5 ? "us" : "ns";
@@ -130,9 +147,31 @@ bool IsTimeName(std::string_view name) { return IsTimeWord(SplitUnitSuffix(Norma
 bool LooksLikeUnit(std::string_view text) {
   if (text.empty() || text.size() > 20) return false;
   if (text == "-" || text == "s" || !UnitOfWord(ToLower(text)).empty() || ParseUnit(text).ok()) return true;
-  static constexpr std::array<std::string_view, 24> kMore = {
-      "\xC2\xB0", "\xC2\xB0/s", "\xC2\xB0" "C", "C",     "K",      "degrees", "radians", "radian",   "degree", "Hz",    "volt", "volts",
-      "amp",      "amps",       "kV",           "N*m",   "N.m",    "N\xC2\xB7m", "rad/sec", "deg/sec", "rad/s2", "m/s2", "m/s^2", "counts"};
+  static constexpr std::array<std::string_view, 24> kMore = {"\xC2\xB0",
+                                                             "\xC2\xB0/s",
+                                                             "\xC2\xB0"
+                                                             "C",
+                                                             "C",
+                                                             "K",
+                                                             "degrees",
+                                                             "radians",
+                                                             "radian",
+                                                             "degree",
+                                                             "Hz",
+                                                             "volt",
+                                                             "volts",
+                                                             "amp",
+                                                             "amps",
+                                                             "kV",
+                                                             "N*m",
+                                                             "N.m",
+                                                             "N\xC2\xB7m",
+                                                             "rad/sec",
+                                                             "deg/sec",
+                                                             "rad/s2",
+                                                             "m/s2",
+                                                             "m/s^2",
+                                                             "counts"};
   return std::find(kMore.begin(), kMore.end(), text) != kMore.end();
 }
 
@@ -142,8 +181,12 @@ Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted) 
     found = log.Find(wanted);
     if (!found) {
       const std::string nearest = Nearest(wanted, log.ColumnNames());
-      return Error{.what = "no column '" + wanted + "' for the time", .where = log.WhereHeader(), .actual = "columns " + Joined(log.ColumnNames()),
-                   .allowed = "", .cure = nearest.empty() ? "name the time column in the experiment file" : "did you mean '" + nearest + "'?"};
+      return Error{
+          .what = "no column '" + wanted + "' for the time",
+          .where = log.WhereHeader(),
+          .actual = "columns " + Joined(log.ColumnNames()),
+          .allowed = "",
+          .cure = nearest.empty() ? "name the time column in the experiment file" : "did you mean '" + nearest + "'?"};
     }
   }
   for (const auto& column : log.columns) {
@@ -153,13 +196,18 @@ Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted) 
     if (!found && IsLooselyTimeName(column.name)) found = &column;
   }
   if (!found) {
-    return Error{.what = "no time column", .where = log.WhereHeader(), .actual = "columns " + Joined(log.ColumnNames()),
+    return Error{.what = "no time column",
+                 .where = log.WhereHeader(),
+                 .actual = "columns " + Joined(log.ColumnNames()),
                  .allowed = "a column named time_s, t, time, timestamp, __time ...",
                  .cure = "name it in the experiment file: log: {time: {column: NAME, unit: s}}"};
   }
   if (std::none_of(found->values.begin(), found->values.end(), [](double t) { return std::isfinite(t); })) {
-    return Error{.what = "the time column '" + found->name + "' holds no number at all", .where = log.Where(0),
-                 .actual = fmt::format("{} rows without a stamp", found->values.size()), .allowed = "a stamp in every row", .cure = ""};
+    return Error{.what = "the time column '" + found->name + "' holds no number at all",
+                 .where = log.Where(0),
+                 .actual = fmt::format("{} rows without a stamp", found->values.size()),
+                 .allowed = "a stamp in every row",
+                 .cure = "name another time column in the experiment file: log: {time: {column: NAME, unit: s}}"};
   }
   return found;
 }
@@ -169,8 +217,11 @@ Result<TimeUnit> FindTimeUnit(const Log& log, const Column& column, const std::s
   if (!stated.empty()) {
     const std::string_view unit = UnitOfWord(ToLower(stated));
     if (unit.empty()) {
-      return Error{.what = "'" + stated + "' is not a unit of time", .where = log.WhereHeader() + ", column " + column.name,
-                   .actual = "", .allowed = "s, ms, us, ns, min", .cure = "correct it, or state the unit in the experiment file"};
+      return Error{.what = "'" + stated + "' is not a unit of time",
+                   .where = log.WhereHeader() + ", column " + column.name,
+                   .actual = "",
+                   .allowed = "s, ms, us, ns, min",
+                   .cure = "correct it, or state the unit in the experiment file"};
     }
     return TimeUnit{std::string(unit), *SecondsPer(unit), ""};
   }

@@ -20,9 +20,9 @@ bool LooksLikeUnit(std::string_view text);
 Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted);
 
 struct TimeUnit {
-  std::string name;    // "s", "ms", "us", "ns", "min"
+  std::string name;     // "s", "ms", "us", "ns", "min"
   double factor_s = 1;  // seconds per unit
-  std::string guess;   // empty: stated by the caller, the heading or the name; else a sentence that says why
+  std::string guess;    // empty: stated by the caller, the heading or the name; else a sentence that says why
 };
 
 // The unit of the stamps, from the first of these that tells:

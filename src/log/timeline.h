@@ -14,18 +14,20 @@ namespace gapscope {
 // first row stays). Where the clock starts again for several rows (a reset, or recordings joined), the longest stretch
 // between such places is kept. A counter of 16 or 32 bits that wraps is carried on: no row is lost.
 enum class TimeRepair { kError, kDropRows };
-enum class MissingRepair { kError, kDropRows, kHold };   // NaN in a column that is used
-enum class WrapRepair { kKeep, kUnwrap };                // an encoder angle that jumps by a whole turn
+enum class MissingRepair { kError, kDropRows, kHold };  // NaN in a column that is used
+enum class WrapRepair { kKeep, kUnwrap };               // an encoder angle that jumps by a whole turn
 
 struct TimelineOptions {
-  std::string time_column;      // empty: the first column named like a time ("time_s", "t", "timestamp", "__time", ...)
-  std::string time_unit;        // "s", "ms", "us", "ns"; empty: from the name, then from the size of the steps
+  std::string time_column =
+      {};                      // empty: the first column named like a time ("time_s", "t", "timestamp", "__time", ...)
+  std::string time_unit = {};  // "s", "ms", "us", "ns"; empty: from the name, then from the size of the steps
   TimeRepair repeated = TimeRepair::kDropRows;
   TimeRepair reversed = TimeRepair::kDropRows;
   // For rows without a stamp kHold means kDropRows: a time cannot be held.
   MissingRepair missing = MissingRepair::kHold;
-  std::vector<std::string> required;  // with missing = kDropRows: rows with NaN in any of these columns are dropped
-  double gap_factor = 5;        // a step longer than this many median steps is reported as a gap
+  std::vector<std::string> required =
+      {};                 // with missing = kDropRows: rows with NaN in any of these columns are dropped
+  double gap_factor = 5;  // a step longer than this many median steps is reported as a gap
 };
 
 struct Timeline {
@@ -38,17 +40,17 @@ struct Timeline {
   std::vector<Finding> findings;
 };
 
-// How the time column and its unit are found: src/log/time_column.h. Findings: "missing_stamp", "missing" (rows dropped),
-// "clock_wrap", "clock_reset", "time_reversal", "repeated_stamp", "gap", "irregular", "time_unit", "time_unit_doubt".
-// Errors: no time column, no unit that makes sense (median step within 10 ns .. 1000 s), fewer than two rows left, a
-// policy of kError that was violated.
+// How the time column and its unit are found: src/log/time_column.h. Findings: "missing_stamp", "missing" (rows
+// dropped), "clock_wrap", "clock_reset", "time_reversal", "repeated_stamp", "gap", "irregular", "time_unit",
+// "time_unit_doubt". Errors: no time column, no unit that makes sense (median step within 10 ns .. 1000 s), fewer than
+// two rows left, a policy of kError that was violated.
 Result<Timeline> BuildTimeline(const Log& log, const TimelineOptions& options);
 
 // One column on the timeline, scaled: value = factor * raw + offset. NaN are repaired by `missing` (kDropRows is
 // treated as kError here: rows are dropped in BuildTimeline only for columns listed in `required`).
 // Values before the first one that is there take that one. `wrap_period` > 0 with kUnwrap removes jumps by that many SI
 // units, taking each step as the shortest way round: right while the angle moves less than half a turn between rows.
-// Findings: "missing", "wrap" (also with kKeep, then as a warning), "saturation".
+// Findings: "held" (of a missing value), "wrap" (also with kKeep, then as a warning), "saturation".
 // Errors: a NaN under kError or kDropRows, no value at all, a value that is not finite once scaled.
 struct ColumnOptions {
   double factor = 1, offset = 0;

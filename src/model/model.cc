@@ -75,6 +75,7 @@ Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, 
   GS_ASSIGN(Structure structure, Structure::Load(model->experiment_));
   for (const auto& use : effects) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
+  structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step
   model->parameters_ = structure.parameters;
   try {
     model->compiled_.reset(mj_compile(structure.spec.get(), nullptr));

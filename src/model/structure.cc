@@ -6,6 +6,7 @@
 #include <set>
 
 #include "src/core/units.h"
+#include "src/experiment/expression.h"
 
 namespace gapscope {
 namespace {
@@ -35,18 +36,19 @@ void Combine(Structure::Terms& terms, const std::string& key, const std::string&
   entry->second = key == "torque_limit_n_m" || key == "power_w" ? "min(" + entry->second + "," + expression + ")" : entry->second + "+(" + expression + ")";
 }
 
-using Attributes = std::map<std::string, std::string, std::less<>>;
-
-// A plugin instance of that name; an existing one is returned as it stands.
-void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& instance, const Attributes& attributes) {
+// A plugin instance of that name. Its attributes stand in custom texts: mjSpec's attribute map is a C++ object that crosses no library boundary.
+void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& instance, const std::map<std::string, std::string>& attributes) {
   mjs_activatePlugin(spec, plugin.c_str());
   mjsPlugin* element = mjs_addPlugin(spec);
   mjs_setName(element->element, instance.c_str());
   mjs_setString(element->name, instance.c_str());
   mjs_setString(element->plugin_name, plugin.c_str());
   element->active = 1;
-  Attributes copy = attributes;
-  mjs_setPluginAttributes(element, &copy);
+  for (const auto& [key, value] : attributes) {
+    mjsText* text = mjs_addText(spec);
+    mjs_setName(text->element, (instance + "." + key).c_str());
+    mjs_setString(text->data, value.c_str());
+  }
 }
 
 void Attach(mjsPlugin* use, const std::string& plugin, const std::string& instance) {
@@ -65,6 +67,13 @@ Result<Structure> Structure::Load(const Experiment& experiment) {
     std::string text = message;
     std::replace(text.begin(), text.end(), '\n', ' ');
     return Error{.what = "cannot read the MJCF: " + text, .where = experiment.model_path};
+  }
+  const SpecPtr copy(mj_copySpec(structure.spec.get()));
+  structure.base_.reset(mj_compile(copy.get(), nullptr));
+  if (!structure.base_) {
+    std::string text = mjs_getError(copy.get());
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    return Error{.what = "the MJCF does not compile: " + text, .where = experiment.model_path};
   }
   structure.experiment_ = &experiment;
   structure.parameters = experiment.parameters;
@@ -120,14 +129,11 @@ bool Structure::IsServo(const std::string& actuator) const {
   const mjsActuator* found = FindActuator(actuator);
   if (!found) return false;
   if (!found->plugin.active) return found->biastype == mjBIAS_AFFINE && found->biasprm[1] != 0;
-  const std::string instance = mjs_getString(found->plugin.name);
-  for (mjsElement* e = mjs_firstElement(spec.get(), mjOBJ_PLUGIN); e; e = mjs_nextElement(spec.get(), e)) {
-    if (NameOf(e) != instance) continue;
-    const auto* attributes = static_cast<const Attributes*>(mjs_getPluginAttributes(mjs_asPlugin(e)));
-    const auto law = attributes ? attributes->find("law") : Attributes::const_iterator{};
-    return attributes && law != attributes->end() && (law->second == "position" || law->second == "duty");
-  }
-  return false;
+  // A plugin's law is only known to the compiled model.
+  const int id = mj_name2id(base_.get(), mjOBJ_ACTUATOR, actuator.c_str());
+  const int instance = id < 0 ? -1 : base_->actuator_plugin[id];
+  const char* law = instance < 0 ? nullptr : mj_getPluginConfig(base_.get(), instance, "law");
+  return law && (std::string_view(law) == "position" || std::string_view(law) == "duty");
 }
 
 bool Structure::HasSpring(const std::string& joint) const {
@@ -209,6 +215,14 @@ void Structure::AddNumeric(const std::string& name, double value) {
   mjs_setName(numeric->element, name.c_str());
   mjs_setDouble(numeric->data, &value, 1);
   numeric->size = 1;
+}
+
+double Structure::NominalOf(const std::string& expression) const {
+  std::map<std::string, double> values;
+  for (const auto& parameter : parameters) values[parameter.name] = parameter.nominal;
+  for (const auto& value : experiment_->values) values[value.name] = value.fallback.value_or(1);
+  const auto result = EvaluateOnce(expression, values, "effect");
+  return result.ok() ? result.value() : 0;
 }
 
 Status Structure::Finish() {
@@ -328,9 +342,10 @@ Status Structure::FinishMotors() {
       }
     }
     // Lags and the sag keep their state in activations of the first actuator.
+    drive->actdim = std::max(0, drive->actdim);  // MuJoCo's default, -1, counts as none
     for (const char* stage : {"time_constant_s", "second_time_constant_s", "sag_fraction"}) drive->actdim += terms.contains(stage) ? 1 : 0;
     for (const auto& [key, expression] : terms) {
-      AddNumeric(instance + "." + key, 0);
+      AddNumeric(instance + "." + key, NominalOf(expression));
       Set("numeric/" + instance + "." + key, {expression});
     }
   }
@@ -345,7 +360,7 @@ Status Structure::FinishFriction() {
     const mjtNum solimp[] = {0.9999, 0.9999, 0.001, 0.5, 2};
     std::copy_n(solimp, mjNIMP, element->solimp_friction);
     element->solref_friction[0] = -1;
-    element->solref_friction[1] = -1 / spec->option.timestep;
+    element->solref_friction[1] = -0.9999 / spec->option.timestep;  // at -1/h stops give energy back
     const std::string base = "joint/" + joint + "/frictionloss";
     const auto set = std::find_if(settings.begin(), settings.end(), [&](const FieldSetting& s) { return s.field == base; });
     const std::string base_level = set != settings.end() ? set->expressions.front() : TextOf(element->frictionloss);
@@ -363,10 +378,10 @@ Status Structure::FinishFriction() {
       return Error{.what = "the body of joint '" + joint + "' already has a plugin", .where = experiment_->model_path, .actual = mjs_getString(body->plugin.plugin_name),
                    .allowed = "one plugin per body", .cure = "move it to a body of its own"};
     }
-    AddInstance(spec.get(), "gapscope.friction", instance, {{"joint", joint}});
+    AddInstance(spec.get(), "gapscope.friction", instance, {{"joint", joint}, {"row_softness", "0.01"}});
     Attach(&body->plugin, "gapscope.friction", instance);
     for (const auto& [key, expression] : terms) {
-      AddNumeric(instance + "." + key, 0);
+      AddNumeric(instance + "." + key, NominalOf(expression));
       Set("numeric/" + instance + "." + key, {expression});
     }
     if (terms.contains("load_coefficient")) {
@@ -401,7 +416,7 @@ Status Structure::FinishSprings() {
     AddInstance(spec.get(), "gapscope.spring", instance, {{"joint", joint}});
     Attach(&holder->plugin, "gapscope.spring", instance);
     for (const auto& [key, expression] : terms) {
-      AddNumeric(instance + "." + key, 0);
+      AddNumeric(instance + "." + key, NominalOf(expression));
       Set("numeric/" + instance + "." + key, {expression});
     }
   }

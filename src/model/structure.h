@@ -64,9 +64,11 @@ class Structure {
   Status FinishMotors();
   Status FinishFriction();
   Status FinishSprings();
+  double NominalOf(const std::string& expression) const;
   void AddNumeric(const std::string& name, double value);
 
   const Experiment* experiment_ = nullptr;
+  ModelPtr base_;  // compiled, without effects
   std::map<std::string, Terms> motor_, friction_, spring_;  // by joint
 };
 

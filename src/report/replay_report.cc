@@ -5,11 +5,10 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "src/core/file.h"
-#include "src/report/version.h"
+#include "src/report/json.h"
 
 namespace gapscope {
 namespace {
@@ -26,9 +25,6 @@ const char* ModeName(ReplayMode mode) {
 }
 
 const char* OutcomeName(Outcome outcome) { return outcome == Outcome::kCompleted ? "completed" : "diverged"; }
-
-// Not a number and infinity have no place in JSON.
-ordered_json Number(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
 
 // The end of a path that fits `width`.
 std::string Shorten(const std::string& path, std::size_t width) {
@@ -77,22 +73,21 @@ std::string ReplayTable(const ReplayReport& report) {
 
 std::string ReplayJson(const ReplayReport& report) {
   const auto& [result, comparison, model, values, seed] = report;
-  ordered_json json = {{"schema", "gapscope.replay/1"}, {"mode", ModeName(result.mode)}, {"error", Number(comparison.error)}, {"time_step_s", result.time_step_s},
-                       {"time_step_error", Number(result.time_step_error)}, {"logs", ordered_json::array()}};
+  ordered_json json = {{"schema", "gapscope.replay/1"}, {"mode", ModeName(result.mode)}, {"error", JsonNumber(comparison.error)}, {"time_step_s", result.time_step_s},
+                       {"time_step_error", JsonNumber(result.time_step_error)}, {"logs", ordered_json::array()}};
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
     const LogComparison& log = comparison.logs[l];
     const LogReplay& replay = result.logs[l];
-    ordered_json entry = {{"log", log.log_path}, {"outcome", OutcomeName(replay.outcome)}, {"error", Number(log.error)}, {"samples", replay.time_s.size()}, {"windows", replay.windows}};
+    ordered_json entry = {{"log", log.log_path}, {"outcome", OutcomeName(replay.outcome)}, {"error", JsonNumber(log.error)}, {"samples", replay.time_s.size()}, {"windows", replay.windows}};
     if (replay.outcome == Outcome::kDiverged) entry["diverged_at_s"] = replay.diverged_at_s;
     entry["signals"] = ordered_json::object();
     for (const SignalScore& s : log.signals) {
-      entry["signals"][s.signal] = {{"rmse", Number(s.rmse)}, {"mae", Number(s.mae)}, {"nrmse", Number(s.nrmse)}, {"max", Number(s.max)}, {"lag_s", Number(s.lag_s)},
-                                    {"correlation", Number(s.correlation)}};
+      entry["signals"][s.signal] = JsonScore(s);
     }
     entry["where"] = ordered_json::array();
     for (const ConditionShare& w : log.where) {
-      entry["where"].push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", Number(w.share_of_error)}, {"share_of_time", Number(w.share_of_time)},
-                                {"low", Number(w.low)}, {"high", Number(w.high)}});
+      entry["where"].push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", JsonNumber(w.share_of_error)}, {"share_of_time", JsonNumber(w.share_of_time)},
+                                {"low", JsonNumber(w.low)}, {"high", JsonNumber(w.high)}});
     }
     json["logs"].push_back(std::move(entry));
   }
@@ -104,7 +99,7 @@ std::string ReplayJson(const ReplayReport& report) {
   }
   json["cost"] = {{"wall_s", result.wall_s}, {"simulated_s", result.simulated_s}, {"steps", result.steps}};
   json["seed"] = seed;
-  json["versions"] = {{"gapscope", GapscopeVersion()}, {"mujoco", MujocoVersion()}};
+  json["versions"] = JsonVersions();
   return json.dump(2);
 }
 

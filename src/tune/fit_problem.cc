@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "src/tune/journal.h"
+
 namespace gapscope {
 namespace {
 
@@ -11,6 +13,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The log's own initial state counts as much as this many samples at the window's start.
 constexpr double kStatePriorSamples = 5;
 constexpr double kOffsetBound_rad = 0.3;
+// Of the sum of squares, per residual and squared range of a coordinate.
+constexpr double kAnchor = 1e-8;
+constexpr double kBlock_s = 0.5;
 
 }  // namespace
 
@@ -80,7 +85,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       const double deviation = std::max(std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count))), measured.spec.resolution);
       if (!(deviation > 0)) continue;
       scalings[s].deviation = deviation;
-      if (measured.spec.scored) scalings[s].weight = 1 / deviation;
+      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / deviation : options_.weights[measured.index];
       if (measured.spec.kind != SignalKind::kPosition) continue;
       const SignalSource& source = model.source(measured.index);
       if (options_.fit_offsets) {
@@ -92,7 +97,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
         scalings[s].joint_state = static_cast<int>(2 * prototype.qpos.size());
         prototype.qpos.push_back(source.qpos);
         prototype.dof.push_back(source.dof);
-        const double weight = std::sqrt(kStatePriorSamples) / deviation;
+        const double weight = std::sqrt(kStatePriorSamples) * (scalings[s].weight > 0 ? scalings[s].weight : 1 / deviation);
         prior.push_back(weight);
         prior.push_back(weight * kInitialFitHalfWidth_s);
       }
@@ -124,7 +129,22 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
   }
   low_ = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
   high_ = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));
+  anchor_ = Start().y;
+  double scale = 1;
+  if (!options_.weights.empty()) {
+    // In units of the signals' standard deviations, as without weights.
+    scale = 0;
+    for (const auto& log : scaling_) {
+      for (const auto& scaling : log) scale = std::max(scale, scaling.weight * scaling.deviation);
+    }
+    scale *= scale;
+  }
+  anchor_weight_ = kAnchor * scale * static_cast<double>(residuals()) * (high_ - low_).cwiseAbs2().cwiseMax(1e-12).cwiseInverse();
 }
+
+double FitProblem::AnchorCost(const FitPoint& point) const { return 0.5 * anchor_weight_.cwiseProduct((point.y - anchor_).cwiseAbs2()).sum(); }
+
+std::size_t FitProblem::windows() const { return windows_.size(); }
 
 std::size_t FitProblem::residuals() const {
   std::size_t count = 0;
@@ -159,7 +179,7 @@ double FitProblem::Offset(const FitPoint& point, std::size_t log, std::size_t si
   return scaling.offset < 0 ? 0 : point.y[scaling.offset] * scaling.deviation;
 }
 
-double FitProblem::Shift(const FitPoint& point) const { return shift_scale_s_ == 0 ? 0 : point.y[point.y.size() - 1] * shift_scale_s_; }
+double FitProblem::Shift(const FitPoint& point) const { return shift_scale_s_ == 0 ? options_.shift_s : point.y[point.y.size() - 1] * shift_scale_s_; }
 
 FitProblem::Worker& FitProblem::GetWorker(int index) {
   if (!workers_[index]) workers_[index] = std::make_unique<Worker>(model_, options_.time_step_s);
@@ -223,6 +243,20 @@ double FitProblem::WindowCost(const Eigen::VectorXd& residual, const FitWindow& 
 }
 
 double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs) {
+  ++evaluations_;
+  if (!journal_) return CostNow(point, log_costs);
+  std::vector<double> record;
+  if (!journal_->Next(point, &record)) {
+    std::vector<double> costs;
+    record = {CostNow(point, &costs)};
+    record.insert(record.end(), costs.begin(), costs.end());
+    journal_->Append(point, record);
+  }
+  if (log_costs) log_costs->assign(record.begin() + 1, record.end());
+  return record[0];
+}
+
+double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs) {
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<double> costs(windows_.size());
@@ -243,6 +277,7 @@ double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs) {
     total += costs[w];
     if (log_costs) (*log_costs)[windows_[w].log] += costs[w];
   }
+  total += AnchorCost(point);
   return std::isnan(total) ? kInfinity : total;
 }
 
@@ -265,14 +300,26 @@ void FitProblem::UpdateRobustScale(const FitPoint& point) {
   huber_threshold_ = options_.huber * 1.4826 * all[all.size() / 2];  // the median of |r| as a standard deviation
 }
 
-Linearization FitProblem::Linearize(const FitPoint& point, double step) {
-  const Eigen::Index n = low_.size(), parameters = static_cast<Eigen::Index>(coordinates_.size());
+Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns columns) {
+  ++evaluations_;
+  if (!journal_) return LinearizeNow(point, step, columns);
+  std::vector<double> record;
+  if (journal_->Next(point, &record)) return Unpack(record);
+  Linearization result = LinearizeNow(point, step, columns);
+  journal_->Append(point, Pack(result));
+  return result;
+}
+
+Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Columns columns) {
+  const bool all = columns == Columns::kAll;
+  const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0;
   struct Part {
     double cost = 0;
     Eigen::MatrixXd hessian;
     Eigen::VectorXd gradient;
     Eigen::MatrixXd gain;
     Eigen::VectorXd state_step;
+    std::vector<Eigen::VectorXd> blocks;
     bool valid = false;
   };
   std::vector<Part> parts(windows_.size());
@@ -306,7 +353,7 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step) {
       }
       worker.values[c.parameter] = values[c.parameter];
     }
-    if (shift_scale_s_ > 0) {
+    if (all && shift_scale_s_ > 0) {
       constexpr double kShiftStep = 0.2;  // samples
       difference(n - 1, kShiftStep, Simulate(worker, window, point, values, state, shift + kShiftStep * shift_scale_s_, worker.perturbed));
     }
@@ -320,7 +367,7 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step) {
     // An offset moves its own prediction, and the start the other way.
     for (std::size_t s = 0; s < signals; ++s) {
       const Scaling& scaling = scaling_[window.log][s];
-      if (scaling.offset < 0) continue;
+      if (scaling.offset < 0 || !all) continue;
       auto column = worker.jacobian.col(scaling.offset);
       if (scaling.joint_state >= 0) {
         column = -scaling.deviation * worker.jacobian.col(n + scaling.joint_state);
@@ -364,8 +411,26 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step) {
       part.state_step.resize(0);
     }
     part.valid = true;
+    if (!all) return;
+    // The gradient once more in blocks of time, at the states' optimum: rows less what the states take.
+    const Eigen::MatrixXd reduced = m > 0 ? Eigen::MatrixXd(worker.jacobian.leftCols(n) - worker.jacobian.rightCols(m) * part.gain) : Eigen::MatrixXd(worker.jacobian.leftCols(n));
+    const Eigen::VectorXd after = m > 0 ? Eigen::VectorXd(worker.residual + worker.jacobian.rightCols(m) * part.state_step) : worker.residual;
+    const Eigen::Index scored = static_cast<Eigen::Index>(window.rows.rows() - window.first_scored);
+    const double* time = recordings_[window.log].time_s.data() + window.rows.begin + window.first_scored;
+    for (Eigen::Index begin = 0; begin < scored;) {
+      Eigen::Index end = begin + 1;
+      while (end < scored && time[end] - time[begin] < kBlock_s) ++end;
+      if (end < scored && time[scored - 1] - time[end] < 0.5 * kBlock_s) end = scored;
+      Eigen::VectorXd block = Eigen::VectorXd::Zero(n);
+      for (std::size_t s = 0; s < signals; ++s) {
+        const Eigen::Index first = static_cast<Eigen::Index>(s) * scored + begin;
+        block += reduced.middleRows(first, end - begin).transpose() * after.segment(first, end - begin);
+      }
+      part.blocks.push_back(std::move(block));
+      begin = end;
+    }
   });
-  replays_ += 1 + static_cast<std::size_t>(parameters) + (shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
+  replays_ += 1 + static_cast<std::size_t>(parameters) + (all && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
   Linearization result;
   result.hessian = Eigen::MatrixXd::Zero(n, n);
   result.gradient = Eigen::VectorXd::Zero(n);
@@ -376,11 +441,52 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step) {
     result.cost += part.cost;
     result.hessian += part.hessian;
     result.gradient += part.gradient;
-    result.window_gradients.push_back(std::move(part.gradient));
+    for (auto& block : part.blocks) result.block_gradients.push_back(std::move(block));
     result.state_gain.push_back(std::move(part.gain));
     result.state_step.push_back(std::move(part.state_step));
   }
+  result.cost += AnchorCost(point);
+  result.gradient += anchor_weight_.cwiseProduct(point.y - anchor_);
+  result.hessian.diagonal() += anchor_weight_;
   return result;
+}
+
+std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
+  std::vector<LogReplay> logs(recordings_.size());
+  for (std::size_t l = 0; l < recordings_.size(); ++l) {
+    logs[l].log_path = recordings_[l].log_path;
+    logs[l].time_s = recordings_[l].time_s;
+    for (const auto& measured : recordings_[l].measured) {
+      logs[l].signals.push_back({.signal = measured.spec.signal, .kind = measured.spec.kind, .scored = measured.spec.scored, .resolution = measured.spec.resolution,
+                                 .measured = measured.values, .predicted = std::vector<double>(recordings_[l].rows(), std::numeric_limits<double>::quiet_NaN())});
+    }
+  }
+  const std::vector<double> values = Values(point);
+  const double shift = Shift(point);
+  std::vector<char> failed(windows_.size(), 0);
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    Worker& worker = GetWorker(index);
+    const FitWindow& window = windows_[w];
+    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) {
+      failed[w] = 1;
+      return;
+    }
+    auto& signals = logs[window.log].signals;
+    // Windows share their border row; the later one leaves it to the earlier.
+    for (std::size_t s = 0; s < signals.size(); ++s) {
+      const double offset = Offset(point, window.log, s);
+      for (std::size_t r = window.rows.begin == 0 ? 0 : 1; r < window.rows.rows(); ++r) signals[s].predicted[window.rows.begin + r] = worker.base[r * signals.size() + s] + offset;
+    }
+  });
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    LogReplay& log = logs[windows_[w].log];
+    ++log.windows;
+    if (failed[w]) {
+      ++log.diverged_windows;
+      log.outcome = Outcome::kDiverged;
+    }
+  }
+  return logs;
 }
 
 FitPoint FitProblem::Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const {

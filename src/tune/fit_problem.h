@@ -30,6 +30,8 @@ struct FitOptions {
   bool fit_offsets = true;          // zero offsets of measured positions, per log
   bool fit_shift = true;            // command shift within +-1 sample, common to all logs
   bool fit_states = true;           // initial state of each window
+  double shift_s = 0;               // where no shift is fitted: this one
+  std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 
@@ -42,6 +44,8 @@ struct Coordinate {
   double ToValue(double search) const;
 };
 
+class Journal;
+
 // One candidate solution.
 struct FitPoint {
   Eigen::VectorXd y;                    // parameters, then offsets, then the shift
@@ -53,7 +57,7 @@ struct Linearization {
   double cost = 0;
   Eigen::MatrixXd hessian;                  // Gauss-Newton, of y
   Eigen::VectorXd gradient;                 // of y, at the states' own optimum
-  std::vector<Eigen::VectorXd> window_gradients;  // reduced, per window: for cluster-robust covariances
+  std::vector<Eigen::VectorXd> block_gradients;   // reduced, per half second: for cluster-robust covariances
   std::vector<Eigen::MatrixXd> state_gain;  // dx_w = state_step - state_gain dy
   std::vector<Eigen::VectorXd> state_step;
   bool valid = false;                       // false: the point cannot be simulated
@@ -69,7 +73,7 @@ class FitProblem {
   std::size_t size() const { return low_.size(); }
   const Eigen::VectorXd& low() const { return low_; }
   const Eigen::VectorXd& high() const { return high_; }
-  std::size_t windows() const { return windows_.size(); }
+  std::size_t windows() const;
   std::size_t residuals() const;           // scored rows x signals
 
   FitPoint Start() const;
@@ -80,16 +84,26 @@ class FitProblem {
 
   // Cost; infinity where a replay diverges. `log_costs` receives each log's part.
   double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr);
-  // `step`: finite difference in search coordinates.
-  Linearization Linearize(const FitPoint& point, double step);
+  // `step`: finite difference in search coordinates. Columns of parameters, offsets and shift may be left out: the gradient and hessian are zero then.
+  enum class Columns { kAll, kStates };
+  Linearization Linearize(const FitPoint& point, double step, Columns columns = Columns::kAll);
   // Moves y by dy and each window's state by its own best answer to that.
   FitPoint Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const;
 
+  // Predictions at a point on all rows of the problem's windows, offsets added: one entry per recording.
+  std::vector<LogReplay> Predict(const FitPoint& point);
+
   std::size_t replays() const { return replays_; }   // passes over all windows
+  std::size_t evaluations() const { return evaluations_; }  // calls of Cost and Linearize
+  // Results are recorded there, and taken from there as long as the same calls come in the same order.
+  void set_journal(Journal* journal) { journal_ = journal; }
   // Huber threshold in residual units; infinity: plain squares. Set from the residuals of the last Cost().
   void UpdateRobustScale(const FitPoint& point);
 
  private:
+  Linearization LinearizeNow(const FitPoint& point, double step, Columns columns);
+  double CostNow(const FitPoint& point, std::vector<double>* log_costs);
+  double AnchorCost(const FitPoint& point) const;
   struct FitWindow;
   struct Worker;
   struct Scaling;
@@ -111,7 +125,9 @@ class FitProblem {
   std::vector<std::vector<Scaling>> scaling_;   // per log, per signal
   std::vector<std::unique_ptr<Worker>> workers_;
   double huber_threshold_;
-  std::size_t replays_ = 0;
+  Eigen::VectorXd anchor_, anchor_weight_;      // a pull to the start, weak enough to only hold directions that the logs leave open
+  Journal* journal_ = nullptr;
+  std::size_t replays_ = 0, evaluations_ = 0;
   double shift_scale_s_ = 0;                    // one sample; 0: no shift is fitted
 };
 

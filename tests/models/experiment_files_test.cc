@@ -1,5 +1,6 @@
-// Each experiment file against its MJCF: every field of `set` exists and, at the nominal values, is what the MJCF already
-// holds, so that the bare MJCF and the experiment describe the same rig; bounds, units and signals as contract.md asks.
+// Each experiment file against its MJCF: every field of `set` exists and, at the nominal values, is what the MJCF
+// already holds, so that the bare MJCF and the experiment describe the same rig; bounds, units and signals as
+// contract.md asks.
 #include <gtest/gtest.h>
 #include <muParser.h>
 #include <yaml-cpp/yaml.h>
@@ -31,7 +32,8 @@ double Evaluate(const std::string& rig, const YAML::Node& experiment, const std:
   mu::Parser parser;
   parser.DefineNameChars("0123456789_.abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ");
   parser.DefineConst("pi", 3.14159265358979323846);
-  for (const auto& p : experiment["parameters"]) parser.DefineConst(p.first.as<std::string>(), p.second["nominal"].as<double>());
+  for (const auto& p : experiment["parameters"])
+    parser.DefineConst(p.first.as<std::string>(), p.second["nominal"].as<double>());
   if (const auto found = LogValues().find(rig); found != LogValues().end()) {
     for (const auto& [name, value] : found->second) parser.DefineConst(name, value);
   }
@@ -115,7 +117,8 @@ TEST(ExperimentFilesTest, SetReproducesTheMjcfAtTheNominalValues) {
         const double value = Evaluate(rig, experiment, texts[i]);
         EXPECT_TRUE(std::isfinite(value)) << rig << ": " << field;
         if (DiffersFromItsMjcf(rig, field)) continue;
-        EXPECT_NEAR(value, (*actual)[i], kRelative * std::abs((*actual)[i]) + 1e-12) << rig << ": " << field << "[" << i << "]";
+        EXPECT_NEAR(value, (*actual)[i], kRelative * std::abs((*actual)[i]) + 1e-12)
+            << rig << ": " << field << "[" << i << "]";
       }
     }
   }
@@ -182,18 +185,21 @@ TEST(ExperimentFilesTest, SignalsAndColumnsOfTheContract) {
     EXPECT_EQ(experiment["commands"][0]["column"].as<std::string>(), column);
     EXPECT_EQ(experiment["log"]["time"]["column"].as<std::string>(), "time_s");
     // The shipped rigs' columns are named as their signals.
-    for (const auto& item : experiment["measured"]) EXPECT_EQ(item["column"].as<std::string>(), item["signal"].as<std::string>());
+    for (const auto& item : experiment["measured"])
+      EXPECT_EQ(item["column"].as<std::string>(), item["signal"].as<std::string>());
   }
 }
 
 TEST(ExperimentFilesTest, PublishedParametersNameParameters) {
   for (const char* rig : {"xl330", "sts3032"}) {
-    const YAML::Node published = YAML::LoadFile(Folder(rig) + "/published_m1.yaml"), parameters = Experiment(rig)["parameters"];
+    const YAML::Node published = YAML::LoadFile(Folder(rig) + "/published_m1.yaml"),
+                     parameters = Experiment(rig)["parameters"];
     EXPECT_GE(published.size(), 6u);
     for (const auto& p : published) {
       const YAML::Node parameter = parameters[p.first.as<std::string>()];
       ASSERT_TRUE(parameter) << rig << ": " << p.first.as<std::string>();
-      EXPECT_NEAR(p.second.as<double>(), parameter["nominal"].as<double>(), 1e-3 * std::abs(p.second.as<double>()) + 1e-5);
+      EXPECT_NEAR(p.second.as<double>(), parameter["nominal"].as<double>(),
+                  1e-3 * std::abs(p.second.as<double>()) + 1e-5);
     }
   }
 }

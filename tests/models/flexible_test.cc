@@ -30,8 +30,12 @@ struct FlexibleCase {
 // Contract and source values, written out again here.
 const std::vector<FlexibleCase>& Cases() {
   static const std::vector<FlexibleCase> cases = {
-      {"flexjoint", "base", "link",
-       {0.621 * 0.00768 * 70 / 2.6, 0.621 * 0.00768 * 0.00768 * 70 * 70 / 2.6, 0.002087, 0.015, 0.003156, 1.8426, 0.001}, 5},
+      {"flexjoint",
+       "base",
+       "link",
+       {0.621 * 0.00768 * 70 / 2.6, 0.621 * 0.00768 * 0.00768 * 70 * 70 / 2.6, 0.002087, 0.015, 0.003156, 1.8426,
+        0.001},
+       5},
       {"flexlink", "hub", "deflection", {0.3338496, 0, 0.002087, 0.015, 0.0038, 1.0936, 0.0015}, 0.6},
       {"flexlink_2dsfl", "hub", "deflection", {8.925, 0, 0.0635, 4.0, 0.1704, 39.96, 0, 0.94}, 1.4}};
   return cases;
@@ -64,8 +68,10 @@ TEST(FlexibleModelTest, LinearisedMatricesOfTheReport) {
                                       0, -p.k * both, damping,  -p.b2 * both};
     const std::array<double, 4> b = {0, 0, p.gain / p.j1, -p.gain / p.j1};
     const Linear linear = Linearise(*m, {0, 0});
-    for (int i = 0; i < 16; ++i) EXPECT_NEAR(linear.a[i], a[i], 1e-7 * std::abs(a[i]) + 1e-7) << c.rig << " A[" << i << "]";
-    for (int i = 0; i < 4; ++i) EXPECT_NEAR(linear.b[i], b[i], 1e-7 * std::abs(b[i]) + 1e-9) << c.rig << " B[" << i << "]";
+    for (int i = 0; i < 16; ++i)
+      EXPECT_NEAR(linear.a[i], a[i], 1e-7 * std::abs(a[i]) + 1e-7) << c.rig << " A[" << i << "]";
+    for (int i = 0; i < 4; ++i)
+      EXPECT_NEAR(linear.b[i], b[i], 1e-7 * std::abs(b[i]) + 1e-9) << c.rig << " B[" << i << "]";
   }
 }
 
@@ -87,7 +93,8 @@ TEST(FlexibleModelTest, EnergyIsKeptWithoutDampingAndCommand) {
     const double before = c.p.k * 0.2 * 0.2 / 2;
     for (int k = 0; k < 1000; ++k) mj_step(m.get(), d.get());
     const double tip = d->qvel[0] + d->qvel[1];
-    const double after = c.p.j1 * d->qvel[0] * d->qvel[0] / 2 + c.p.j2 * tip * tip / 2 + c.p.k * d->qpos[1] * d->qpos[1] / 2;
+    const double after =
+        c.p.j1 * d->qvel[0] * d->qvel[0] / 2 + c.p.j2 * tip * tip / 2 + c.p.k * d->qpos[1] * d->qpos[1] / 2;
     EXPECT_NEAR(after, before, 1e-4 * before) << c.rig;
   }
 }

@@ -1,4 +1,5 @@
-// What contract.md fixes about every rig: names of joints and actuators, what a base model may hold, what can be rendered.
+// What contract.md fixes about every rig: names of joints and actuators, what a base model may hold, what can be
+// rendered.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -16,12 +17,16 @@ ModelPtr LoadAny(const std::string& rig) {
 }
 
 const std::map<std::string, std::vector<std::string>>& JointNames() {
-  static const std::map<std::string, std::vector<std::string>> names = {
-      {"joint", {"joint"}},           {"qube", {"arm", "pendulum"}},
-      {"flexjoint", {"base", "link"}}, {"flexlink", {"hub", "deflection"}},
-      {"xl330", {"joint"}},           {"sts3032", {"joint"}},
-      {"ak80", {"joint"}},            {"qube_simurlacra", {"arm", "pendulum"}},
-      {"qube_koopman", {"arm", "pendulum"}}, {"flexlink_2dsfl", {"hub", "deflection"}}};
+  static const std::map<std::string, std::vector<std::string>> names = {{"joint", {"joint"}},
+                                                                        {"qube", {"arm", "pendulum"}},
+                                                                        {"flexjoint", {"base", "link"}},
+                                                                        {"flexlink", {"hub", "deflection"}},
+                                                                        {"xl330", {"joint"}},
+                                                                        {"sts3032", {"joint"}},
+                                                                        {"ak80", {"joint"}},
+                                                                        {"qube_simurlacra", {"arm", "pendulum"}},
+                                                                        {"qube_koopman", {"arm", "pendulum"}},
+                                                                        {"flexlink_2dsfl", {"hub", "deflection"}}};
   return names;
 }
 
@@ -70,10 +75,12 @@ TEST(RigContractTest, ThreeCamerasAndGeometryThatWeighsNothing) {
   for (const auto& rig : RigNames()) {
     const ModelPtr m = LoadAny(rig);
     ASSERT_NE(m, nullptr);
-    for (const char* camera : {"fixed", "track", "top"}) EXPECT_GE(mj_name2id(m.get(), mjOBJ_CAMERA, camera), 0) << rig << " " << camera;
+    for (const char* camera : {"fixed", "track", "top"})
+      EXPECT_GE(mj_name2id(m.get(), mjOBJ_CAMERA, camera), 0) << rig << " " << camera;
     EXPECT_GE(m->ngeom, 10) << rig;
     if (IsServo(rig) && !HasMotorPlugin()) continue;  // loaded without the scene and its classes
-    for (int g = 0; g < m->ngeom; ++g) EXPECT_EQ(m->geom_contype[g] | m->geom_conaffinity[g], 0) << rig << " geom " << g;
+    for (int g = 0; g < m->ngeom; ++g)
+      EXPECT_EQ(m->geom_contype[g] | m->geom_conaffinity[g], 0) << rig << " geom " << g;
     EXPECT_EQ(m->nlight, 2) << rig;
   }
 }

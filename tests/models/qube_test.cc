@@ -21,7 +21,8 @@ struct QubeConstants {
   double arm_damping = 1.5e-4, pendulum_damping = 3.0e-5, w = 1.0 / 3;
 
   double A(double alpha) const {
-    return arm_inertia + mass * arm_length * arm_length + w * mass * length * length * std::sin(alpha) * std::sin(alpha);
+    return arm_inertia + mass * arm_length * arm_length +
+           w * mass * length * length * std::sin(alpha) * std::sin(alpha);
   }
   double B(double alpha) const { return mass * arm_length * length / 2 * std::cos(alpha); }
   double C() const { return mass * length * length / 3; }
@@ -44,7 +45,8 @@ struct QubeConstants {
 };
 
 constexpr double kReferenceStep_s = 2e-5;
-// A rod is given 1e-10 kg m2 about itself, a quarter of a millionth of the inertia about the axis: that is what is left over.
+// A rod is given 1e-10 kg m2 about itself, a quarter of a millionth of the inertia about the axis: that is what is left
+// over.
 constexpr double kTolerance_rad = 2e-5;
 
 TEST(QubeModelTest, FollowsTheEquationsSwingingWidely) {
@@ -93,18 +95,31 @@ TEST(QubeModelTest, LinearisedMatricesHangingAndUpright) {
   constexpr double kRelative = 1e-5;
   for (const double sign : {1.0, -1.0}) {
     const double alpha = sign > 0 ? 0 : std::numbers::pi;
-    const double a = p.arm_inertia + p.mass * p.arm_length * p.arm_length, b = sign * p.mass * p.arm_length * p.length / 2, c = p.C();
+    const double a = p.arm_inertia + p.mass * p.arm_length * p.arm_length,
+                 b = sign * p.mass * p.arm_length * p.length / 2, c = p.C();
     const double det = a * c - b * b, gravity = sign * p.mass * p.g * p.length / 2;
     const double friction = p.kt * p.km / p.r + p.arm_damping;
-    const std::array<double, 16> expected_a = {
-        0, 0, 1, 0,                                                                          //
-        0, 0, 0, 1,                                                                          //
-        0, b * gravity / det, -c * friction / det, b * p.pendulum_damping / det,             //
-        0, -a * gravity / det, b * friction / det, -a * p.pendulum_damping / det};
+    const std::array<double, 16> expected_a = {0,
+                                               0,
+                                               1,
+                                               0,  //
+                                               0,
+                                               0,
+                                               0,
+                                               1,  //
+                                               0,
+                                               b * gravity / det,
+                                               -c * friction / det,
+                                               b * p.pendulum_damping / det,  //
+                                               0,
+                                               -a * gravity / det,
+                                               b * friction / det,
+                                               -a * p.pendulum_damping / det};
     const std::array<double, 4> expected_b = {0, 0, c * p.kt / (p.r * det), -b * p.kt / (p.r * det)};
     const Linear linear = Linearise(*m, {0, alpha});
     for (int i = 0; i < 16; ++i) {
-      EXPECT_NEAR(linear.a[i], expected_a[i], kRelative * std::abs(expected_a[i]) + 1e-6) << "A[" << i << "], sign " << sign;
+      EXPECT_NEAR(linear.a[i], expected_a[i], kRelative * std::abs(expected_a[i]) + 1e-6)
+          << "A[" << i << "], sign " << sign;
     }
     for (int i = 0; i < 4; ++i) EXPECT_NEAR(linear.b[i], expected_b[i], kRelative * std::abs(expected_b[i]) + 1e-9);
     // Hanging is stable, upright is not.

@@ -28,12 +28,15 @@ void LoadPluginsOnce() {
 }  // namespace
 
 const std::vector<std::string>& RigNames() {
-  static const std::vector<std::string> names = {"joint", "qube", "flexjoint", "flexlink", "xl330", "sts3032", "ak80",
-                                                 "qube_simurlacra", "qube_koopman", "flexlink_2dsfl"};
+  static const std::vector<std::string> names = {"joint",        "qube",          "flexjoint", "flexlink",
+                                                 "xl330",        "sts3032",       "ak80",      "qube_simurlacra",
+                                                 "qube_koopman", "flexlink_2dsfl"};
   return names;
 }
 
-std::string RigPath(const std::string& rig) { return std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/" + rig + ".xml"; }
+std::string RigPath(const std::string& rig) {
+  return std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/" + rig + ".xml";
+}
 
 bool HasMotorPlugin() {
   LoadPluginsOnce();
@@ -83,7 +86,8 @@ int Actuator(const mjModel& m, const char* actuator) {
   return std::max(id, 0);
 }
 
-Motion Drive(const mjModel& m, const std::vector<double>& q0, int steps, const std::function<std::vector<double>(int)>& command) {
+Motion Drive(const mjModel& m, const std::vector<double>& q0, int steps,
+             const std::function<std::vector<double>(int)>& command) {
   DataPtr d(mj_makeData(&m));
   std::copy(q0.begin(), q0.end(), d->qpos);
   Motion motion;
@@ -106,7 +110,8 @@ double ChirpAndSteps(double t_s, double amplitude, double f0_hz, double f1_hz, d
 Linear Linearise(const mjModel& m, const std::vector<double>& q0) {
   DataPtr d(mj_makeData(&m));
   const int nv = m.nv, n = 2 * nv, nu = m.nu;
-  Linear linear{std::vector<double>(static_cast<std::size_t>(n) * n), std::vector<double>(static_cast<std::size_t>(n) * nu)};
+  Linear linear{std::vector<double>(static_cast<std::size_t>(n) * n),
+                std::vector<double>(static_cast<std::size_t>(n) * nu)};
   auto derivative = [&](int column, double step) {
     mj_resetData(&m, d.get());
     std::copy(q0.begin(), q0.end(), d->qpos);

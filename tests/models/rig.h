@@ -1,4 +1,5 @@
-// What the tests of the shipped rigs share: loading an MJCF, driving it by a held command, and an integrator of their own.
+// What the tests of the shipped rigs share: loading an MJCF, driving it by a held command, and an integrator of their
+// own.
 #ifndef GAPSCOPE_TESTS_MODELS_RIG_H_
 #define GAPSCOPE_TESTS_MODELS_RIG_H_
 
@@ -32,7 +33,8 @@ int Actuator(const mjModel& m, const char* actuator);
 struct Motion {
   std::vector<std::vector<double>> q, v;
 };
-Motion Drive(const mjModel& m, const std::vector<double>& q0, int steps, const std::function<std::vector<double>(int)>& command);
+Motion Drive(const mjModel& m, const std::vector<double>& q0, int steps,
+             const std::function<std::vector<double>(int)>& command);
 
 // A chirp from `f0_hz` to `f1_hz` in `duration_s`, and a square wave on top: rich in frequencies and in steps.
 double ChirpAndSteps(double t_s, double amplitude, double f0_hz, double f1_hz, double duration_s);
@@ -54,8 +56,8 @@ std::array<double, N> Integrate(std::array<double, N> x, double duration_s, doub
   return x;
 }
 
-// Largest difference between MuJoCo's positions and those of x' = f(x, u), x = (q..., v...), from rest at `q0`, where u is
-// command(k) held over step k.
+// Largest difference between MuJoCo's positions and those of x' = f(x, u), x = (q..., v...), from rest at `q0`, where u
+// is command(k) held over step k.
 template <std::size_t N, class F>
 double LargestDifference(const mjModel& m, const Motion& motion, const std::vector<double>& q0, double h_s, F&& f,
                          const std::function<std::vector<double>(int)>& command) {
@@ -70,7 +72,8 @@ double LargestDifference(const mjModel& m, const Motion& motion, const std::vect
   return largest;
 }
 
-// Continuous A (2nv x 2nv) and B (2nv x nu), row-major, of x = (q, v) at (q0, 0, u = 0) by central differences of mj_forward.
+// Continuous A (2nv x 2nv) and B (2nv x nu), row-major, of x = (q, v) at (q0, 0, u = 0) by central differences of
+// mj_forward.
 struct Linear {
   std::vector<double> a, b;
 };

@@ -1,9 +1,8 @@
 // Hobby servos: MuJoCo against (m l^2 + armature) q'' = tau - b q' - m g l sin(q + offset) - dry friction, with
-// tau = kt (clip(k (target - q)) V - kt q')/R. The mechanism is checked with a native actuator in the plugin's place, unclipped;
-// the whole, with clipping and switching off, with the plugin.
-#include <gtest/gtest.h>
-
+// tau = kt (clip(k (target - q)) V - kt q')/R. The mechanism is checked with a native actuator in the plugin's place,
+// unclipped; the whole, with clipping and switching off, with the plugin.
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include "tests/models/rig.h"
 
@@ -25,7 +24,8 @@ const std::vector<ServoCase>& Cases() {
 
 constexpr double kG = 9.81;
 
-// The reference: symplectic Euler in small steps, with friction that either stops the joint within the step or opposes it in full.
+// The reference: symplectic Euler in small steps, with friction that either stops the joint within the step or opposes
+// it in full.
 class ServoReference {
  public:
   ServoReference(const ServoCase& c, double q0, double step_s) : c_(c), q_(q0), step_s_(step_s) {}
@@ -50,18 +50,22 @@ class ServoReference {
   double q_, v_ = 0, step_s_;
 };
 
-// Where friction, duty clip or switch have a kink inside a step even RK4 is of first order in the step: this share of it.
+// Where friction, duty clip or switch have a kink inside a step even RK4 is of first order in the step: this share of
+// it.
 constexpr double kTolerance_rad_per_s = 0.6;
 
 TEST(ServoModelTest, MechanismFollowsTheEquationWithANativeActuator) {
   for (const auto& c : Cases()) {
     const double gain = c.gain * c.supply * c.kt / c.r;
-    const ModelPtr m = LoadRig(c.rig, fmt::format("<general name=\"motor\" joint=\"joint\" gaintype=\"fixed\" gainprm=\"{}\" "
-                                                  "biastype=\"affine\" biasprm=\"0 {} {}\"/>", gain, -gain, -c.kt * c.kt / c.r));
+    const ModelPtr m =
+        LoadRig(c.rig, fmt::format("<general name=\"motor\" joint=\"joint\" gaintype=\"fixed\" gainprm=\"{}\" "
+                                   "biastype=\"affine\" biasprm=\"0 {} {}\"/>",
+                                   gain, -gain, -c.kt * c.kt / c.r));
     ASSERT_NE(m, nullptr);
     const double h = m->opt.timestep;
     const auto target = [&](int k) { return ChirpAndSteps(k * h, 0.3, 0.2, 2, 3); };
-    const Motion motion = Drive(*m, {0.2}, static_cast<int>(std::lround(3 / h)), [&](int k) { return std::vector<double>{target(k)}; });
+    const Motion motion =
+        Drive(*m, {0.2}, static_cast<int>(std::lround(3 / h)), [&](int k) { return std::vector<double>{target(k)}; });
     ServoReference reference(c, 0.2, 1e-5);
     double largest = 0;
     for (std::size_t k = 0; k < motion.q.size(); ++k) {
@@ -72,13 +76,15 @@ TEST(ServoModelTest, MechanismFollowsTheEquationWithANativeActuator) {
   }
 }
 
-// The largest difference of a run with a clipped start, a supply that drops and a motor that is switched off, at time step h.
+// The largest difference of a run with a clipped start, a supply that drops and a motor that is switched off, at time
+// step h.
 double PluginDifference(const ServoCase& c, double h) {
   const ModelPtr m = LoadRig(c.rig);
   if (!m) return NAN;
   m->opt.timestep = h;
   m->dof_solref[1] = -1 / h;
-  const int target = Actuator(*m, "motor"), supply = Actuator(*m, "motor.supply"), enable = Actuator(*m, "motor.enable");
+  const int target = Actuator(*m, "motor"), supply = Actuator(*m, "motor.supply"),
+            enable = Actuator(*m, "motor.enable");
   EXPECT_EQ(m->nu, 3);
   const auto command = [&](int k) {
     const double t = k * h;

@@ -54,7 +54,8 @@ void SetGains(mjModel* m, double kp, double kd) {
 }
 
 TEST(Ak80ModelTest, FollowsThePendulumEquationUnderTorqueAndUnderPd) {
-  constexpr double kMass = 0.676, kCom = 0.45, kInertia = 0.0104 + 0.676 * 0.45 * 0.45 + 0.002186, kViscous = 0.1, kG = 9.81;
+  constexpr double kMass = 0.676, kCom = 0.45, kInertia = 0.0104 + 0.676 * 0.45 * 0.45 + 0.002186, kViscous = 0.1,
+                   kG = 9.81;
   constexpr double kTolerance_rad = 1e-6;
   for (const auto& [kp, kd] : {std::pair{0.0, 0.0}, std::pair{15.5, 2.5}}) {
     const ModelPtr m = LoadRig("ak80");
@@ -62,7 +63,8 @@ TEST(Ak80ModelTest, FollowsThePendulumEquationUnderTorqueAndUnderPd) {
     SetGains(m.get(), kp, kd);
     const double h = m->opt.timestep;
     ASSERT_EQ(m->nu, 3);
-    const int position = Actuator(*m, "motor"), velocity = Actuator(*m, "motor.velocity"), torque = Actuator(*m, "motor.feedforward");
+    const int position = Actuator(*m, "motor"), velocity = Actuator(*m, "motor.velocity"),
+              torque = Actuator(*m, "motor.feedforward");
     const auto command = [&](int k) {
       std::vector<double> u(3);
       u[position] = 0.8 * std::sin(3 * k * h);

@@ -14,11 +14,12 @@ std::string Xml(const Attributes& config, const Attributes& live, const std::str
   std::string text = "<mujoco><option gravity='0 0 0' " + option +
                      "/><extension><plugin plugin='gapscope.encoder'><instance name='encoder'>";
   for (const auto& [key, value] : config) text += "<config key='" + key + "' value='" + value + "'/>";
-  text += "</instance></plugin></extension><worldbody><body name='body'><joint name='joint' axis='0 0 1'/>"
-          "<inertial pos='0 0 0' mass='1' diaginertia='0.1 0.1 0.1'/></body></worldbody><custom>";
+  text +=
+      "</instance></plugin></extension><worldbody><body name='body'><joint name='joint' axis='0 0 1'/>"
+      "<inertial pos='0 0 0' mass='1' diaginertia='0.1 0.1 0.1'/></body></worldbody><custom>";
   for (const auto& [key, value] : live) text += "<numeric name='encoder." + key + "' data='" + value + "'/>";
-  return text + "</custom><actuator><motor joint='joint'/></actuator><sensor><plugin objtype='" + objtype + "' objname='" +
-         objtype + "' plugin='gapscope.encoder' instance='encoder'/></sensor></mujoco>";
+  return text + "</custom><actuator><motor joint='joint'/></actuator><sensor><plugin objtype='" + objtype +
+         "' objname='" + objtype + "' plugin='gapscope.encoder' instance='encoder'/></sensor></mujoco>";
 }
 
 ModelPtr Compile(const std::string& xml, std::string* message = nullptr) {
@@ -96,8 +97,9 @@ TEST(EncoderTest, SpeedIsTheFilteredDifferenceOfReadings) {
 }
 
 TEST(EncoderTest, ResetAndSetStateRepeatBitForBit) {
-  const ModelPtr m = Compile(Xml({{"velocity", "true"}, {"resolution_rad", "0.002"}},
-                                 {{"delay_s", "0.0033"}, {"time_constant_s", "0.004"}}, "timestep='0.002' integrator='RK4'"));
+  const ModelPtr m =
+      Compile(Xml({{"velocity", "true"}, {"resolution_rad", "0.002"}},
+                  {{"delay_s", "0.0033"}, {"time_constant_s", "0.004"}}, "timestep='0.002' integrator='RK4'"));
   const DataPtr d(mj_makeData(m.get()));
   const auto run = [&](int from, int to) {
     std::vector<double> readings;

@@ -51,8 +51,9 @@ TEST(FrictionExactTest, SpringDecaysByEqualSwingsAndSticks) {
   }
 }
 
-// A block on a belt of speed v, held by a spring to the ground; seen from the belt, a spring whose end moves at v pulls it.
-// Static level S, sliding level F: it sticks until k (v t - q) = S, slides on a sinusoid, and sticks again when q' = 0.
+// A block on a belt of speed v, held by a spring to the ground; seen from the belt, a spring whose end moves at v pulls
+// it. Static level S, sliding level F: it sticks until k (v t - q) = S, slides on a sinusoid, and sticks again when q'
+// = 0.
 class BeltExact {
  public:
   BeltExact(double speed, double sliding, double breakaway) : v_(speed), f_(sliding), s_(breakaway) {}
@@ -61,7 +62,8 @@ class BeltExact {
     while (true) {
       const double release = (s_ / kStiffness + q_) / v_;
       if (t <= release) return q_;
-      // Sliding: e = v t - q - F/k obeys e'' = -w^2 e with e = (S-F)/k, e' = v at release; q' = v - e' = 0 again at `duration`.
+      // Sliding: e = v t - q - F/k obeys e'' = -w^2 e with e = (S-F)/k, e' = v at release; q' = v - e' = 0 again at
+      // `duration`.
       const double e0 = (s_ - f_) / kStiffness, a = e0, b = v_ / kOmega;
       const double duration = 2 / kOmega * (std::numbers::pi - std::atan2(e0 * kOmega, v_));
       const auto place = [&](double since) {
@@ -100,8 +102,9 @@ double BeltError(double step_s, const std::string& integrator, int* cycles) {
 }
 
 TEST(FrictionExactTest, BlockOnABeltSticksAndSlips) {
-  // A release that comes late by T lengthens the slip by 2 v T and so delays the next release by 2 T more. With 1.5 steps (half
-  // a step until the pull is seen, one until the level has dropped) over 5 cycles: 15 h, at the top slip speed of (S-F) w / k.
+  // A release that comes late by T lengthens the slip by 2 v T and so delays the next release by 2 T more. With 1.5
+  // steps (half a step until the pull is seen, one until the level has dropped) over 5 cycles: 15 h, at the top slip
+  // speed of (S-F) w / k.
   const double kError_rad_per_s = 5 * 2 * 1.5 * 0.3 * kOmega / kStiffness;
   for (const char* integrator : {"Euler", "implicitfast", "RK4"}) {
     for (const double h : {0.004, 0.002, 0.001, 0.0005}) {
@@ -114,14 +117,18 @@ TEST(FrictionExactTest, BlockOnABeltSticksAndSlips) {
   }
 }
 
-// With a Stribeck hump of finite width there is no closed form: the sliding phase by RK4 at 2 us, the stop found exactly.
+// With a Stribeck hump of finite width there is no closed form: the sliding phase by RK4 at 2 us, the stop found
+// exactly.
 TEST(FrictionExactTest, StribeckToStandstill) {
   constexpr double kCoulomb = 0.1, kBreakaway = 0.2, kSpeed = 0.5, kViscous = 0.005;
-  const auto slow = [&](double w) { return -(kCoulomb + (kBreakaway - kCoulomb) * std::exp(-w * w / (kSpeed * kSpeed)) + kViscous * w) / kInertia; };
+  const auto slow = [&](double w) {
+    return -(kCoulomb + (kBreakaway - kCoulomb) * std::exp(-w * w / (kSpeed * kSpeed)) + kViscous * w) / kInertia;
+  };
   double q = 0, w = 8;
   constexpr double kFine_s = 2e-6;
   while (w > 0) {
-    const double a = slow(w), b = slow(w + 0.5 * kFine_s * a), c = slow(w + 0.5 * kFine_s * b), e = slow(w + kFine_s * c);
+    const double a = slow(w), b = slow(w + 0.5 * kFine_s * a), c = slow(w + 0.5 * kFine_s * b),
+                 e = slow(w + kFine_s * c);
     const double next = w + kFine_s / 6 * (a + 2 * b + 2 * c + e);
     q += next > 0 ? 0.5 * kFine_s * (w + next) : 0.5 * w * w / -slow(w);
     w = next;
@@ -129,8 +136,8 @@ TEST(FrictionExactTest, StribeckToStandstill) {
   for (const auto& [integrator, rate] : {std::pair{"Euler", 4.5}, {"implicitfast", 4.5}, {"RK4", 0.1}}) {
     for (const double h : {0.005, 0.002, 0.0005}) {
       JointModel joint{.step_s = h, .integrator = integrator, .inertia = kInertia};
-      joint.config = Config("friction_n_m", kCoulomb) + Config("breakaway_n_m", kBreakaway) + Config("stribeck_speed_rad_per_s", kSpeed) +
-                     Config("viscous_n_m_s_per_rad", kViscous);
+      joint.config = Config("friction_n_m", kCoulomb) + Config("breakaway_n_m", kBreakaway) +
+                     Config("stribeck_speed_rad_per_s", kSpeed) + Config("viscous_n_m_s_per_rad", kViscous);
       const ModelPtr m = Compile(joint.Xml());
       const DataPtr d(mj_makeData(m.get()));
       d->qvel[0] = 8;

@@ -51,26 +51,30 @@ struct JointModel {
   double step_s = 0.001;
   std::string integrator = "Euler", solver = "Newton", flags = "";
   double inertia = 0.01;
-  double mass = 0, length = 0;       // of the off-centre mass
-  std::string joint = "";                 // more attributes of the joint
-  std::string row = "";              // solimpfriction ...; empty: StiffRow
+  double mass = 0, length = 0;  // of the off-centre mass
+  std::string joint = "";       // more attributes of the joint
+  std::string row = "";         // solimpfriction ...; empty: StiffRow
   double frictionloss = 1e-9;
-  std::string config = "", numeric = "";       // of the plugin
+  std::string config = "", numeric = "";  // of the plugin
   bool with_plugin = true;
-  bool turn = false;                 // gives the plugin its ACTUATOR compute
+  bool turn = false;  // gives the plugin its ACTUATOR compute
   std::string actuators = "";
 
   std::string Xml() const {
     const std::string stiff = row.empty() ? StiffRow(step_s) : row;
-    std::string xml = "<mujoco><compiler autolimits=\"true\" angle=\"radian\"/><option timestep=\"" + Text(step_s) + "\" integrator=\"" + integrator +
-                      "\" solver=\"" + solver + "\" gravity=\"0 0 -9.81\"><flag contact=\"disable\" " + flags + "/></option>";
+    std::string xml = "<mujoco><compiler autolimits=\"true\" angle=\"radian\"/><option timestep=\"" + Text(step_s) +
+                      "\" integrator=\"" + integrator + "\" solver=\"" + solver +
+                      "\" gravity=\"0 0 -9.81\"><flag contact=\"disable\" " + flags + "/></option>";
     if (with_plugin) {
-      xml += "<extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\"><config key=\"joint\" value=\"j\"/>" + config +
-             "</instance></plugin></extension>";
+      xml +=
+          "<extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\"><config key=\"joint\" value=\"j\"/>" +
+          config + "</instance></plugin></extension>";
     }
-    xml += "<custom>" + numeric + "</custom><worldbody><body><joint name=\"j\" type=\"hinge\" axis=\"0 -1 0\" frictionloss=\"" + Text(frictionloss) +
-           "\" " + stiff + " " + joint + "/><inertial pos=\"0 0 " + Text(-length) + "\" mass=\"" + Text(mass > 0 ? mass : 1e-6) + "\" diaginertia=\"" +
-           Text(inertia) + " " + Text(inertia) + " " + Text(inertia) + "\"/>";
+    xml += "<custom>" + numeric +
+           "</custom><worldbody><body><joint name=\"j\" type=\"hinge\" axis=\"0 -1 0\" frictionloss=\"" +
+           Text(frictionloss) + "\" " + stiff + " " + joint + "/><inertial pos=\"0 0 " + Text(-length) + "\" mass=\"" +
+           Text(mass > 0 ? mass : 1e-6) + "\" diaginertia=\"" + Text(inertia) + " " + Text(inertia) + " " +
+           Text(inertia) + "\"/>";
     if (with_plugin) xml += "<plugin plugin=\"gapscope.friction\" instance=\"f\"/>";
     xml += "</body></worldbody><actuator>" + actuators;
     if (turn && with_plugin) xml += "<plugin joint=\"j\" plugin=\"gapscope.friction\" instance=\"f\"/>";

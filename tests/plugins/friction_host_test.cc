@@ -28,17 +28,25 @@ namespace {
 
 // Two joints, load and direction, LuGre, and a spring with hysteresis, all on.
 std::string Everything(const std::string& integrator) {
-  return "<mujoco><option timestep=\"0.002\" integrator=\"" + integrator + "\"/><extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\">" +
-         Config("joint", "j") + Config("friction_n_m", 0.2) + Config("breakaway_n_m", 0.3) + Config("load_coefficient", 0.1) +
-         Config("friction_positive_n_m", 0.05) + Config("viscous_n_m_s_per_rad", 0.01) + Config("load", "gearbox") + Config("row_softness", 0.1) +
-         "</instance><instance name=\"l\">" + Config("joint", "k") + Config("model", "lugre") + Config("friction_n_m", 0.02) +
-         Config("sigma0_n_m_per_rad", 5) + Config("sigma1_n_m_s_per_rad", 0.01) + "</instance></plugin><plugin plugin=\"gapscope.spring\"><instance name=\"s\">" +
-         Config("joint", "j") + Config("stiffness_n_m_per_rad", 0.3) + Config("hysteresis_n_m", 0.1) + Config("cogging_n_m", 0.02) +
-         "</instance></plugin></extension><worldbody><body><joint name=\"j\" axis=\"0 1 0\" frictionloss=\"1e-6\" " + StiffRow(0.002) +
-         "/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 0.3 0 0\"/><plugin plugin=\"gapscope.friction\" instance=\"f\"/>"
-         "<body pos=\"0.3 0 0\"><joint name=\"k\" axis=\"0 1 0\"/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 0.2 0 0\"/>"
-         "<plugin plugin=\"gapscope.friction\" instance=\"l\"/></body></body><body><plugin plugin=\"gapscope.spring\" instance=\"s\"/></body></worldbody>"
-         "<actuator><motor joint=\"j\" gear=\"3\"/><plugin joint=\"j\" plugin=\"gapscope.friction\" instance=\"f\"/></actuator></mujoco>";
+  return "<mujoco><option timestep=\"0.002\" integrator=\"" + integrator +
+         "\"/><extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\">" + Config("joint", "j") +
+         Config("friction_n_m", 0.2) + Config("breakaway_n_m", 0.3) + Config("load_coefficient", 0.1) +
+         Config("friction_positive_n_m", 0.05) + Config("viscous_n_m_s_per_rad", 0.01) + Config("load", "gearbox") +
+         Config("row_softness", 0.1) + "</instance><instance name=\"l\">" + Config("joint", "k") +
+         Config("model", "lugre") + Config("friction_n_m", 0.02) + Config("sigma0_n_m_per_rad", 5) +
+         Config("sigma1_n_m_s_per_rad", 0.01) +
+         "</instance></plugin><plugin plugin=\"gapscope.spring\"><instance name=\"s\">" + Config("joint", "j") +
+         Config("stiffness_n_m_per_rad", 0.3) + Config("hysteresis_n_m", 0.1) + Config("cogging_n_m", 0.02) +
+         "</instance></plugin></extension><worldbody><body><joint name=\"j\" axis=\"0 1 0\" frictionloss=\"1e-6\" " +
+         StiffRow(0.002) +
+         "/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 0.3 0 0\"/><plugin plugin=\"gapscope.friction\" "
+         "instance=\"f\"/>"
+         "<body pos=\"0.3 0 0\"><joint name=\"k\" axis=\"0 1 0\"/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 "
+         "0.2 0 0\"/>"
+         "<plugin plugin=\"gapscope.friction\" instance=\"l\"/></body></body><body><plugin plugin=\"gapscope.spring\" "
+         "instance=\"s\"/></body></worldbody>"
+         "<actuator><motor joint=\"j\" gear=\"3\"/><plugin joint=\"j\" plugin=\"gapscope.friction\" "
+         "instance=\"f\"/></actuator></mujoco>";
 }
 
 std::vector<mjtNum> StepOn(const mjModel* m, mjData* d, int from, int to) {
@@ -126,7 +134,8 @@ TEST(FrictionHostTest, WrongAttributesAreRefusedWithACure) {
     joint.config = c.config, joint.numeric = c.numeric;
     std::string error;
     EXPECT_EQ(Compile(joint.Xml(), &error), nullptr) << c.config << c.numeric;
-    for (const std::string& text : c.says) EXPECT_NE(error.find(text), std::string::npos) << "'" << text << "' in: " << error;
+    for (const std::string& text : c.says)
+      EXPECT_NE(error.find(text), std::string::npos) << "'" << text << "' in: " << error;
   }
   // The joint: none, unknown, of another type; a second instance on it; no row to rewrite.
   const std::string good = JointModel{}.Xml();
@@ -141,7 +150,8 @@ TEST(FrictionHostTest, WrongAttributesAreRefusedWithACure) {
   refused(Config("joint", "j"), "", "hinge or slide joint (j)");
   refused(Config("joint", "j"), Config("joint", "arm"), "'arm', allowed the name of a hinge or slide joint (j)");
   refused("frictionloss=\"1.0000000000000001e-09\"", "", "set frictionloss=\"1e-9\"");
-  refused("</instance>", "</instance><instance name=\"g\">" + Config("joint", "j") + "</instance>", "one gapscope.friction per joint");
+  refused("</instance>", "</instance><instance name=\"g\">" + Config("joint", "j") + "</instance>",
+          "one gapscope.friction per joint");
   refused("type=\"hinge\" axis=\"0 -1 0\" frictionloss=\"1.0000000000000001e-09\"", "type=\"ball\"", "none named");
 }
 

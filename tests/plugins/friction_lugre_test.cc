@@ -33,7 +33,8 @@ TEST(FrictionLugreTest, BristleIsExactAtAnyStep) {
   }
 }
 
-// Below breakaway the joint is a spring of sigma0; the static deflection of the rate-independent part is -(F/s0) ln(1 - T/F).
+// Below breakaway the joint is a spring of sigma0; the static deflection of the rate-independent part is -(F/s0) ln(1 -
+// T/F).
 TEST(FrictionLugreTest, PreslidingBendsAndHolds) {
   for (const char* integrator : {"Euler", "implicitfast", "RK4"}) {
     const ModelPtr m = Compile(Bristle(0.001, integrator).Xml());

@@ -1,4 +1,5 @@
-// gapscope.friction against MuJoCo's own frictionloss, and what true stick must do: hold, not chatter, not create energy.
+// gapscope.friction against MuJoCo's own frictionloss, and what true stick must do: hold, not chatter, not create
+// energy.
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -12,17 +13,22 @@ namespace {
 constexpr double kSensorCount_rad = 2 * std::numbers::pi / 4096;
 
 // Two joints, one with the plugin, the other with native friction always; driven, so that they stick and slip.
-std::string TwoJoints(const std::string& integrator, const std::string& solver, bool island, const std::string& jacobian, bool plugin) {
-  std::string xml = "<mujoco><option timestep=\"0.002\" integrator=\"" + integrator + "\" solver=\"" + solver + "\" jacobian=\"" + jacobian +
-                    "\"><flag island=\"" + (island ? "enable" : "disable") + "\"/></option>";
+std::string TwoJoints(const std::string& integrator, const std::string& solver, bool island,
+                      const std::string& jacobian, bool plugin) {
+  std::string xml = "<mujoco><option timestep=\"0.002\" integrator=\"" + integrator + "\" solver=\"" + solver +
+                    "\" jacobian=\"" + jacobian + "\"><flag island=\"" + (island ? "enable" : "disable") +
+                    "\"/></option>";
   if (plugin) {
-    xml += "<extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\">" + Config("joint", "j") + Config("friction_n_m", 0.3) +
-           "</instance></plugin></extension>";
+    xml += "<extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\">" + Config("joint", "j") +
+           Config("friction_n_m", 0.3) + "</instance></plugin></extension>";
   }
-  xml += "<worldbody><body><joint name=\"j\" axis=\"0 1 0\" damping=\"0.01\" frictionloss=\"" + std::string(plugin ? "1e-6" : "0.3") +
-         "\"/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 0.3 0 0\"/>" + (plugin ? "<plugin plugin=\"gapscope.friction\" instance=\"f\"/>" : "") +
-         "<body pos=\"0.3 0 0\"><joint name=\"k\" axis=\"0 1 0\" frictionloss=\"0.05\"/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 0.2 0 0\"/>"
-         "</body></body><body pos=\"0 1 0\"><joint name=\"l\" axis=\"0 1 0\" frictionloss=\"0.1\"/><geom size=\"0.1\" pos=\"0.1 0 0\"/></body></worldbody>"
+  xml += "<worldbody><body><joint name=\"j\" axis=\"0 1 0\" damping=\"0.01\" frictionloss=\"" +
+         std::string(plugin ? "1e-6" : "0.3") + "\"/><geom type=\"capsule\" size=\"0.02\" fromto=\"0 0 0 0.3 0 0\"/>" +
+         (plugin ? "<plugin plugin=\"gapscope.friction\" instance=\"f\"/>" : "") +
+         "<body pos=\"0.3 0 0\"><joint name=\"k\" axis=\"0 1 0\" frictionloss=\"0.05\"/><geom type=\"capsule\" "
+         "size=\"0.02\" fromto=\"0 0 0 0.2 0 0\"/>"
+         "</body></body><body pos=\"0 1 0\"><joint name=\"l\" axis=\"0 1 0\" frictionloss=\"0.1\"/><geom size=\"0.1\" "
+         "pos=\"0.1 0 0\"/></body></worldbody>"
          "<actuator><motor joint=\"j\" gear=\"2\"/></actuator></mujoco>";
   return xml;
 }
@@ -53,7 +59,12 @@ TEST(FrictionNativeTest, EqualsFrictionlossBitForBit) {
 TEST(FrictionNativeTest, HoldsALoadFor1000sWithoutCreep) {
   for (const double step_s : {0.001, 0.002, 0.004}) {
     for (const char* solver : {"Newton", "CG", "PGS"}) {
-      JointModel joint{.step_s = step_s, .integrator = "implicitfast", .solver = solver, .inertia = 0.0018, .mass = 0.49, .length = 0.1};
+      JointModel joint{.step_s = step_s,
+                       .integrator = "implicitfast",
+                       .solver = solver,
+                       .inertia = 0.0018,
+                       .mass = 0.49,
+                       .length = 0.1};
       joint.config = Config("friction_n_m", 0.35) + Config("row_softness", 0.01);
       const ModelPtr m = Compile(joint.Xml());
       const DataPtr d(mj_makeData(m.get()));
@@ -75,7 +86,12 @@ struct Driven {
 };
 
 JointModel StickSlipModel(const Driven& c) {
-  JointModel joint{.step_s = c.step_s, .integrator = c.integrator, .solver = c.solver, .inertia = 0.0018, .mass = 0.49, .length = 0.1};
+  JointModel joint{.step_s = c.step_s,
+                   .integrator = c.integrator,
+                   .solver = c.solver,
+                   .inertia = 0.0018,
+                   .mass = 0.49,
+                   .length = 0.1};
   joint.config = Config("friction_n_m", 0.35) + Config("breakaway_n_m", 0.45) + Config("load_coefficient", 0.1) +
                  Config("friction_negative_n_m", 0.05) + Config("row_softness", 0.01);
   joint.turn = true;
@@ -83,13 +99,18 @@ JointModel StickSlipModel(const Driven& c) {
   return joint;
 }
 
-double Drive(double t) { return std::sin(2 * std::numbers::pi * 0.5 * t) + 0.3 * std::sin(2 * std::numbers::pi * 1.7 * t); }
+double Drive(double t) {
+  return std::sin(2 * std::numbers::pi * 0.5 * t) + 0.3 * std::sin(2 * std::numbers::pi * 1.7 * t);
+}
 
 TEST(FrictionNativeTest, NeverCreatesEnergy) {
   // Newton and PGS give exactly none; CG stops at its own relative tolerance, here of the 0.35 N m over a radian.
   constexpr double kCgTolerance_j = 1e-8 * 0.35;
-  for (const Driven& c : std::vector<Driven>{{0.001, "Euler", "Newton"}, {0.002, "implicitfast", "Newton"}, {0.004, "implicitfast", "Newton"},
-                                             {0.004, "Euler", "PGS"}, {0.002, "implicitfast", "CG"}}) {
+  for (const Driven& c : std::vector<Driven>{{0.001, "Euler", "Newton"},
+                                             {0.002, "implicitfast", "Newton"},
+                                             {0.004, "implicitfast", "Newton"},
+                                             {0.004, "Euler", "PGS"},
+                                             {0.002, "implicitfast", "CG"}}) {
     const ModelPtr m = Compile(StickSlipModel(c).Xml());
     const DataPtr d(mj_makeData(m.get()));
     double lost_j = 0;
@@ -108,8 +129,12 @@ TEST(FrictionNativeTest, NeverCreatesEnergy) {
 // The joint turns round once per reversal of the drive, and at rest it rests: no sign changes beyond the motion's own.
 TEST(FrictionNativeTest, DoesNotChatter) {
   std::vector<int> turns;
-  for (const Driven& c : std::vector<Driven>{{0.0001, "Euler", "Newton"}, {0.001, "Euler", "Newton"}, {0.002, "implicitfast", "Newton"},
-                                             {0.004, "implicitfast", "Newton"}, {0.004, "implicitfast", "PGS"}, {0.004, "RK4", "Newton"}}) {
+  for (const Driven& c : std::vector<Driven>{{0.0001, "Euler", "Newton"},
+                                             {0.001, "Euler", "Newton"},
+                                             {0.002, "implicitfast", "Newton"},
+                                             {0.004, "implicitfast", "Newton"},
+                                             {0.004, "implicitfast", "PGS"},
+                                             {0.004, "RK4", "Newton"}}) {
     JointModel joint = StickSlipModel(c);
     joint.mass = 0;  // a free wheel: where it sticks and for how long is set by the drive alone
     const ModelPtr m = Compile(joint.Xml());

@@ -38,28 +38,31 @@ TEST(FrictionTermsTest, SlidingTorqueFollowsTheLaw) {
     double speed, torque, friction;  // friction torque expected, with its sign
   };
   const double hump = 0.1 + 0.2 * std::exp(-1.0 / 4), hump_linear = 0.1 + 0.2 * std::exp(-0.5);
-  for (const Case& c : std::vector<Case>{
-           {base, 2, 0.5, -0.1},
-           {base, -2, 0.5, 0.1},
-           {base + Config("breakaway_n_m", 0.3) + Config("stribeck_speed_rad_per_s", 2), 1, 0, -hump},
-           {base + Config("breakaway_n_m", 0.3) + Config("stribeck_speed_rad_per_s", 2) + Config("stribeck_exponent", 1), -1, 0, hump_linear},
-           {base + Config("breakaway_n_m", 0.05), 1, 0, -0.1},
-           {base + Config("viscous_n_m_s_per_rad", 0.02), 5, 0, -0.2},
-           {base + Config("quadratic_n_m_s2_per_rad2", 0.02), -5, 0, 0.6},
-           {base + Config("friction_positive_n_m", 0.04), 3, 0, -0.14},
-           {base + Config("friction_positive_n_m", 0.04), -3, 0, 0.1},
-           {base + Config("friction_negative_n_m", 0.04), -3, 0, 0.14},
-           {base + Config("viscous_positive_n_m_s_per_rad", 0.01), 4, 0, -0.14},
-           {base + Config("viscous_positive_n_m_s_per_rad", 0.01), -4, 0, 0.1},
-           {base + Config("viscous_negative_n_m_s_per_rad", 0.01), -4, 0, 0.14},
-           {base + Config("load_coefficient", 0.2), 3, 1, -0.3},
-           {base + Config("load_coefficient", 0.2), 3, 5, -0.5},  // the force limit of 2 N m holds
-           {base + Config("load_quadratic", 0.2), -3, -1.5, 0.55},
-           {base + Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5), 3, -1, -0.2},
-           {base + Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5), 3, 1, -0.3}}) {
+  for (const Case& c :
+       std::vector<Case>{{base, 2, 0.5, -0.1},
+                         {base, -2, 0.5, 0.1},
+                         {base + Config("breakaway_n_m", 0.3) + Config("stribeck_speed_rad_per_s", 2), 1, 0, -hump},
+                         {base + Config("breakaway_n_m", 0.3) + Config("stribeck_speed_rad_per_s", 2) +
+                              Config("stribeck_exponent", 1),
+                          -1, 0, hump_linear},
+                         {base + Config("breakaway_n_m", 0.05), 1, 0, -0.1},
+                         {base + Config("viscous_n_m_s_per_rad", 0.02), 5, 0, -0.2},
+                         {base + Config("quadratic_n_m_s2_per_rad2", 0.02), -5, 0, 0.6},
+                         {base + Config("friction_positive_n_m", 0.04), 3, 0, -0.14},
+                         {base + Config("friction_positive_n_m", 0.04), -3, 0, 0.1},
+                         {base + Config("friction_negative_n_m", 0.04), -3, 0, 0.14},
+                         {base + Config("viscous_positive_n_m_s_per_rad", 0.01), 4, 0, -0.14},
+                         {base + Config("viscous_positive_n_m_s_per_rad", 0.01), -4, 0, 0.1},
+                         {base + Config("viscous_negative_n_m_s_per_rad", 0.01), -4, 0, 0.14},
+                         {base + Config("load_coefficient", 0.2), 3, 1, -0.3},
+                         {base + Config("load_coefficient", 0.2), 3, 5, -0.5},  // the force limit of 2 N m holds
+                         {base + Config("load_quadratic", 0.2), -3, -1.5, 0.55},
+                         {base + Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5), 3, -1, -0.2},
+                         {base + Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5), 3, 1, -0.3}}) {
     const double applied = std::clamp(c.torque, -2.0, 2.0);
     for (const bool turn : {true, false}) {  // the torque is steady, so last step's is this step's
-      EXPECT_NEAR(Acceleration(Wheel(c.config, turn), c.speed, c.torque), (applied + c.friction) / kInertia, kTolerance / kInertia)
+      EXPECT_NEAR(Acceleration(Wheel(c.config, turn), c.speed, c.torque), (applied + c.friction) / kInertia,
+                  kTolerance / kInertia)
           << c.config << " at " << c.speed << " rad/s, " << c.torque << " N m, turn " << turn;
     }
   }
@@ -67,7 +70,8 @@ TEST(FrictionTermsTest, SlidingTorqueFollowsTheLaw) {
 
 // At rest the level is that of the direction in which the joint would start.
 TEST(FrictionTermsTest, HoldsDifferentlyByDirection) {
-  const std::string config = Config("friction_n_m", 0.1) + Config("friction_positive_n_m", 0.05) + Config("friction_negative_n_m", 0.2);
+  const std::string config =
+      Config("friction_n_m", 0.1) + Config("friction_positive_n_m", 0.05) + Config("friction_negative_n_m", 0.2);
   for (const bool turn : {true, false}) {
     EXPECT_LT(std::abs(Acceleration(Wheel(config, turn), 0, 0.149)), 1e-3);
     EXPECT_NEAR(Acceleration(Wheel(config, turn), 0, 0.151), 0.001 / kInertia, 1e-3);
@@ -75,7 +79,8 @@ TEST(FrictionTermsTest, HoldsDifferentlyByDirection) {
     EXPECT_NEAR(Acceleration(Wheel(config, turn), 0, -0.301), -0.001 / kInertia, 1e-3);
   }
   // Held by the motor against back-driving: half of the load's share.
-  const std::string geared = Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5) + Config("friction_n_m", 0.01);
+  const std::string geared =
+      Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5) + Config("friction_n_m", 0.01);
   JointModel loaded = Wheel(geared);
   loaded.mass = 0.5, loaded.length = 0.1, loaded.inertia = kInertia;
   const ModelPtr m = Compile(loaded.Xml());
@@ -90,14 +95,19 @@ TEST(FrictionTermsTest, HoldsDifferentlyByDirection) {
   }
 }
 
-// A pendulum on the same wheel pulls it through the mass matrix: only the whole system's free acceleration tells the side.
+// A pendulum on the same wheel pulls it through the mass matrix: only the whole system's free acceleration tells the
+// side.
 TEST(FrictionTermsTest, DirectionAtRestSeesOtherJoints) {
   const std::string xml =
-      "<mujoco><option timestep=\"0.001\"><flag contact=\"disable\"/></option><extension><plugin plugin=\"gapscope.friction\"><instance name=\"f\">" +
+      "<mujoco><option timestep=\"0.001\"><flag contact=\"disable\"/></option><extension><plugin "
+      "plugin=\"gapscope.friction\"><instance name=\"f\">" +
       Config("joint", "j") + Config("friction_n_m", 0.01) + Config("friction_negative_n_m", 5) +
-      "</instance></plugin></extension><worldbody><body><joint name=\"j\" axis=\"0 0 1\" frictionloss=\"1e-9\" " + StiffRow(0.001) +
-      "/><geom type=\"capsule\" size=\".01\" fromto=\"0 0 0 .2 0 0\" mass=\".1\"/><plugin plugin=\"gapscope.friction\" instance=\"f\"/>"
-      "<body pos=\".2 0 0\"><joint name=\"p\" axis=\"1 0 0\"/><geom type=\"capsule\" size=\".01\" fromto=\"0 0 0 0 0 -.3\" mass=\".2\"/></body></body>"
+      "</instance></plugin></extension><worldbody><body><joint name=\"j\" axis=\"0 0 1\" frictionloss=\"1e-9\" " +
+      StiffRow(0.001) +
+      "/><geom type=\"capsule\" size=\".01\" fromto=\"0 0 0 .2 0 0\" mass=\".1\"/><plugin plugin=\"gapscope.friction\" "
+      "instance=\"f\"/>"
+      "<body pos=\".2 0 0\"><joint name=\"p\" axis=\"1 0 0\"/><geom type=\"capsule\" size=\".01\" fromto=\"0 0 0 0 0 "
+      "-.3\" mass=\".2\"/></body></body>"
       "</worldbody><actuator><plugin joint=\"j\" plugin=\"gapscope.friction\" instance=\"f\"/></actuator></mujoco>";
   const ModelPtr m = Compile(xml);
   for (const double side : {1.0, -1.0}) {
@@ -120,7 +130,8 @@ TEST(FrictionTermsTest, DirectionAtRestSeesOtherJoints) {
 TEST(FrictionTermsTest, GearboxLoadCountsMotorAndGravity) {
   const double gravity = -0.5 * 9.81 * 0.1 * std::sin(0.8);
   for (const bool turn : {true, false}) {
-    JointModel joint = Wheel(Config("load", "gearbox") + Config("load_coefficient", 0.2) + Config("viscous_n_m_s_per_rad", 0.1), turn);
+    JointModel joint =
+        Wheel(Config("load", "gearbox") + Config("load_coefficient", 0.2) + Config("viscous_n_m_s_per_rad", 0.1), turn);
     joint.mass = 0.5, joint.length = 0.1, joint.joint = "damping=\"0.3\"";
     const ModelPtr m = Compile(joint.Xml());
     const DataPtr d(mj_makeData(m.get()));
@@ -145,7 +156,8 @@ void RegisterTestMotor() {
     plugin.reset = +[](const mjModel*, mjtNum*, void*, int) {};
     plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
       for (int i = 0; i < m->nactuator; ++i) {
-        if (m->actuator_plugin[i] == instance) d->actuator_force[m->actuator_outadr[i]] = d->ctrl[m->actuator_ctrladr[i]];
+        if (m->actuator_plugin[i] == instance)
+          d->actuator_force[m->actuator_outadr[i]] = d->ctrl[m->actuator_ctrladr[i]];
       }
     };
     mjp_registerPlugin(&plugin);
@@ -187,11 +199,19 @@ TEST(FrictionTermsTest, EveryParameterHasASmoothGradient) {
     const char* key;
     double value, step;
   };
-  const std::vector<Knob> knobs = {
-      {"friction_n_m", 0.02, 1e-3}, {"breakaway_n_m", 0.05, 1e-3}, {"stribeck_speed_rad_per_s", 3, 0.03}, {"stribeck_exponent", 2, 0.02},
-      {"viscous_n_m_s_per_rad", 0.002, 1e-4}, {"quadratic_n_m_s2_per_rad2", 3e-4, 1e-5}, {"load_coefficient", 0.1, 1e-3}, {"load_quadratic", 0.1, 1e-3},
-      {"friction_positive_n_m", 0.01, 1e-4}, {"friction_negative_n_m", 0.02, 1e-4}, {"viscous_positive_n_m_s_per_rad", 0.001, 1e-5},
-      {"viscous_negative_n_m_s_per_rad", 0.002, 1e-5}, {"backdrive_factor", 0.7, 1e-2}};
+  const std::vector<Knob> knobs = {{"friction_n_m", 0.02, 1e-3},
+                                   {"breakaway_n_m", 0.05, 1e-3},
+                                   {"stribeck_speed_rad_per_s", 3, 0.03},
+                                   {"stribeck_exponent", 2, 0.02},
+                                   {"viscous_n_m_s_per_rad", 0.002, 1e-4},
+                                   {"quadratic_n_m_s2_per_rad2", 3e-4, 1e-5},
+                                   {"load_coefficient", 0.1, 1e-3},
+                                   {"load_quadratic", 0.1, 1e-3},
+                                   {"friction_positive_n_m", 0.01, 1e-4},
+                                   {"friction_negative_n_m", 0.02, 1e-4},
+                                   {"viscous_positive_n_m_s_per_rad", 0.001, 1e-5},
+                                   {"viscous_negative_n_m_s_per_rad", 0.002, 1e-5},
+                                   {"backdrive_factor", 0.7, 1e-2}};
   for (const bool lugre : {false, true}) {
     JointModel joint{.step_s = 0.001, .inertia = kInertia};
     std::vector<Knob> all = knobs;

@@ -6,7 +6,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr double kExact = 1e-6;     // rad, asked for of a fractional delay
+constexpr double kExact = 1e-6;  // rad, asked for of a fractional delay
 constexpr double kRounding = 1e-12;
 
 // --- command delay -------------------------------------------------------------------------------------------------
@@ -169,7 +169,8 @@ TEST_P(MotorLoopDelayTest, StepResponseIsExact) {
 
 INSTANTIATE_TEST_SUITE_P(Delays, MotorLoopDelayTest, ::testing::Values(0.003, 0.00305, 0.01001, 0.02));
 
-// A joint that coasts at constant speed: the delayed law knows the angle exactly, also below a step and in RK4's stages.
+// A joint that coasts at constant speed: the delayed law knows the angle exactly, also below a step and in RK4's
+// stages.
 TEST(MotorDelayTest, CoastingAngleIsExactBelowAStep) {
   for (const std::string integrator : {"Euler", "RK4"}) {
     const Rig rig{.config = {{"law", "position"}, {"kp", "1e-9"}},

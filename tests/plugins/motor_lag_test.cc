@@ -49,7 +49,7 @@ TEST_P(MotorLagTest, StepResponseIsTheClosedForm) {
 
 std::vector<LagCase> LagCases() {
   std::vector<LagCase> cases;
-  for (const char* integrator : {"Euler", "implicitfast", "RK4"}) {
+  for (const char* integrator : {"Euler", "implicitfast", "discrete", "RK4"}) {
     for (const double constant : {0.0, 1e-9, 0.5 * kStep, kStep, 5 * kStep}) cases.push_back({integrator, constant});
   }
   return cases;
@@ -77,10 +77,11 @@ std::array<double, 2> Linear(std::array<std::array<double, 2>, 2> a, std::array<
 constexpr double kKt = 0.5, kResistance = 2, kTimeConstant = 0.01, kDamping = 0.1, kVoltage = 10;
 
 Rig Electric(const std::string& integrator, double h) {
-  return {.config = {{"law", "voltage"}, {"kt", "0.5"}, {"ke", "0.5"}, {"resistance", "2"}, {"time_constant_s", "0.01"}},
-          .option = "timestep='" + std::to_string(h) + "' integrator='" + integrator + "'",
-          .first = "actdim='1'",
-          .damping = kDamping};
+  return {
+      .config = {{"law", "voltage"}, {"kt", "0.5"}, {"ke", "0.5"}, {"resistance", "2"}, {"time_constant_s", "0.01"}},
+      .option = "timestep='" + std::to_string(h) + "' integrator='" + integrator + "'",
+      .first = "actdim='1'",
+      .damping = kDamping};
 }
 
 double SpeedAfter(const mjModel* m, double time) {
@@ -94,9 +95,9 @@ double SpeedAfter(const mjModel* m, double time) {
 
 // The lag on the whole request, back-EMF included, is the winding L di/dt = V - R i - ke w with L = R tc.
 TEST(MotorLagElectricTest, WindingWithBackEmfIsExactUnderRk4) {
-  const auto exact = Linear({{{-kDamping / kInertia, 1 / kInertia},
-                              {-kKt * kKt / kResistance / kTimeConstant, -1 / kTimeConstant}}},
-                            {0, kKt * kVoltage / kResistance / kTimeConstant}, 0.1);
+  const auto exact =
+      Linear({{{-kDamping / kInertia, 1 / kInertia}, {-kKt * kKt / kResistance / kTimeConstant, -1 / kTimeConstant}}},
+             {0, kKt * kVoltage / kResistance / kTimeConstant}, 0.1);
   EXPECT_NEAR(SpeedAfter(Electric("RK4", 0.001).Compile().get(), 0.1), exact[0], 1e-6 * exact[0]);
   EXPECT_NEAR(SpeedAfter(Electric("Euler", 0.0001).Compile().get(), 0.1), exact[0], 1e-2 * exact[0]);
 }
@@ -106,7 +107,8 @@ TEST(MotorLagElectricTest, ConvergesToTheNativeDcMotor) {
   double difference[2];
   for (const int i : {0, 1}) {
     const double h = i == 0 ? 0.0002 : 0.0001;
-    const Rig native{.option = "timestep='" + std::to_string(h) + "'", .damping = kDamping,
+    const Rig native{.option = "timestep='" + std::to_string(h) + "'",
+                     .damping = kDamping,
                      .native = "<dcmotor joint='joint' motorconst='0.5' resistance='2' inductance='0.02'/>"};
     const ModelPtr n = native.Compile();
     const DataPtr d(mj_makeData(n.get()));
@@ -157,7 +159,9 @@ TEST(MotorLagPrimingTest, StartsAtThePresentRequestUnlessTheHostSaysOtherwise) {
 
 TEST(MotorSagTest, CeilingFallsUnderLoadAndRecovers) {
   const double limit = 2, fraction = 0.3, constant = 0.05;
-  const Rig rig{.config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"sag_fraction", "0.3"},
+  const Rig rig{.config = {{"law", "torque"},
+                           {"torque_limit_n_m", "2"},
+                           {"sag_fraction", "0.3"},
                            {"sag_time_constant_s", "0.05"}},
                 .option = "timestep='0.001' integrator='RK4'",
                 .first = "actdim='1'"};
@@ -181,7 +185,8 @@ TEST(MotorSagTest, CeilingFallsUnderLoadAndRecovers) {
 }
 
 TEST(MotorSagTest, StartsAtRestUnderThePresentLoad) {
-  const Rig rig{.config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"sag_fraction", "0.3"}}, .first = "actdim='1'"};
+  const Rig rig{.config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"sag_fraction", "0.3"}},
+                .first = "actdim='1'"};
   const ModelPtr m = rig.Compile();
   const DataPtr d(mj_makeData(m.get()));
   d->ctrl[0] = 100;
@@ -192,8 +197,14 @@ TEST(MotorSagTest, StartsAtRestUnderThePresentLoad) {
 }
 
 TEST(MotorSagTest, SupplyOfADutyServoSags) {
-  const Rig rig{.config = {{"law", "duty"}, {"duty_gain", "1000"}, {"supply_v", "12"}, {"kt", "0.4"}, {"ke", "0"},
-                           {"resistance", "4"}, {"sag_fraction", "0.5"}, {"sag_time_constant_s", "0.1"}},
+  const Rig rig{.config = {{"law", "duty"},
+                           {"duty_gain", "1000"},
+                           {"supply_v", "12"},
+                           {"kt", "0.4"},
+                           {"ke", "0"},
+                           {"resistance", "4"},
+                           {"sag_fraction", "0.5"},
+                           {"sag_time_constant_s", "0.1"}},
                 .first = "actdim='1'"};
   const ModelPtr m = rig.Compile();
   const DataPtr d(mj_makeData(m.get()));

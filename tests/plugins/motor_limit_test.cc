@@ -28,38 +28,52 @@ void Trace(const Rig& rig, double fastest, Motoring motoring, Generating generat
 }
 
 TEST(MotorLimitTest, RatedPeakNoLoad) {
-  const Rig rig{.config = {{"law", "torque"}, {"peak_torque_n_m", "3"}, {"rated_speed_rad_per_s", "4"},
-                           {"no_load_speed_rad_per_s", "10"}, {"generating_factor", "1.2"}}};
-  Trace(rig, 15, [](double w) { return w <= 4 ? 3 : w >= 10 ? 0 : 3 * (10 - w) / 6; }, [](double) { return 3.6; });
+  const Rig rig{.config = {{"law", "torque"},
+                           {"peak_torque_n_m", "3"},
+                           {"rated_speed_rad_per_s", "4"},
+                           {"no_load_speed_rad_per_s", "10"},
+                           {"generating_factor", "1.2"}}};
+  Trace(
+      rig, 15, [](double w) { return w <= 4    ? 3
+                                     : w >= 10 ? 0
+                                               : 3 * (10 - w) / 6; }, [](double) { return 3.6; });
 }
 
 TEST(MotorLimitTest, ConstantPowerOnBothSides) {
-  const Rig rig{.config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"power_w", "8"}, {"generating_power_w", "12"}}};
-  Trace(rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double w) { return std::min(2.0, 12 / w); });
+  const Rig rig{
+      .config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"power_w", "8"}, {"generating_power_w", "12"}}};
+  Trace(
+      rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double w) { return std::min(2.0, 12 / w); });
 }
 
 TEST(MotorLimitTest, PowerLeavesGeneratingAloneByDefault) {
   const Rig rig{.config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"power_w", "8"}}};
-  Trace(rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double) { return 2.0; });
+  Trace(
+      rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double) { return 2.0; });
 }
 
 const std::vector<double> kSpeed = {0, 2, 5, 9, 12}, kTorque = {3, 2.9, 2.2, 0.7, 0}, kBrake = {3.5, 3.5, 3.1, 2, 1};
 
 double LinearTable(const std::vector<double>& torque, double w) {
   for (std::size_t i = 0; i + 1 < kSpeed.size(); ++i) {
-    if (w <= kSpeed[i + 1]) return torque[i] + (torque[i + 1] - torque[i]) * (w - kSpeed[i]) / (kSpeed[i + 1] - kSpeed[i]);
+    if (w <= kSpeed[i + 1])
+      return torque[i] + (torque[i + 1] - torque[i]) * (w - kSpeed[i]) / (kSpeed[i + 1] - kSpeed[i]);
   }
   return torque.back();
 }
 
 Rig Table(const std::string& interpolation) {
-  return {.config = {{"law", "torque"}, {"speed_table", "0 2 5 9 12"}, {"torque_table", "3 2.9 2.2 0.7 0"},
-                     {"generating_torque_table", "3.5 3.5 3.1 2 1"}, {"table_interpolation", interpolation}}};
+  return {.config = {{"law", "torque"},
+                     {"speed_table", "0 2 5 9 12"},
+                     {"torque_table", "3 2.9 2.2 0.7 0"},
+                     {"generating_torque_table", "3.5 3.5 3.1 2 1"},
+                     {"table_interpolation", interpolation}}};
 }
 
 TEST(MotorLimitTest, LinearTable) {
-  Trace(Table("linear"), 14, [](double w) { return LinearTable(kTorque, w); },
-        [](double w) { return LinearTable(kBrake, w); });
+  Trace(
+      Table("linear"), 14, [](double w) { return LinearTable(kTorque, w); },
+      [](double w) { return LinearTable(kBrake, w); });
 }
 
 TEST(MotorLimitTest, CubicTableMeetsThePointsAndIsMonotone) {
@@ -80,9 +94,13 @@ TEST(MotorLimitTest, CubicTableMeetsThePointsAndIsMonotone) {
 }
 
 TEST(MotorLimitTest, CubicReproducesAStraightLine) {
-  const Rig rig{.config = {{"law", "torque"}, {"speed_table", "0 1 5 10"}, {"torque_table", "10 9 5 0"},
-                           {"table_interpolation", "cubic"}, {"generating_factor", "0.5"}}};
-  Trace(rig, 12, [](double w) { return std::max(0.0, 10 - w); }, [](double) { return 5.0; });
+  const Rig rig{.config = {{"law", "torque"},
+                           {"speed_table", "0 1 5 10"},
+                           {"torque_table", "10 9 5 0"},
+                           {"table_interpolation", "cubic"},
+                           {"generating_factor", "0.5"}}};
+  Trace(
+      rig, 12, [](double w) { return std::max(0.0, 10 - w); }, [](double) { return 5.0; });
 }
 
 // MuJoCo's own parallelogram: the line of a voltage drive at its ceiling is the trapeze with rated speed zero.

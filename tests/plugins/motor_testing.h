@@ -31,10 +31,10 @@ using Attributes = std::map<std::string, std::string>;
 struct Rig {
   Attributes config = {}, live = {};
   std::string option = "timestep='0.001'";
-  std::string first = {};            // attributes of the first actuator: "actdim='1'"
+  std::string first = {};  // attributes of the first actuator: "actdim='1'"
   int actuators = 1;
   double damping = 0;
-  std::string native = {};           // replaces the plugin's actuators
+  std::string native = {};  // replaces the plugin's actuators
   std::string sensors = {};
 
   std::string Xml() const {

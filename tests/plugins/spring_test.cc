@@ -15,9 +15,11 @@ struct SpringModel {
   bool with_plugin = true;
 
   std::string Xml() const {
-    std::string xml = "<mujoco><compiler angle=\"radian\"/><option timestep=\"" + Text(step_s) + "\" integrator=\"" + integrator + "\"/>";
+    std::string xml = "<mujoco><compiler angle=\"radian\"/><option timestep=\"" + Text(step_s) + "\" integrator=\"" +
+                      integrator + "\"/>";
     if (with_plugin) {
-      xml += "<extension><plugin plugin=\"gapscope.spring\"><instance name=\"f\">" + Config("joint", "j") + config + "</instance></plugin></extension>";
+      xml += "<extension><plugin plugin=\"gapscope.spring\"><instance name=\"f\">" + Config("joint", "j") + config +
+             "</instance></plugin></extension>";
     }
     return xml + "<custom>" + numeric + "</custom><worldbody><body><joint name=\"j\" axis=\"0 0 1\" " + joint +
            "/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/>" +
@@ -38,8 +40,11 @@ TEST(SpringTest, EveryTermHasItsClosedForm) {
            {Config("cubic_n_m_per_rad3", 3) + Config("rest_rad", 0.2), -3 * 0.125},
            {Config("gravity_n_m", 1.5) + Config("gravity_rest_rad", 0.3), -1.5 * std::sin(0.4)},
            {Config("bias_n_m", -0.25), -0.25},
-           {Config("cogging_n_m", 0.1) + Config("cogging_periods_per_rev", 7) + Config("cogging_phase_rad", 0.4), 0.1 * std::sin(4.9 + 0.4)},
-           {Config("cogging_second_n_m", 0.1) + Config("cogging_periods_per_rev", 7) + Config("cogging_second_phase_rad", -1), 0.1 * std::sin(9.8 - 1)}}) {
+           {Config("cogging_n_m", 0.1) + Config("cogging_periods_per_rev", 7) + Config("cogging_phase_rad", 0.4),
+            0.1 * std::sin(4.9 + 0.4)},
+           {Config("cogging_second_n_m", 0.1) + Config("cogging_periods_per_rev", 7) +
+                Config("cogging_second_phase_rad", -1),
+            0.1 * std::sin(9.8 - 1)}}) {
     const ModelPtr m = Compile(SpringModel{.config = c.config}.Xml());
     const DataPtr d(mj_makeData(m.get()));
     d->qpos[0] = kAngle;
@@ -51,8 +56,12 @@ TEST(SpringTest, EveryTermHasItsClosedForm) {
 TEST(SpringTest, EqualsNativeStiffness) {
   constexpr double kRounding_rad = 1e-12;
   for (const char* integrator : {"Euler", "implicitfast", "RK4"}) {
-    const ModelPtr ours = Compile(SpringModel{.config = Config("stiffness_n_m_per_rad", 2) + Config("rest_rad", 0.3), .integrator = integrator}.Xml());
-    const ModelPtr native = Compile(SpringModel{.joint = "stiffness=\"2\" springref=\"0.3\"", .integrator = integrator, .with_plugin = false}.Xml());
+    const ModelPtr ours = Compile(
+        SpringModel{.config = Config("stiffness_n_m_per_rad", 2) + Config("rest_rad", 0.3), .integrator = integrator}
+            .Xml());
+    const ModelPtr native = Compile(
+        SpringModel{.joint = "stiffness=\"2\" springref=\"0.3\"", .integrator = integrator, .with_plugin = false}
+            .Xml());
     const DataPtr a(mj_makeData(ours.get())), b(mj_makeData(native.get()));
     for (int i = 0; i < 2000; ++i) {
       mj_step(ours.get(), a.get());
@@ -71,7 +80,8 @@ TEST(SpringTest, EnergyIsKeptWithoutHysteresisAndLostWithIt) {
   constexpr double kRk4Loss = 1e-6;  // share of the energy in 5 s
   const std::string hard = Config("stiffness_n_m_per_rad", 2) + Config("cubic_n_m_per_rad3", 1.5);
   for (const double height : {0.0, 0.02}) {
-    const ModelPtr m = Compile(SpringModel{.config = hard + Config("hysteresis_n_m", height), .integrator = "RK4"}.Xml());
+    const ModelPtr m =
+        Compile(SpringModel{.config = hard + Config("hysteresis_n_m", height), .integrator = "RK4"}.Xml());
     const DataPtr d(mj_makeData(m.get()));
     d->qpos[0] = 1;
     const double start = Energy(d.get(), 2, 1.5);
@@ -90,13 +100,16 @@ TEST(SpringTest, HysteresisLoopHasItsClosedForm) {
   constexpr double kHeight = 0.3, kReach = 0.1, kSweep = 0.25;
   for (const char* integrator : {"Euler", "RK4"}) {
     for (const int steps : {5, 50}) {
-      const ModelPtr m = Compile(SpringModel{.config = Config("hysteresis_n_m", kHeight) + Config("hysteresis_rad", kReach), .integrator = integrator}.Xml());
+      const ModelPtr m = Compile(SpringModel{
+          .config = Config("hysteresis_n_m", kHeight) + Config("hysteresis_rad", kReach), .integrator = integrator}
+                                     .Xml());
       const DataPtr d(mj_makeData(m.get()));
       double bend = 0, q = 0;
       for (const double target : {kSweep, -kSweep, kSweep}) {
         const double start = q, from = bend, sign = target > start ? 1 : -1;
         for (int i = 1; i <= steps; ++i) {
-          // The joint is pushed so that it lands on the next point: a step of a free body under its own speed and no net torque.
+          // The joint is pushed so that it lands on the next point: a step of a free body under its own speed and no
+          // net torque.
           const double next = start + (target - start) * i / steps;
           d->qvel[0] = (next - d->qpos[0]) / m->opt.timestep;
           m->dof_armature[0] = 1e12;
@@ -114,14 +127,18 @@ TEST(SpringTest, HysteresisLoopHasItsClosedForm) {
 // RK4 calls compute four times a step; the bend must follow the joint's travel, not the number of calls.
 TEST(SpringTest, Rk4SettlesOncePerStep) {
   const auto run = [](double h, const char* integrator) {
-    const ModelPtr m = Compile(SpringModel{.config = Config("stiffness_n_m_per_rad", 2) + Config("hysteresis_n_m", 0.2), .integrator = integrator, .step_s = h}.Xml());
+    const ModelPtr m = Compile(SpringModel{.config = Config("stiffness_n_m_per_rad", 2) + Config("hysteresis_n_m", 0.2),
+                                           .integrator = integrator,
+                                           .step_s = h}
+                                   .Xml());
     const DataPtr d(mj_makeData(m.get()));
     d->qpos[0] = 1;
     for (int i = 0; i < std::lround(1 / h); ++i) mj_step(m.get(), d.get());
     return d->qpos[0];
   };
   const double fine = run(1e-5, "RK4");
-  std::printf("hysteresis: RK4 1 ms %.3g rad, Euler 1 ms %.3g rad off\n", run(1e-3, "RK4") - fine, run(1e-3, "Euler") - fine);
+  std::printf("hysteresis: RK4 1 ms %.3g rad, Euler 1 ms %.3g rad off\n", run(1e-3, "RK4") - fine,
+              run(1e-3, "Euler") - fine);
   EXPECT_NEAR(run(1e-3, "RK4"), fine, 1e-4);
   EXPECT_NEAR(run(1e-4, "Euler"), fine, 1e-3);
 }
@@ -144,10 +161,12 @@ TEST(SpringTest, EveryParameterHasASmoothGradient) {
     const char* key;
     double value, step;
   };
-  const std::vector<Knob> knobs = {{"stiffness_n_m_per_rad", 0.5, 1e-2}, {"rest_rad", 0.1, 1e-2}, {"hysteresis_n_m", 0.05, 1e-3}, {"hysteresis_rad", 0.1, 1e-3},
-                                   {"cubic_n_m_per_rad3", 0.2, 1e-2}, {"gravity_n_m", 0.3, 1e-2}, {"gravity_rest_rad", 0.4, 1e-2}, {"bias_n_m", 0.05, 1e-3},
-                                   {"cogging_n_m", 0.02, 1e-3}, {"cogging_periods_per_rev", 6, 1e-3}, {"cogging_phase_rad", 0.3, 1e-2},
-                                   {"cogging_second_n_m", 0.01, 1e-3}, {"cogging_second_phase_rad", 0.3, 1e-2}};
+  const std::vector<Knob> knobs = {
+      {"stiffness_n_m_per_rad", 0.5, 1e-2},   {"rest_rad", 0.1, 1e-2},           {"hysteresis_n_m", 0.05, 1e-3},
+      {"hysteresis_rad", 0.1, 1e-3},          {"cubic_n_m_per_rad3", 0.2, 1e-2}, {"gravity_n_m", 0.3, 1e-2},
+      {"gravity_rest_rad", 0.4, 1e-2},        {"bias_n_m", 0.05, 1e-3},          {"cogging_n_m", 0.02, 1e-3},
+      {"cogging_periods_per_rev", 6, 1e-3},   {"cogging_phase_rad", 0.3, 1e-2},  {"cogging_second_n_m", 0.01, 1e-3},
+      {"cogging_second_phase_rad", 0.3, 1e-2}};
   SpringModel spring;
   for (const Knob& knob : knobs) spring.numeric += Numeric(knob.key, knob.value);
   const ModelPtr m = Compile(spring.Xml());

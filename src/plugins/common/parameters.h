@@ -31,10 +31,21 @@ struct ParameterSpec {
   double min, max;
 };
 
-// The trimmed text of a `<config>`; empty when absent.
+inline std::string InstanceName(const mjModel* m, int instance) {
+  const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
+  return name ? name : "";
+}
+
+// The trimmed text of a `<config>`, or of the model's `<custom><text name="NAME.KEY">` where there is no config: the way in for programs that build a
+// model through mjSpec, whose attribute map is a C++ object of MuJoCo's own standard library. Empty when absent.
 inline std::string_view ConfigText(const mjModel* m, int instance, const char* key) {
   const char* text = mj_getPluginConfig(m, instance, key);
-  if (!text) return {};
+  if (!text || !*text) {
+    const std::string full = InstanceName(m, instance) + "." + key;
+    const int id = full.front() == '.' ? -1 : mj_name2id(m, mjOBJ_TEXT, full.c_str());
+    if (id < 0) return {};
+    text = m->text_data + m->text_adr[id];
+  }
   std::string_view view(text);
   while (!view.empty() && std::isspace(static_cast<unsigned char>(view.front()))) view.remove_prefix(1);
   while (!view.empty() && std::isspace(static_cast<unsigned char>(view.back()))) view.remove_suffix(1);
@@ -45,11 +56,6 @@ inline std::string_view ConfigText(const mjModel* m, int instance, const char* k
 inline bool ParseNumber(std::string_view text, double* value) {
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), *value);
   return code == std::errc() && end == text.data() + text.size() && std::isfinite(*value);
-}
-
-inline std::string InstanceName(const mjModel* m, int instance) {
-  const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
-  return name ? name : "";
 }
 
 // N parameters, in the order of their specs.

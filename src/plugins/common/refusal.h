@@ -67,7 +67,8 @@ inline std::string ResolveJoint(const mjModel* m, int instance, int* joint) {
       all += (all.empty() ? "" : ", ") + std::string(candidate);
     }
   }
-  return Fault(m, instance, "joint", name, "the name of a hinge or slide joint (" + (all.empty() ? "none named" : all) + ")",
+  return Fault(m, instance, "joint", name,
+               "the name of a hinge or slide joint (" + (all.empty() ? "none named" : all) + ")",
                "set <config key=\"joint\" value=\"...\"/>");
 }
 

@@ -67,8 +67,8 @@ std::unique_ptr<Encoder> Encoder::Create(const mjModel* m, int instance, std::st
   }
   encoder->max_delay_s_ = MaxDelay(m, instance);
   if (const double delay = encoder->live_(m, kDelay); delay > encoder->max_delay_s_) {
-    *problem = who + "attribute 'delay_s' is " + std::to_string(delay) + " s, allowed 0 to max_delay_s = " +
-               std::to_string(encoder->max_delay_s_) + " s; raise max_delay_s";
+    *problem = who + "attribute 'delay_s' is " + std::to_string(delay) +
+               " s, allowed 0 to max_delay_s = " + std::to_string(encoder->max_delay_s_) + " s; raise max_delay_s";
     return encoder;
   }
 

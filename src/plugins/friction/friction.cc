@@ -42,6 +42,7 @@ const std::array<ParameterSpec, Friction::kKeyCount> Friction::kSpecs = {{
 
 std::unique_ptr<Friction> Friction::Create(const mjModel* m, int instance) {
   auto friction = std::make_unique<Friction>();
+  friction->scratch_ = std::make_unique<mjtNum[]>(2 * static_cast<std::size_t>(m->nv));
   const std::string structure = friction->ResolveStructure(m, instance);
   const std::string values = friction->ResolveValues(m, instance);
   if (!structure.empty()) {
@@ -96,8 +97,8 @@ std::string Friction::ResolveValues(const mjModel* m, int instance) {
   return UnknownNumeric(m, instance, keys.data(), kKeyCount);
 }
 
-// Lists the joint's drives and this instance's own actuator elements. MuJoCo runs actuator plugins in the order of their
-// instances, so a motor plugin that comes later has not spoken yet when this one's turn comes.
+// Lists the joint's drives and this instance's own actuator elements. MuJoCo runs actuator plugins in the order of
+// their instances, so a motor plugin that comes later has not spoken yet when this one's turn comes.
 std::string Friction::CheckTurn(const mjModel* m, int instance) {
   for (int i = 0; i < m->nactuator; ++i) {
     const int end = m->actuator_outadr[i] + m->actuator_outnum[i];
@@ -114,8 +115,8 @@ std::string Friction::CheckTurn(const mjModel* m, int instance) {
     last_in_turn_ = false;
     if (own_outputs_.empty()) continue;
     return "plugin instance '" + InstanceName(m, instance) + "': it stands before the actuator plugin instance '" +
-           InstanceName(m, other) + "' that drives its joint, allowed only after it; move its <plugin plugin=\"" + kName +
-           "\"> to the end of <extension>";
+           InstanceName(m, other) + "' that drives its joint, allowed only after it; move its <plugin plugin=\"" +
+           kName + "\"> to the end of <extension>";
   }
   return {};
 }
@@ -173,9 +174,8 @@ double Friction::ExternalTorque(mjData* d) const {
 
 // The joint's acceleration without constraints: its sign tells which way the joint starts, other joints' pull included.
 double Friction::FreeAcceleration(const mjModel* m, mjData* d) const {
-  mj_markStack(d);
-  mjtNum* force = mj_stackAllocNum(d, m->nv);
-  mjtNum* acceleration = mj_stackAllocNum(d, m->nv);
+  mjtNum* const force = scratch_.get();
+  mjtNum* const acceleration = scratch_.get() + m->nv;
   for (int i = 0; i < m->nv; ++i) force[i] = d->qfrc_passive[i] - d->qfrc_bias[i] + d->qfrc_applied[i];
   for (int i = 0; i < m->nactuator; ++i) {
     const int end = m->actuator_outadr[i] + m->actuator_outnum[i];
@@ -196,9 +196,7 @@ double Friction::FreeAcceleration(const mjModel* m, mjData* d) const {
     }
   }
   mj_solveM(m, d, acceleration, force, 1);
-  const double result = acceleration[dof_];
-  mj_freeStack(d);
-  return result;
+  return acceleration[dof_];
 }
 
 double Friction::Level(const mjModel* m, const DryFriction& law, double speed, double drive, double external,
@@ -224,8 +222,8 @@ void Friction::WriteRow(const mjModel* m, mjData* d, double level, bool soften) 
     if (d->nA > 0) {
       // PGS solves with A + R, projected before this.
       const bool sparse = d->efc_AR_rownnz != nullptr;
-      const int at = sparse ? FindColumn(d->efc_AR_rownnz, d->efc_AR_rowadr, d->efc_AR_colind, row, row)
-                            : row * d->nefc + row;
+      const int at =
+          sparse ? FindColumn(d->efc_AR_rownnz, d->efc_AR_rowadr, d->efc_AR_colind, row, row) : row * d->nefc + row;
       if (at >= 0) d->efc_AR[at] += r - d->efc_R[row];
     }
     d->efc_R[row] = r;

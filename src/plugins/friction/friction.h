@@ -1,9 +1,9 @@
 // gapscope.friction: dry, viscous and quadratic friction of one hinge or slide joint, with true stick.
 //
-// A friction torque that is a steep function of speed creeps under load and needs tiny steps. MuJoCo's constraint solver
-// sticks: a joint with `frictionloss` gets a row whose force is whatever stops the joint, up to a level. This plugin
-// rewrites that level on every compute, from speed, direction and transmitted torque (law.h), and adds viscous and
-// quadratic drag as passive torque. Alternatively the LuGre model, whose bristle gives presliding motion:
+// A friction torque that is a steep function of speed creeps under load and needs tiny steps. MuJoCo's constraint
+// solver sticks: a joint with `frictionloss` gets a row whose force is whatever stops the joint, up to a level. This
+// plugin rewrites that level on every compute, from speed, direction and transmitted torque (law.h), and adds viscous
+// and quadratic drag as passive torque. Alternatively the LuGre model, whose bristle gives presliding motion:
 //   dz/dt = w - sigma0 |w| z / level,  torque = -(sigma0 z + sigma1 dz/dt)
 // Attributes, recipe and limits: README.md in this folder.
 #ifndef GAPSCOPE_PLUGINS_FRICTION_FRICTION_H_
@@ -24,9 +24,23 @@ namespace gapscope::plugins {
 class Friction {
  public:
   enum Key {
-    kFriction, kBreakaway, kStribeckSpeed, kStribeckExponent, kViscous, kQuadratic, kLoadCoefficient, kLoadQuadratic,
-    kFrictionPositive, kFrictionNegative, kViscousPositive, kViscousNegative, kBackdriveFactor, kRowSoftness, kSigma0,
-    kSigma1, kKeyCount
+    kFriction,
+    kBreakaway,
+    kStribeckSpeed,
+    kStribeckExponent,
+    kViscous,
+    kQuadratic,
+    kLoadCoefficient,
+    kLoadQuadratic,
+    kFrictionPositive,
+    kFrictionNegative,
+    kViscousPositive,
+    kViscousNegative,
+    kBackdriveFactor,
+    kRowSoftness,
+    kSigma0,
+    kSigma1,
+    kKeyCount
   };
   static const std::array<ParameterSpec, kKeyCount> kSpecs;
 
@@ -36,11 +50,11 @@ class Friction {
 
   // What the next step needs of the last one; stands in mjData.plugin_state.
   struct State {
-    double drive_n_m;                   // torque of the joint's actuators in the last step
-    double external_n_m;                // torque of gravity, springs and applied forces in the last step
+    double drive_n_m;                     // torque of the joint's actuators in the last step
+    double external_n_m;                  // torque of gravity, springs and applied forces in the last step
     double free_acceleration_rad_per_s2;  // of the last step, without constraints
-    double own_n_m;                     // passive torque of this plugin in the last compute
-    BristleState bristle;               // LuGre
+    double own_n_m;                       // passive torque of this plugin in the last compute
+    BristleState bristle;                 // LuGre
   };
   static constexpr int kStateSize = sizeof(State) / sizeof(mjtNum);
 
@@ -77,7 +91,9 @@ class Friction {
   Model model_ = Model::kDry;
   bool last_in_turn_ = true;  // its ACTUATOR compute comes after those of the joint's drives
   bool inert_ = false;
-  std::vector<int> drives_;      // actuators that may act on the joint
+  std::vector<int> drives_;  // actuators that may act on the joint
+  // Two vectors of nv: an instance belongs to one mjData, and MuJoCo's stack calls do not link under AddressSanitizer.
+  std::unique_ptr<mjtNum[]> scratch_;
   std::vector<int> own_outputs_;  // force outputs of its own actuator elements
 };
 

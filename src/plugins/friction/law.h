@@ -34,7 +34,8 @@ inline double StribeckShare(double speed, double stribeck_speed, double exponent
 }
 
 // `direction` is the sign of the motion, or at rest of the motion that would begin without friction; 0 takes the mean
-// of both. `load_n_m` is the torque through the gears, `drive_n_m` the motor's: against the direction it is back-driven.
+// of both. `load_n_m` is the torque through the gears, `drive_n_m` the motor's: against the direction it is
+// back-driven.
 inline double DryLevel(const DryFriction& f, double speed_rad_per_s, int direction, double load_n_m, double drive_n_m) {
   double level = f.coulomb_n_m;
   if (f.load_coefficient != 0 || f.load_quadratic_per_n_m != 0) {

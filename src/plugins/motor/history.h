@@ -1,5 +1,5 @@
-// The past of a drive or a sensor, kept in `mjData.plugin_state` so that mj_resetData, mj_setState and mj_copyData treat
-// it like any other state.
+// The past of a drive or a sensor, kept in `mjData.plugin_state` so that mj_resetData, mj_setState and mj_copyData
+// treat it like any other state.
 //
 // A ring of samples (t, q, qdot, ctrl...) at the starts of past steps, and the sample of the step that is open now: the
 // engine's `compute` opens a step, `advance` closes it, so RK4's four computes make one sample. Times may be irregular.

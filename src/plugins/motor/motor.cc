@@ -99,8 +99,8 @@ double Motor::Request(const mjModel* m, const double* inputs, Motion seen, doubl
       break;
     }
     case MotorLaw::kAffine:
-      torque = Parameter(m, kGain) * command + (Parameter(m, kBias0) + Parameter(m, kBias1) * seen.q +
-               Parameter(m, kBias2) * seen.qdot);
+      torque = Parameter(m, kGain) * command +
+               (Parameter(m, kBias0) + Parameter(m, kBias1) * seen.q + Parameter(m, kBias2) * seen.qdot);
       break;
   }
   return torque + Input(inputs, kFeedforward, 0);
@@ -116,16 +116,16 @@ Motor::Limits Motor::LimitsAt(const mjModel* m, double torque, double speed) con
   }
   if (trapeze_) {
     if (const double peak = Parameter(m, kPeakTorque); peak > 0) {
-      limit = std::min(limit, torque * speed < 0 ? peak * Parameter(m, kGeneratingFactor)
-                                                 : TrapezeLimit(size, peak, Parameter(m, kRatedSpeed),
-                                                                Parameter(m, kNoLoadSpeed)));
+      limit = std::min(limit, torque * speed < 0
+                                  ? peak * Parameter(m, kGeneratingFactor)
+                                  : TrapezeLimit(size, peak, Parameter(m, kRatedSpeed), Parameter(m, kNoLoadSpeed)));
     }
   }
   if (torque * speed < 0 && !config_.generating.empty()) {
     limit = std::min(limit, config_.generating(size));
   } else if (!config_.motoring.empty()) {
-    limit = std::min(limit, torque * speed < 0 ? config_.motoring.peak() * Parameter(m, kGeneratingFactor)
-                                               : config_.motoring(size));
+    limit = std::min(
+        limit, torque * speed < 0 ? config_.motoring.peak() * Parameter(m, kGeneratingFactor) : config_.motoring(size));
   }
   Limits limits{-limit, limit};
   if (forcerange_) {

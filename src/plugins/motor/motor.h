@@ -1,9 +1,9 @@
 // gapscope.motor: a drive between command and joint torque, as an actuator plugin.
 //
-// command -> delay -> [dead zone] -> law -> delay in the servo's loop -> lag(s) -> [dead zone] -> limits (torque, power,
-// torque-speed curve, all sagging) -> the drive's own estimate -> droop -> asymmetry -> gear efficiency -> joint.
-// Every stage is neutral at its default and skipped by one branch when it can only be neutral. Equations, sources and
-// attributes: README.md.
+// command -> delay -> [dead zone] -> law -> delay in the servo's loop -> lag(s) -> [dead zone] -> limits (torque,
+// power, torque-speed curve, all sagging) -> the drive's own estimate -> droop -> asymmetry -> gear efficiency ->
+// joint. Every stage is neutral at its default and skipped by one branch when it can only be neutral. Equations,
+// sources and attributes: README.md.
 #ifndef GAPSCOPE_PLUGINS_MOTOR_MOTOR_H_
 #define GAPSCOPE_PLUGINS_MOTOR_MOTOR_H_
 
@@ -52,11 +52,11 @@ class Motor {
 
   MotorConfig config_;
   bool inert_ = false;
-  int state_ = 0;                // address in plugin_state
-  int capacity_ = 0;             // of the history
-  int output_ = 0;               // address in actuator_force
-  int first_ = 0;                // the actuator that carries the torque
-  std::array<int, kRoles> actuator_{};  // of each input
+  int state_ = 0;                              // address in plugin_state
+  int capacity_ = 0;                           // of the history
+  int output_ = 0;                             // address in actuator_force
+  int first_ = 0;                              // the actuator that carries the torque
+  std::array<int, kRoles> actuator_{};         // of each input
   int lag_ = -1, second_lag_ = -1, sag_ = -1;  // addresses in act; -1: stage neutral
   // Stages that may not be neutral.
   bool history_, dead_zone_, limits_, trapeze_, forcerange_, droop_, asymmetry_, efficiency_, supply_, enable_;

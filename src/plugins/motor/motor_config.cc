@@ -10,7 +10,7 @@
 namespace gapscope::plugins {
 namespace {
 
-constexpr const char* kRoleNames[kRoles] = {"target", "velocity",    "torque", "current",
+constexpr const char* kRoleNames[kRoles] = {"target",  "velocity",    "torque", "current",
                                             "voltage", "feedforward", "supply", "enable"};
 struct LawName {
   const char* name;
@@ -31,8 +31,9 @@ std::string Problem(const mjModel* m, int instance, const std::string& text) {
 
 std::string Bad(const mjModel* m, int instance, const char* key, std::string_view found, const std::string& allowed,
                 const std::string& cure = "") {
-  return Problem(m, instance, "attribute '" + std::string(key) + "' is '" + std::string(found) + "', allowed " +
-                                  allowed + (cure.empty() ? "" : "; " + cure));
+  return Problem(m, instance,
+                 "attribute '" + std::string(key) + "' is '" + std::string(found) + "', allowed " + allowed +
+                     (cure.empty() ? "" : "; " + cure));
 }
 
 std::vector<std::string_view> Words(std::string_view text) {
@@ -110,14 +111,48 @@ const std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"asymmetry", "1", 0, -1, 1},
 }};
 
-const char* const kMotorAttributes[] = {
-    "law", "inputs", "dead_zone_on", "max_delay_s", "min_timestep_s", "speed_table", "torque_table",
-    "generating_torque_table", "table_interpolation",
-    "kp", "kd", "gain", "bias0", "bias1", "bias2", "kt", "ke", "resistance", "gear", "efficiency_drive",
-    "efficiency_backdrive", "duty_gain", "duty_damping", "duty_limit", "supply_v", "command_delay_s",
-    "torque_delay_s", "time_constant_s", "second_time_constant_s", "dead_zone", "torque_limit_n_m", "power_w",
-    "generating_power_w", "peak_torque_n_m", "rated_speed_rad_per_s", "no_load_speed_rad_per_s", "generating_factor",
-    "sag_fraction", "sag_time_constant_s", "droop_at_peak", "droop_reference_n_m", "asymmetry"};
+const char* const kMotorAttributes[] = {"law",
+                                        "inputs",
+                                        "dead_zone_on",
+                                        "max_delay_s",
+                                        "min_timestep_s",
+                                        "speed_table",
+                                        "torque_table",
+                                        "generating_torque_table",
+                                        "table_interpolation",
+                                        "kp",
+                                        "kd",
+                                        "gain",
+                                        "bias0",
+                                        "bias1",
+                                        "bias2",
+                                        "kt",
+                                        "ke",
+                                        "resistance",
+                                        "gear",
+                                        "efficiency_drive",
+                                        "efficiency_backdrive",
+                                        "duty_gain",
+                                        "duty_damping",
+                                        "duty_limit",
+                                        "supply_v",
+                                        "command_delay_s",
+                                        "torque_delay_s",
+                                        "time_constant_s",
+                                        "second_time_constant_s",
+                                        "dead_zone",
+                                        "torque_limit_n_m",
+                                        "power_w",
+                                        "generating_power_w",
+                                        "peak_torque_n_m",
+                                        "rated_speed_rad_per_s",
+                                        "no_load_speed_rad_per_s",
+                                        "generating_factor",
+                                        "sag_fraction",
+                                        "sag_time_constant_s",
+                                        "droop_at_peak",
+                                        "droop_reference_n_m",
+                                        "asymmetry"};
 const int kMotorAttributeCount = static_cast<int>(std::size(kMotorAttributes));
 static_assert(std::size(kMotorAttributes) == kMotorParameters + 9);
 
@@ -187,22 +222,27 @@ std::string MotorConfig::Parse(const mjModel* m, int instance) {
     if (m->actuator_delay[i] != 0) {
       return Problem(m, instance, "actuator '" + name + "' has a native delay, allowed 0; use command_delay_s");
     }
-    if (m->actuator_trntype[i] != m->actuator_trntype[first] || m->actuator_trnid[2 * i] != m->actuator_trnid[2 * first]) {
-      return Problem(m, instance, "actuator '" + name + "' is not on the joint of the first one, allowed one joint per "
-                                  "instance; make another instance");
+    if (m->actuator_trntype[i] != m->actuator_trntype[first] ||
+        m->actuator_trnid[2 * i] != m->actuator_trnid[2 * first]) {
+      return Problem(m, instance,
+                     "actuator '" + name +
+                         "' is not on the joint of the first one, allowed one joint per "
+                         "instance; make another instance");
     }
   }
   if (found != inputs) {
-    return Problem(m, instance, "attribute 'inputs' lists " + std::to_string(inputs) + " role(s) but " +
-                                    std::to_string(found) + " actuator(s) name this instance, allowed as many; list "
-                                    "one role per actuator, in the order of the actuators");
+    return Problem(m, instance,
+                   "attribute 'inputs' lists " + std::to_string(inputs) + " role(s) but " + std::to_string(found) +
+                       " actuator(s) name this instance, allowed as many; list "
+                       "one role per actuator, in the order of the actuators");
   }
 
   // Where the dead zone sits.
   const std::string_view dead_text = ConfigText(m, instance, "dead_zone_on");
   dead_zone_on_command = law == MotorLaw::kVoltage || law == MotorLaw::kCurrent;
   if (!dead_text.empty()) {
-    if (dead_text != "command" && dead_text != "torque") return Bad(m, instance, "dead_zone_on", dead_text, "command, torque");
+    if (dead_text != "command" && dead_text != "torque")
+      return Bad(m, instance, "dead_zone_on", dead_text, "command, torque");
     dead_zone_on_command = dead_text == "command";
   }
 
@@ -216,8 +256,9 @@ std::string MotorConfig::Parse(const mjModel* m, int instance) {
   const auto needs = [&](std::initializer_list<const char*> keys) -> std::string {
     for (const char* key : keys) {
       if (!given(key)) {
-        return Problem(m, instance, "attribute '" + std::string(key) + "' is missing, law '" + chosen->name +
-                                        "' needs it; add <config key=\"" + key + "\" value=\"...\"/>");
+        return Problem(m, instance,
+                       "attribute '" + std::string(key) + "' is missing, law '" + chosen->name +
+                           "' needs it; add <config key=\"" + key + "\" value=\"...\"/>");
       }
     }
     return "";
@@ -241,9 +282,9 @@ std::string MotorConfig::Parse(const mjModel* m, int instance) {
   }
   max_delay_s = MaxDelay(m, instance);
   if (const double delay = live(m, kCommandDelay) + live(m, kTorqueDelay); delay > max_delay_s) {
-    return Problem(m, instance, "attributes 'command_delay_s' and 'torque_delay_s' add up to " + std::to_string(delay) +
-                                    " s, allowed 0 to max_delay_s = " + std::to_string(max_delay_s) +
-                                    " s; raise max_delay_s");
+    return Problem(m, instance,
+                   "attributes 'command_delay_s' and 'torque_delay_s' add up to " + std::to_string(delay) +
+                       " s, allowed 0 to max_delay_s = " + std::to_string(max_delay_s) + " s; raise max_delay_s");
   }
 
   // Torque-speed tables.
@@ -251,8 +292,8 @@ std::string MotorConfig::Parse(const mjModel* m, int instance) {
   if (!interpolation_text.empty() && interpolation_text != "linear" && interpolation_text != "cubic") {
     return Bad(m, instance, "table_interpolation", interpolation_text, "linear, cubic", "leave it out for linear");
   }
-  const auto interpolation = interpolation_text == "cubic" ? SpeedTable::Interpolation::kMonotoneCubic
-                                                           : SpeedTable::Interpolation::kLinear;
+  const auto interpolation =
+      interpolation_text == "cubic" ? SpeedTable::Interpolation::kMonotoneCubic : SpeedTable::Interpolation::kLinear;
   const std::string_view speed_text = ConfigText(m, instance, "speed_table");
   std::vector<double> speed;
   bool good = Numbers(speed_text, &speed) && (speed_text.empty() || speed.size() >= 2);
@@ -260,31 +301,35 @@ std::string MotorConfig::Parse(const mjModel* m, int instance) {
   if (!good) {
     return Bad(m, instance, "speed_table", speed_text, "two or more numbers >= 0 in rad/s, strictly ascending");
   }
-  for (const auto& [key, table] : {std::pair{"torque_table", &motoring}, std::pair{"generating_torque_table", &generating}}) {
+  for (const auto& [key, table] :
+       {std::pair{"torque_table", &motoring}, std::pair{"generating_torque_table", &generating}}) {
     const std::string_view text = ConfigText(m, instance, key);
     if (text.empty()) continue;
     std::vector<double> torque;
     good = Numbers(text, &torque) && torque.size() == speed.size();
     for (const double value : torque) good = good && value >= 0;
     if (!good) {
-      return Bad(m, instance, key, text, "as many numbers >= 0 in N m as speed_table has (" +
-                                             std::to_string(speed.size()) + ")");
+      return Bad(m, instance, key, text,
+                 "as many numbers >= 0 in N m as speed_table has (" + std::to_string(speed.size()) + ")");
     }
     table->Set(speed, std::move(torque), interpolation);
   }
   if (!speed.empty() && motoring.empty() && generating.empty()) {
-    return Problem(m, instance, "attribute 'speed_table' stands alone, allowed with torque_table or "
-                                "generating_torque_table; add one");
+    return Problem(m, instance,
+                   "attribute 'speed_table' stands alone, allowed with torque_table or "
+                   "generating_torque_table; add one");
   }
 
   // Activations for what the engine integrates.
   int needed = 0;
   for (const MotorParameter p : {kTimeConstant, kSecondTimeConstant, kSagFraction}) needed += !live.IsNeutral(p, 0);
   if (m->actuator_actnum[first] < needed) {
-    return Problem(m, instance, "the first actuator has actdim " + std::to_string(m->actuator_actnum[first]) +
-                                    ", allowed at least " + std::to_string(needed) +
-                                    " (one each for time_constant_s, second_time_constant_s, sag_fraction where they "
-                                    "are used); write actdim=\"" + std::to_string(needed) + "\" on that <plugin>");
+    return Problem(m, instance,
+                   "the first actuator has actdim " + std::to_string(m->actuator_actnum[first]) +
+                       ", allowed at least " + std::to_string(needed) +
+                       " (one each for time_constant_s, second_time_constant_s, sag_fraction where they "
+                       "are used); write actdim=\"" +
+                       std::to_string(needed) + "\" on that <plugin>");
   }
 
   // Something that can sag.
@@ -292,8 +337,9 @@ std::string MotorConfig::Parse(const mjModel* m, int instance) {
                  m->actuator_forcelimited[first];
   for (const MotorParameter p : {kTorqueLimit, kPower, kPeakTorque}) ceiling = ceiling || !live.IsNeutral(p, 0);
   if (!live.IsNeutral(kSagFraction, 0) && !ceiling) {
-    return Problem(m, instance, "attribute 'sag_fraction' needs a ceiling that sags; give torque_limit_n_m, "
-                                "peak_torque_n_m, power_w, torque_table, forcerange, or supply_v");
+    return Problem(m, instance,
+                   "attribute 'sag_fraction' needs a ceiling that sags; give torque_limit_n_m, "
+                   "peak_torque_n_m, power_w, torque_table, forcerange, or supply_v");
   }
   return {};
 }

@@ -19,10 +19,40 @@ enum MotorRole { kTarget, kVelocity, kTorque, kCurrent, kVoltage, kFeedforward, 
 
 // Live parameters; units, neutral values and ranges in kMotorSpecs, meaning in README.md.
 enum MotorParameter {
-  kKp, kKd, kGain, kBias0, kBias1, kBias2, kKt, kKe, kResistance, kGear, kEfficiencyDrive, kEfficiencyBackdrive,
-  kDutyGain, kDutyDamping, kDutyLimit, kSupplyV, kCommandDelay, kTorqueDelay, kTimeConstant, kSecondTimeConstant,
-  kDeadZone, kTorqueLimit, kPower, kGeneratingPower, kPeakTorque, kRatedSpeed, kNoLoadSpeed, kGeneratingFactor,
-  kSagFraction, kSagTimeConstant, kDroopAtPeak, kDroopReference, kAsymmetry, kMotorParameters
+  kKp,
+  kKd,
+  kGain,
+  kBias0,
+  kBias1,
+  kBias2,
+  kKt,
+  kKe,
+  kResistance,
+  kGear,
+  kEfficiencyDrive,
+  kEfficiencyBackdrive,
+  kDutyGain,
+  kDutyDamping,
+  kDutyLimit,
+  kSupplyV,
+  kCommandDelay,
+  kTorqueDelay,
+  kTimeConstant,
+  kSecondTimeConstant,
+  kDeadZone,
+  kTorqueLimit,
+  kPower,
+  kGeneratingPower,
+  kPeakTorque,
+  kRatedSpeed,
+  kNoLoadSpeed,
+  kGeneratingFactor,
+  kSagFraction,
+  kSagTimeConstant,
+  kDroopAtPeak,
+  kDroopReference,
+  kAsymmetry,
+  kMotorParameters
 };
 extern const std::array<ParameterSpec, kMotorParameters> kMotorSpecs;
 
@@ -32,11 +62,11 @@ extern const int kMotorAttributeCount;
 
 struct MotorConfig {
   MotorLaw law = MotorLaw::kPosition;
-  int inputs = 1;                        // actuators of the instance, in order of id
-  std::array<int, kRoles> input_of{};    // role -> index among the inputs, -1: none
-  int command = 0;                       // index of the input that the law follows
+  int inputs = 1;                      // actuators of the instance, in order of id
+  std::array<int, kRoles> input_of{};  // role -> index among the inputs, -1: none
+  int command = 0;                     // index of the input that the law follows
   bool dead_zone_on_command = false;
-  double max_delay_s = 0;                // 0: no history
+  double max_delay_s = 0;  // 0: no history
   SpeedTable motoring, generating;
   LiveParameters<kMotorParameters> live;
 

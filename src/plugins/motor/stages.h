@@ -60,7 +60,8 @@ class SpeedTable {
   std::vector<double> speed_, torque_, slope_;
 };
 
-// Peak torque up to the rated speed, then a line to zero at no-load speed; without a no-load speed it stays at the peak.
+// Peak torque up to the rated speed, then a line to zero at no-load speed; without a no-load speed it stays at the
+// peak.
 inline double TrapezeLimit(double speed, double peak, double rated, double no_load) {
   if (!(no_load > 0) || speed <= rated) return peak;
   return speed >= no_load ? 0 : peak * (no_load - speed) / (no_load - rated);

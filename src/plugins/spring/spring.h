@@ -2,8 +2,8 @@
 //
 //   torque = -k e - k3 e^3 - H s - G sin(q - q_g) + B + A sin(P q + a) + A2 sin(2 P q + a2),   e = q - rest
 //
-// with s in -1 .. 1 the bend of a Dahl bristle (../common/bristle.h), which makes a loop of half-height H that turns over
-// within a few `hysteresis_rad`. Stands for a cable, a spring that hardens, an unbalanced mass, a bias, cogging.
+// with s in -1 .. 1 the bend of a Dahl bristle (../common/bristle.h), which makes a loop of half-height H that turns
+// over within a few `hysteresis_rad`. Stands for a cable, a spring that hardens, an unbalanced mass, a bias, cogging.
 // MuJoCo's own `stiffness` and `springref` do for a plain linear spring. Attributes: README.md in this folder.
 #ifndef GAPSCOPE_PLUGINS_SPRING_SPRING_H_
 #define GAPSCOPE_PLUGINS_SPRING_SPRING_H_
@@ -21,8 +21,20 @@ namespace gapscope::plugins {
 class Spring {
  public:
   enum Key {
-    kStiffness, kRest, kHysteresis, kHysteresisAngle, kCubic, kGravity, kGravityRest, kBias, kCogging, kCoggingPeriods,
-    kCoggingPhase, kCoggingSecond, kCoggingSecondPhase, kKeyCount
+    kStiffness,
+    kRest,
+    kHysteresis,
+    kHysteresisAngle,
+    kCubic,
+    kGravity,
+    kGravityRest,
+    kBias,
+    kCogging,
+    kCoggingPeriods,
+    kCoggingPhase,
+    kCoggingSecond,
+    kCoggingSecondPhase,
+    kKeyCount
   };
   static const std::array<ParameterSpec, kKeyCount> kSpecs;
   static constexpr int kStateSize = sizeof(BristleState) / sizeof(mjtNum);

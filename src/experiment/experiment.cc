@@ -126,7 +126,7 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
       map.Fail(item, {.what = "the signal '" + spec.signal + "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
     }
-    ReadScaling(map, item, &spec.factor, &spec.offset);
+    spec.unit = ReadScaling(map, item, &spec.factor, &spec.offset);
     spec.resolution = map.Number("resolution", 0);
     spec.optional = map.Flag("optional", false);
     spec.scored = map.Flag("score", true);

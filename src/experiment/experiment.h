@@ -40,6 +40,7 @@ struct MeasuredSpec {
   std::vector<std::string> columns;  // the first one that the log has
   SignalKind kind = SignalKind::kPosition;
   std::string on;                    // joint, or actuator for kTorque
+  std::string unit;                  // SI unit: "rad", "rad/s", "N m"
   double factor = 1, offset = 0;     // measured in SI = factor * column + offset
   double resolution = 0;             // size of one sensor count, SI; 0: unknown
   bool optional = false;

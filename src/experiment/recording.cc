@@ -84,10 +84,18 @@ Result<std::map<std::string, double>> BindValues(const Experiment& experiment, c
 
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path) {
   GS_ASSIGN(const Log log, ReadLog(log_path, experiment.read));
-  GS_ASSIGN(Timeline timeline, BuildTimeline(log, experiment.timeline));
+  TimelineOptions timeline_options = experiment.timeline;
+  for (const auto& spec : experiment.commands) {
+    if (const Column* column = FindFirst(log, spec.columns)) timeline_options.required.push_back(column->name);
+  }
+  for (const auto& spec : experiment.measured) {
+    if (const Column* column = FindFirst(log, spec.columns)) timeline_options.required.push_back(column->name);
+  }
+  GS_ASSIGN(Timeline timeline, BuildTimeline(log, timeline_options));
   GS_RETURN_IF_ERROR(CutTimeline(experiment, log, &timeline));
   Recording recording;
   recording.log_path = log_path;
+  recording.rows_in_log = log.rows();
   recording.findings = log.findings;
   recording.findings.insert(recording.findings.end(), timeline.findings.begin(), timeline.findings.end());
   recording.time_s = timeline.time_s;

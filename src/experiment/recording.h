@@ -30,6 +30,7 @@ struct Recording {
   std::map<std::string, double> values;
   Timeline timeline;
   std::vector<Finding> findings;  // of reading, timeline and binding
+  std::size_t rows_in_log = 0;    // before repairs
 
   std::size_t rows() const { return time_s.size(); }
   double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }

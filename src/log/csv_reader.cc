@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <limits>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -103,6 +104,11 @@ class BodyReader {
           columns_[c]->push_back(value);
           ++values_;
           p = stop;
+        } else if (const char* comma_stop = DecimalComma<kBlankDelimiter>(p, q, &value)) {
+          columns_[c]->push_back(value);
+          ++values_;
+          decimal_comma_.Add(row_, line_);
+          p = comma_stop;
         } else {
           const std::string_view rest(p, static_cast<std::size_t>(end_ - p));
           const FieldText field = FieldAt(rest, 0, delimiter);
@@ -143,6 +149,26 @@ class BodyReader {
     return Ok();
   }
 
+  // A number "1,5" from `p` on, whose comma is at `comma`, between delimiters that are no commas: read with a point
+  // instead. Returns what follows it, or null when it is not such a number.
+  template <bool kBlankDelimiter>
+  const char* DecimalComma(const char* p, const char* comma, double* value) const {
+    std::array<char, 64> text;
+    const auto whole = static_cast<std::size_t>(comma - p);
+    if (dialect_.delimiter == ',' || comma == end_ || *comma != ',' || comma == p || whole + 1 >= text.size())
+      return nullptr;
+    const std::size_t size = std::min(text.size(), static_cast<std::size_t>(end_ - p));
+    std::memcpy(text.data(), p, size);
+    text[whole] = '.';
+    const auto [q, failure] = std::from_chars(text.data(), text.data() + size, *value);
+    const auto used = static_cast<std::size_t>(q - text.data());
+    if (failure != std::errc{} || used <= whole || used == text.size() || !std::isfinite(*value)) return nullptr;
+    const char* stop = SkipBlanks<kBlankDelimiter>(p + used);
+    const bool closed =
+        stop == end_ || IsEnd(*stop) || (kBlankDelimiter ? stop != p + used : *stop == dialect_.delimiter);
+    return closed ? stop : nullptr;
+  }
+
   static bool IsEnd(char c) { return c == '\n' || c == '\r'; }
 
   template <bool kBlankDelimiter>
@@ -163,7 +189,10 @@ class BodyReader {
   std::string_view LineText(const char* start) const {
     return {start, static_cast<std::size_t>(LineEnd(start) - start)};
   }
-  bool IsHeaderAgain(const char* start) const { return LineText(start) == dialect_.header_text; }
+  bool IsHeaderAgain(const char* start) const {
+    const std::string_view rest(start, static_cast<std::size_t>(end_ - start));
+    return rest.starts_with(dialect_.header_text) && LineText(start) == dialect_.header_text;
+  }
 
   std::string Here(std::size_t column) const {
     return fmt::format("{}:{}, column {}", path_, line_, dialect_.names[column]);
@@ -246,6 +275,8 @@ class BodyReader {
 
   // "1,5" in one place and "0.5" in another: one of them is not what it seems.
   Status CheckNoDecimalPoint() const {
+    const std::string_view body = bytes_.substr(dialect_.body_offset);
+    if (std::memchr(body.data(), '.', body.size()) == nullptr) return Ok();
     std::size_t number = dialect_.body_line;
     for (std::size_t offset = dialect_.body_offset; offset < bytes_.size(); ++number) {
       const Line line = LineAt(bytes_, offset);

@@ -55,6 +55,8 @@ UniformSignal ResampleUniform(const std::vector<double>& time_s, const std::vect
   UniformSignal signal;
   if (t.size() < 2) return signal;
   const double duration_s = time_s.back() - time_s.front();
+  // A log that is mostly one gap is not worth more than a few points per row.
+  most = std::min(most, 4 * values.size() + 1024);
   step_s = std::max(step_s, duration_s / static_cast<double>(most - 1));
   const auto points = static_cast<std::size_t>(std::floor(duration_s / step_s * (1 + 1e-12))) + 1;
   signal.step_s = step_s;

@@ -10,7 +10,8 @@
 namespace gapscope {
 
 // Values at start, start + step ...: linear between samples for what was measured, held for commands. NaN are bridged.
-// Empty when there is no finite value. At most `most` points: the step grows if need be.
+// Empty with fewer than two finite values. At most `most` points, and at most about four per value: the step grows if
+// need be.
 struct UniformSignal {
   double step_s = 0;
   std::vector<double> values;

@@ -17,6 +17,8 @@ std::string OneLine(std::string text) {
 
 // MuJoCo reports what it cannot refuse otherwise through mju_error, which by default ends the process.
 [[noreturn]] void ThrowMujocoError(const char* message) { throw std::runtime_error(message); }
+// What MuJoCo warns about (a state that blows up) is an outcome of a replay; by default it would write MUJOCO_LOG.TXT into the user's folder.
+void DropMujocoWarning(const char*) {}
 
 std::vector<std::string> NamesOf(const std::vector<Parameter>& parameters, const Experiment& experiment) {
   std::vector<std::string> names;
@@ -69,6 +71,7 @@ double DrivenInertia(const mjModel& m, int joint) {
 
 Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, const std::vector<EffectUse>& effects, const ScaleTable& scales) {
   mju_user_error = ThrowMujocoError;
+  mju_user_warning = DropMujocoWarning;
   std::shared_ptr<Model> model(new Model);
   model->experiment_ = experiment;
   model->effects_ = effects;

@@ -121,6 +121,11 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     if (options_.objective != Objective::kFreeRun) add(ReplayMode::kWindows);
     if (options_.objective != Objective::kWindows) add(ReplayMode::kFreeRun);
   }
+  if (options_.max_windows > 0 && windows_.size() > options_.max_windows) {
+    std::vector<FitWindow> kept;
+    for (std::size_t i = 0; i < options_.max_windows; ++i) kept.push_back(std::move(windows_[i * windows_.size() / options_.max_windows]));
+    windows_ = std::move(kept);
+  }
   if (options_.fit_shift && model.command_delay() < 0) {
     // In samples.
     low.push_back(-1);
@@ -310,7 +315,7 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns 
   return result;
 }
 
-Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Columns columns) {
+Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Columns columns, Snapshot* keep) {
   const bool all = columns == Columns::kAll;
   const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0;
   struct Part {
@@ -393,6 +398,10 @@ Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Colum
         worker.residual[i] *= weight;
       }
     }
+    if (keep) {
+      keep->residuals[w] = worker.residual;
+      keep->jacobians[w] = worker.jacobian;
+    }
     const Eigen::MatrixXd full = worker.jacobian.transpose() * worker.jacobian;
     const Eigen::VectorXd slope = worker.jacobian.transpose() * worker.residual;
     Eigen::MatrixXd own = full.bottomRightCorner(m, m);
@@ -449,6 +458,137 @@ Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Colum
   result.gradient += anchor_weight_.cwiseProduct(point.y - anchor_);
   result.hessian.diagonal() += anchor_weight_;
   return result;
+}
+
+Snapshot FitProblem::Capture(const FitPoint& point, double step) {
+  Snapshot snapshot;
+  snapshot.residuals.resize(windows_.size());
+  snapshot.jacobians.resize(windows_.size());
+  ++evaluations_;
+  snapshot.linearization = LinearizeNow(point, step, Columns::kAll, &snapshot);
+  snapshot.valid = snapshot.linearization.valid;
+  snapshot.cost = snapshot.linearization.cost;
+  return snapshot;
+}
+
+ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const Snapshot& base) {
+  GS_CHECK(parent.windows_.size() == windows_.size());
+  const Eigen::Index n = base.linearization.gradient.size();
+  struct Part {
+    Eigen::VectorXd cross;   // reduced J' c
+    double square = 0, slope = 0, raw = 0;
+    bool valid = false;
+  };
+  std::vector<Part> parts(windows_.size());
+  const std::vector<double> values = Values(point);
+  const double shift = Shift(point);
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    Worker& worker = GetWorker(index);
+    const FitWindow& window = windows_[w];
+    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) return;
+    Residuals(window, point, worker.base, worker.residual);
+    const Eigen::VectorXd column = worker.residual - base.residuals[w];
+    const Eigen::MatrixXd& jacobian = base.jacobians[w];
+    const Eigen::Index m = jacobian.cols() - n;
+    Part& part = parts[w];
+    const Eigen::VectorXd all = jacobian.transpose() * column;
+    part.raw = part.square = column.squaredNorm();
+    part.slope = column.dot(base.residuals[w]);
+    part.cross = all.head(n);
+    if (m > 0) {
+      // The states' own answer: with gain = S^-1 Jx' Jy and step = -S^-1 Jx' r, S^-1 Jx' c needs S once more.
+      Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
+      own.diagonal() += window.prior.cwiseAbs2();
+      const Eigen::VectorXd answer = own.ldlt().solve(all.tail(m));
+      part.square -= all.tail(m).dot(answer);
+      part.slope += all.tail(m).dot(base.linearization.state_step[w]);
+      part.cross -= base.linearization.state_gain[w].transpose() * all.tail(m);
+    }
+    part.valid = true;
+  });
+  ++replays_;
+  ColumnTest test;
+  Eigen::VectorXd cross = Eigen::VectorXd::Zero(n);
+  double square = 0, slope = 0, raw = 0;
+  for (const Part& part : parts) {
+    if (!part.valid) return test;
+    cross += part.cross;
+    square += part.square;
+    slope += part.slope;
+    raw += part.raw;
+  }
+  test.valid = true;
+  if (!(raw > 0)) return test;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(base.linearization.hessian);
+  const Eigen::VectorXd answer = solver.solve(cross);
+  const double left = square - cross.dot(answer), pull = slope - answer.dot(base.linearization.gradient);
+  test.absorbed = std::clamp(1 - left / raw, 0.0, 1.0);
+  constexpr double kLeast = 1e-6;  // of the column: below it is rounding
+  if (!(left > kLeast * raw)) return test;
+  test.scale = std::clamp(-pull / left, 0.0, 2.0);
+  test.drop = -(test.scale * pull + 0.5 * test.scale * test.scale * left);
+  test.dy = -(test.scale * answer);
+  return test;
+}
+
+FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent_point, const std::vector<double>& values, const Eigen::VectorXd& parent_dy) const {
+  FitPoint point = Start();
+  Eigen::VectorXd y = parent_point.y;
+  if (parent_dy.size() == y.size()) y = (y + parent_dy).cwiseMax(parent.low_).cwiseMin(parent.high_);
+  for (std::size_t i = 0; i < coordinates_.size(); ++i) {
+    const Coordinate& c = coordinates_[i];
+    const auto k = static_cast<Eigen::Index>(i);
+    point.y[k] = std::clamp(c.logarithmic ? std::log(std::max(values[c.parameter], 1e-300)) : c.ToSearch(values[c.parameter]), c.low, c.high);
+    const std::string& name = model_.parameters()[c.parameter].name;
+    for (std::size_t j = 0; j < parent.coordinates_.size(); ++j) {
+      const Coordinate& other = parent.coordinates_[j];
+      if (parent.model_.parameters()[other.parameter].name == name) point.y[k] = std::clamp(c.ToSearch(std::max(other.ToValue(y[static_cast<Eigen::Index>(j)]), c.logarithmic ? 1e-300 : -1e300)), c.low, c.high);
+    }
+  }
+  for (std::size_t l = 0; l < scaling_.size(); ++l) {
+    for (std::size_t s = 0; s < scaling_[l].size(); ++s) {
+      if (scaling_[l][s].offset >= 0 && parent.scaling_[l][s].offset >= 0) point.y[scaling_[l][s].offset] = y[parent.scaling_[l][s].offset];
+    }
+  }
+  if (shift_scale_s_ > 0 && parent.shift_scale_s_ > 0) point.y[point.y.size() - 1] = y[y.size() - 1];
+  GS_CHECK(point.states.size() == parent_point.states.size());
+  point.states = parent_point.states;
+  return point;
+}
+
+std::vector<double> FitProblem::BlockCosts(const FitPoint& point) {
+  const std::vector<double> values = Values(point);
+  const double shift = Shift(point);
+  std::vector<std::vector<double>> parts(windows_.size());
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    Worker& worker = GetWorker(index);
+    const FitWindow& window = windows_[w];
+    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) return;
+    Residuals(window, point, worker.base, worker.residual);
+    const std::size_t signals = recordings_[window.log].measured.size(), scored = window.rows.rows() - window.first_scored;
+    const double* time = recordings_[window.log].time_s.data() + window.rows.begin + window.first_scored;
+    for (std::size_t begin = 0; begin < scored;) {
+      std::size_t end = begin + 1;
+      while (end < scored && time[end] - time[begin] < kBlock_s) ++end;
+      if (end < scored && time[scored - 1] - time[end] < 0.5 * kBlock_s) end = scored;
+      double cost = 0;
+      for (std::size_t s = 0; s < signals; ++s) {
+        for (std::size_t r = begin; r < end; ++r) {
+          const double a = std::abs(worker.residual[static_cast<Eigen::Index>(s * scored + r)]);
+          cost += a <= huber_threshold_ ? 0.5 * a * a : huber_threshold_ * (a - 0.5 * huber_threshold_);
+        }
+      }
+      parts[w].push_back(cost);
+      begin = end;
+    }
+  });
+  ++replays_;
+  std::vector<double> costs;
+  for (const auto& part : parts) {
+    if (part.empty()) return {};
+    costs.insert(costs.end(), part.begin(), part.end());
+  }
+  return costs;
 }
 
 std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {

@@ -26,6 +26,7 @@ struct FitOptions {
   Objective objective = Objective::kWindows;
   double window_s = 1.0;
   double lead_in_s = 0.05;          // start of a window that is not scored
+  std::size_t max_windows = 0;      // 0: all; else evenly chosen ones
   double time_step_s = 0;           // 0: the model's
   bool fit_offsets = true;          // zero offsets of measured positions, per log
   bool fit_shift = true;            // command shift within +-1 sample, common to all logs
@@ -63,6 +64,24 @@ struct Linearization {
   bool valid = false;                       // false: the point cannot be simulated
 };
 
+// Residuals and Jacobian of a point, kept to test what one more column would explain (see FitProblem::TestColumn).
+struct Snapshot {
+  double cost = 0;
+  std::vector<Eigen::VectorXd> residuals;   // per window, weighted
+  std::vector<Eigen::MatrixXd> jacobians;   // per window: y, then the window's states
+  Linearization linearization;
+  bool valid = false;
+};
+
+// What a column would do to the cost, with all of y and the states free to answer it (score test; Rao, Proc. Cambridge Phil. Soc. 44, 1948).
+struct ColumnTest {
+  double drop = 0;       // of the cost, at the best scale in [0, 2]
+  double scale = 0;      // that scale
+  double absorbed = 1;   // share of the column that y and the states can imitate: near 1 it cannot be seen in these logs
+  Eigen::VectorXd dy;    // how y answers at that scale
+  bool valid = false;
+};
+
 class FitProblem {
  public:
   // All references must outlive the problem. `values`: fixed parameters, and where the free ones start.
@@ -90,6 +109,15 @@ class FitProblem {
   // Moves y by dy and each window's state by its own best answer to that.
   FitPoint Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const;
 
+  // Snapshot of a point.
+  Snapshot Capture(const FitPoint& point, double step);
+  // The change of residuals from `base` (a snapshot of `parent` at `parent_point`, over the same windows) to this problem at `point`, as a column.
+  ColumnTest TestColumn(const FitPoint& point, const FitProblem& parent, const Snapshot& base);
+  // A parent's solution as a point of this problem, whose model has more parameters: they start from `values` (this model's parameters).
+  FitPoint FromParent(const FitProblem& parent, const FitPoint& parent_point, const std::vector<double>& values, const Eigen::VectorXd& parent_dy) const;
+  // Cost of each half second of each window, in the order of windows; states as they are. Empty where it cannot be simulated.
+  std::vector<double> BlockCosts(const FitPoint& point);
+
   // Predictions at a point on all rows of the problem's windows, offsets added: one entry per recording.
   std::vector<LogReplay> Predict(const FitPoint& point);
 
@@ -101,7 +129,7 @@ class FitProblem {
   void UpdateRobustScale(const FitPoint& point);
 
  private:
-  Linearization LinearizeNow(const FitPoint& point, double step, Columns columns);
+  Linearization LinearizeNow(const FitPoint& point, double step, Columns columns, Snapshot* keep = nullptr);
   double CostNow(const FitPoint& point, std::vector<double>* log_costs);
   double AnchorCost(const FitPoint& point) const;
   struct FitWindow;

@@ -55,7 +55,8 @@ TEST(BamReaderTest, MissingKeysAndNullsAreMissingValues) {
 
 TEST(BamReaderTest, PythonsNaNIsMissing) {
   const Log log = Read(
-      R"({"note": "NaN \" Infinity", "entries": [{"t": 0, "x": NaN}, {"t":1, "x":-Infinity}, {"t":2, "x":Infinity}, {"t":3, "x":-3}]})");
+      R"({"note": "NaN \" Infinity", "entries": [{"t": 0, "x": NaN},
+      {"t":1, "x":-Infinity}, {"t":2, "x":Infinity}, {"t":3, "x":-3}]})");
   EXPECT_EQ(log.header_text.at("note"), "NaN \" Infinity");
   EXPECT_EQ(FindFinding(log.findings, "missing", "x")->count, 3u);
   EXPECT_EQ(FindFinding(log.findings, "infinite")->count, 2u);

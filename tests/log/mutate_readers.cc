@@ -110,7 +110,15 @@ const std::vector<std::string>& Dictionary() {
 
 void Mutate(Random* random, std::string* bytes) {
   const auto pick = [&](std::size_t below) { return below > 0 ? static_cast<std::size_t>((*random)() % below) : 0; };
-  for (std::size_t n = 1 + pick(6); n-- > 0;) {
+  // Often only digits: such files are mostly read, and try what comes after reading.
+  if (pick(3) == 0) {
+    for (std::size_t n = 1 + pick(20); n-- > 0 && !bytes->empty();) {
+      char& c = (*bytes)[pick(bytes->size())];
+      if (c >= '0' && c <= '9') c = "0123456789-e."[pick(pick(5) == 0 ? 13 : 10)];
+    }
+    return;
+  }
+  for (std::size_t n = 1 + pick(pick(2) == 0 ? 1 : 6); n-- > 0;) {
     const std::size_t at = pick(bytes->size() + 1);
     const std::size_t length = std::min(bytes->size() - at, pick(pick(4) == 0 ? 200 : 6));
     switch (pick(8)) {

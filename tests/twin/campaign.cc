@@ -29,7 +29,8 @@ LogStyle DrawStyle(Rig rig, int number, bool loop_always, Random* random) {
   const double top = joint ? random->Uniform(5, 15) : random->Uniform(5, 14);
   if (kind == 0) {  // fast and broad
     style.shape = random->Chance(0.55) ? Shape::kChirp : Shape::kMultisine;
-    style.low_hz = DefaultLow(rig) * random->Uniform(1, 2);
+    // Without a loop the lowest tones would take all of the angle and leave little drive for the rest.
+    style.low_hz = DefaultLow(rig) * (style.loop || joint ? random->Uniform(1, 2) : random->Uniform(1.2, 3.5));
     style.high_hz = top;
   } else if (kind == 1) {  // slow, or of growing amplitude
     constexpr Shape kSlow[] = {Shape::kTriangle, Shape::kRamps, Shape::kSwept};
@@ -74,10 +75,10 @@ Envelope DrawEnvelope(Rig rig, Random* random) {
     case Rig::kQube:
       return {random->Uniform(0.6, 1.6), random->Uniform(0.5, 1.5), kNever, random->Uniform(5, 10), kNever};
     case Rig::kFlexJoint:
-      return {random->Uniform(0.6, 2.0), random->Uniform(0.2, 0.5), kNever, random->Uniform(4, 10), kNever};
+      return {random->Uniform(0.8, 2.2), random->Uniform(0.25, 0.55), kNever, random->Uniform(5, 10), kNever};
     case Rig::kFlexLink: break;
   }
-  return {random->Uniform(0.6, 1.8), random->Uniform(0.15, 0.45), kNever, random->Uniform(1, 3), kNever};
+  return {random->Uniform(0.8, 2.2), random->Uniform(0.2, 0.5), kNever, random->Uniform(1.2, 3), kNever};
 }
 
 WeakLoop DrawLoop(Rig rig, Random* random) {

@@ -197,7 +197,8 @@ Drawn Draw(const EffectChoice& c, const Motion& m, const Plant& plant) {
   } else if (is("backlash")) {
     v = {{"gap_rad", 0.008 * s}};
     DrawSplit(&random, &d.extra);
-    d.extra.push_back({"contact_hz", random.Uniform(120, 220)});
+    d.extra[1].second = random.Uniform(0.08, 0.3);  // flanks bounce, and stop bouncing
+    d.extra.push_back({"contact_hz", random.Uniform(250, 400)});
   } else if (is("joint_compliance")) {
     DrawSplit(&random, &d.extra);
     const double share = d.extra[0].second;
@@ -228,7 +229,7 @@ constexpr Limits kHighest[] = {
     {"command_delay", 15},   {"torque_delay", 4},       {"sensor_delay", 15},          {"actuator_lag", 12},
     {"torque_limit", 6},     {"torque_speed_curve", 8}, {"torque_constant_droop", 5},  {"supply_sag", 4},
     {"dead_zone", 6},        {"coulomb_friction", 6},   {"stribeck_friction", 6},      {"direction_asymmetry", 6},
-    {"load_friction", 6},    {"quadratic_drag", 15},    {"backlash", 20},              {"joint_compliance", 10},
+    {"load_friction", 6},    {"quadratic_drag", 15},    {"backlash", 12},              {"joint_compliance", 10},
     {"cable_spring", 12},    {"gravity_offset", 12},    {"torque_bias", 8},            {"cogging", 8},
     {"spring_hardening", 10}};
 

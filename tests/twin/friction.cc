@@ -43,12 +43,15 @@ double Bristles::Torque(const Dry& dry, double distance_rad, double speed, doubl
   if (!dry.Any()) return 0;
   const double typical = Typical(dry, load_n_m);
   if (dry.law == FrictionLaw::kMaxwellSlip) {
-    double torque = 0;
+    double torque = 0, stuck = 0;
     for (int i = 0; i < kElements; ++i) {
       const double z = Element(dry, i, deflection_rad_[i], distance_rad, speed, load_n_m);
       torque += kShare[i] * typical * z / (kSlip[i] * dry.presliding_rad);
+      // Stuck: it could be deflected further in the direction of motion.
+      if (Element(dry, i, z, std::copysign(dry.presliding_rad, speed), speed, load_n_m) != z) stuck += kShare[i];
     }
-    return torque;
+    // Elements that stick lose a little to viscosity, or a stopped joint would tremble for ever.
+    return torque + stuck * 0.5 * std::sqrt(typical / dry.presliding_rad * inertia) * speed;
   }
   const double stiffness = typical / dry.presliding_rad;
   const double z = LuGre(dry, deflection_rad_[0], distance_rad, speed, load_n_m);

@@ -20,7 +20,7 @@ class Bristles {
   static constexpr int kElements = 4;
 
   // Friction torque, opposing motion, `distance_rad` after the last Commit, at speed `speed` and transmitted torque
-  // `load_n_m`. `inertia` sets the damping of the sticking joint (LuGre's c, half critical).
+  // `load_n_m`. `inertia` sets the damping c of the sticking joint (a quarter to half critical).
   double Torque(const Dry& dry, double distance_rad, double speed, double load_n_m, double inertia) const;
   // Ends a step that moved the joint by `distance_rad`.
   void Commit(const Dry& dry, double distance_rad, double speed, double load_n_m);

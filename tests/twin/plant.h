@@ -83,8 +83,8 @@ struct Load {
   double motor_share = 0.5;     // of the driven inertia, when split
   double gap_rad = 0;           // backlash: whole gap
   double stiffness = kNever;    // joint compliance
-  double contact_hz = 180;      // backlash without compliance: how stiff the flanks are
-  double transmission_damping_ratio = 0.05;
+  double contact_hz = 300;      // backlash without compliance: how stiff the flanks are
+  double transmission_damping_ratio = 0.1;
   double cable_stiffness = 0, cable_rest_rad = 0, cable_hysteresis = 0;
   double gravity_n_m = 0, gravity_rest_rad = 0;
   double bias_n_m = 0;

@@ -8,6 +8,7 @@ namespace gapscope::twin {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
+constexpr double kJust_s = 1e-8;
 constexpr double kLongestDelay_s = 0.05;
 constexpr double kLowestCeiling = 0.15;  // a sagging supply keeps this share
 
@@ -292,7 +293,8 @@ void Simulator::Step(const Commands& commands) {
   };
   const State k1 = Derivative(x_, in);
   const auto middle_and_end = [&](double part) {
-    Inputs at = At(commands, t + part * h, &cursor_);
+    // Until just before that time: a command that acts from the end of the step on is no part of it.
+    Inputs at = At(commands, t + part * h - kJust_s, &cursor_);
     if (late) delayed(&at, x_);
     return at;
   };

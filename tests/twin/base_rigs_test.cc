@@ -21,8 +21,7 @@ TEST(BaseRigsTest, JointStepIsSecondOrderResponse) {
   const double wd = w * std::sqrt(1 - zeta * zeta);
   RunFor(0.3, Constant(0.2), &simulator, [&](const Simulator& s) {
     const double t = s.time_s();
-    const double expected =
-        0.2 * (1 - std::exp(-zeta * w * t) * (std::cos(wd * t) + zeta * w / wd * std::sin(wd * t)));
+    const double expected = 0.2 * (1 - std::exp(-zeta * w * t) * (std::cos(wd * t) + zeta * w / wd * std::sin(wd * t)));
     ASSERT_NEAR(s.q1(), expected, kIntegration);
   });
 }
@@ -44,7 +43,8 @@ TEST(BaseRigsTest, QubeConservesAngularMomentumAboutTheArmAxis) {
   const auto momentum = [&](const Simulator& s) {
     const double j = b.pendulum_mass_kg * b.pendulum_length_m * b.pendulum_length_m / 3;
     return (DrivenInertia(plant) + b.pendulum_mass_kg * b.arm_length_m * b.arm_length_m +
-            j * std::pow(std::sin(s.q2()), 2)) * s.w1() +
+            j * std::pow(std::sin(s.q2()), 2)) *
+               s.w1() +
            b.pendulum_mass_kg * b.arm_length_m * b.pendulum_length_m / 2 * std::cos(s.q2()) * s.w2();
   };
   Simulator simulator(plant, kStep_s);
@@ -64,7 +64,8 @@ TEST(BaseRigsTest, QubeSmallSwingWithFreeArm) {
   const double expected = kTurn / std::sqrt(stiffness * m11 / (m11 * m22 - m12 * m12));
   Simulator simulator(plant, kStep_s);
   simulator.Place(0, 0, 1e-3, 0);
-  EXPECT_NEAR(Period(5, Constant(0), &simulator, [](const Simulator& s) { return s.q2(); }), expected, kCrossing * expected);
+  EXPECT_NEAR(Period(5, Constant(0), &simulator, [](const Simulator& s) { return s.q2(); }), expected,
+              kCrossing * expected);
 }
 
 TEST(BaseRigsTest, QubeHangingPendulumSwingsAgainstTheArm) {
@@ -88,7 +89,8 @@ TEST(BaseRigsTest, FlexJointFreeResonance) {
   simulator.Place(0, 0, 0.1, 0);
   const double w = std::sqrt(b.link_stiffness_n_m_per_rad * (b.inertia_kg_m2 + b.link_inertia_kg_m2) /
                              (b.inertia_kg_m2 * b.link_inertia_kg_m2));
-  EXPECT_NEAR(Period(4, Constant(0), &simulator, [](const Simulator& s) { return s.q2(); }), kTurn / w, kCrossing * kTurn / w);
+  EXPECT_NEAR(Period(4, Constant(0), &simulator, [](const Simulator& s) { return s.q2(); }), kTurn / w,
+              kCrossing * kTurn / w);
 }
 
 TEST(BaseRigsTest, FlexLinkWithHeavyHubRingsAtItsClampedFrequency) {
@@ -105,8 +107,8 @@ TEST(BaseRigsTest, FlexLinkCurrentSpeedsUpTheWhole) {
   plant.base.second_damping_n_m_s_per_rad = 0;
   Simulator simulator(plant, kStep_s);
   RunFor(1, Constant(0.5), &simulator);
-  const double momentum = plant.base.inertia_kg_m2 * simulator.w1() +
-                          plant.base.link_inertia_kg_m2 * (simulator.w1() + simulator.w2());
+  const double momentum =
+      plant.base.inertia_kg_m2 * simulator.w1() + plant.base.link_inertia_kg_m2 * (simulator.w1() + simulator.w2());
   EXPECT_NEAR(momentum, 0.3338496 * 0.5, kIntegration);
 }
 

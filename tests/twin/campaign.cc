@@ -60,10 +60,14 @@ LogStyle DrawStyle(Rig rig, int number, bool loop_always, Random* random) {
 
 Envelope Tolerable(Rig rig) {
   switch (rig) {
-    case Rig::kJoint: return {3.5, kNever, 14.5, kNever, kNever};
-    case Rig::kQube: return {4.5, 2.4, kNever, kNever, kNever};
-    case Rig::kFlexJoint: return {5.0, 0.9, kNever, kNever, kNever};
-    case Rig::kFlexLink: break;
+    case Rig::kJoint:
+      return {3.5, kNever, 14.5, kNever, kNever};
+    case Rig::kQube:
+      return {4.5, 2.4, kNever, kNever, kNever};
+    case Rig::kFlexJoint:
+      return {5.0, 0.9, kNever, kNever, kNever};
+    case Rig::kFlexLink:
+      break;
   }
   return {5.0, 0.8, kNever, kNever, kNever};
 }
@@ -76,17 +80,22 @@ Envelope DrawEnvelope(Rig rig, Random* random) {
       return {random->Uniform(0.6, 1.6), random->Uniform(0.5, 1.5), kNever, random->Uniform(5, 10), kNever};
     case Rig::kFlexJoint:
       return {random->Uniform(0.8, 2.2), random->Uniform(0.25, 0.55), kNever, random->Uniform(5, 10), kNever};
-    case Rig::kFlexLink: break;
+    case Rig::kFlexLink:
+      break;
   }
   return {random->Uniform(0.8, 2.2), random->Uniform(0.2, 0.5), kNever, random->Uniform(1.2, 3), kNever};
 }
 
 WeakLoop DrawLoop(Rig rig, Random* random) {
   switch (rig) {
-    case Rig::kQube: return {random->Uniform(2, 5), random->Uniform(0.15, 0.35)};
-    case Rig::kFlexJoint: return {random->Uniform(3, 7), random->Uniform(0.0, 0.1)};
-    case Rig::kFlexLink: return {random->Uniform(0.3, 0.8), random->Uniform(0.02, 0.06)};
-    case Rig::kJoint: break;
+    case Rig::kQube:
+      return {random->Uniform(2, 5), random->Uniform(0.15, 0.35)};
+    case Rig::kFlexJoint:
+      return {random->Uniform(3, 7), random->Uniform(0.0, 0.1)};
+    case Rig::kFlexLink:
+      return {random->Uniform(0.3, 0.8), random->Uniform(0.02, 0.06)};
+    case Rig::kJoint:
+      break;
   }
   return {};
 }
@@ -237,10 +246,9 @@ Motion MotionOf(const Plant& plant, const std::vector<LogSpec>& logs) {
       grow(&motion.speed1_peak_rad_per_s, w1);
       grow(&motion.angle2_peak_rad, q2);
       grow(&motion.speed2_peak_rad_per_s, w2);
-      const double spring =
-          plant.rig == Rig::kQube
-              ? b.pendulum_mass_kg * b.gravity_m_per_s2 * b.pendulum_length_m / 2 * std::sin(q2)
-              : b.link_stiffness_n_m_per_rad * q2;
+      const double spring = plant.rig == Rig::kQube
+                                ? b.pendulum_mass_kg * b.gravity_m_per_s2 * b.pendulum_length_m / 2 * std::sin(q2)
+                                : b.link_stiffness_n_m_per_rad * q2;
       torque2 += spring * spring;
       torque_squares += drive.torque_n_m * drive.torque_n_m;
       speed_squares += w1 * w1;

@@ -1,5 +1,5 @@
-// The logs of one case: sensors, excitations of several kinds, and amplitudes found by simulation so that a rig moves as
-// a careful experimenter would move it.
+// The logs of one case: sensors, excitations of several kinds, and amplitudes found by simulation so that a rig moves
+// as a careful experimenter would move it.
 #ifndef GAPSCOPE_TESTS_TWIN_CAMPAIGN_H_
 #define GAPSCOPE_TESTS_TWIN_CAMPAIGN_H_
 

@@ -14,7 +14,11 @@ constexpr int kTries = 12;
 
 Kind DrawKind(Random* random) {
   const double u = random->Unit();
-  return u < 0.25 ? Kind::kNone : u < 0.65 ? Kind::kSingle : u < 0.80 ? Kind::kPair : u < 0.90 ? Kind::kUnknown : Kind::kAmbiguous;
+  return u < 0.25   ? Kind::kNone
+         : u < 0.65 ? Kind::kSingle
+         : u < 0.80 ? Kind::kPair
+         : u < 0.90 ? Kind::kUnknown
+                    : Kind::kAmbiguous;
 }
 
 // "name" or "name@place" among the rig's effects.
@@ -29,7 +33,8 @@ bool FindEffect(Rig rig, const std::string& wanted, Random* random, EffectRange*
   }
   if (fitting.empty()) return false;
   // By name first, then by place: an effect on two places is not twice as frequent.
-  const std::string drawn = fitting[static_cast<std::size_t>(random->Integer(0, static_cast<int>(fitting.size()) - 1))].choice.name;
+  const std::string drawn =
+      fitting[static_cast<std::size_t>(random->Integer(0, static_cast<int>(fitting.size()) - 1))].choice.name;
   std::erase_if(fitting, [&](const EffectRange& r) { return r.choice.name != drawn; });
   *found = fitting[static_cast<std::size_t>(random->Integer(0, static_cast<int>(fitting.size()) - 1))];
   found->choice.shape_seed = static_cast<std::uint64_t>(random->Unit() * 0x1.0p53);
@@ -38,7 +43,8 @@ bool FindEffect(Rig rig, const std::string& wanted, Random* random, EffectRange*
 
 // Effects that push an integrating rig away from its start.
 bool Drifts(const EffectChoice& c) {
-  return c.name == "torque_bias" || c.name == "direction_asymmetry" || c.name == "cogging" || c.name == "gravity_offset";
+  return c.name == "torque_bias" || c.name == "direction_asymmetry" || c.name == "cogging" ||
+         c.name == "gravity_offset";
 }
 
 Plant With(const Case& c, const std::vector<EffectChoice>& choices, const Motion& motion) {
@@ -131,8 +137,9 @@ bool MakeUnknown(const CaseRequest& request, Random* random, Case* c, std::strin
     return false;
   }
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    c->outside = request.effect.empty() ? names[static_cast<std::size_t>(random->Integer(0, static_cast<int>(names.size()) - 1))]
-                                        : request.effect;
+    c->outside = request.effect.empty()
+                     ? names[static_cast<std::size_t>(random->Integer(0, static_cast<int>(names.size()) - 1))]
+                     : request.effect;
     const auto shape = static_cast<std::uint64_t>(random->Unit() * 0x1.0p53);
     c->logs = DrawCampaign(c->base, c->outside == "external_torque" && c->rig != Rig::kJoint, random);
     const Motion motion = MotionOf(c->base, c->logs);
@@ -143,8 +150,7 @@ bool MakeUnknown(const CaseRequest& request, Random* random, Case* c, std::strin
     };
     double severity = request.severity;
     if (severity <= 0) {
-      const Search found =
-          FindSeverity(plant_at, c->base, c->logs, c->sensors, random->LogUniform(6, 60), 0.02, 10);
+      const Search found = FindSeverity(plant_at, c->base, c->logs, c->sensors, random->LogUniform(6, 60), 0.02, 10);
       severity = found.severity;
       if ((severity <= 0 || found.gap.refit < 4) && attempt + 1 < kTries) continue;
     }
@@ -213,9 +219,11 @@ Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& r
   bool low_known = false, high_known = false;
   for (int i = 0; i < 8; ++i) {
     const Plant plant = plant_at(std::exp(at));
-    const bool calm = std::all_of(logs.begin(), logs.end(), [&](const LogSpec& l) { return PeaksOf(plant, l).Within(tolerable); });
+    const bool calm =
+        std::all_of(logs.begin(), logs.end(), [&](const LogSpec& l) { return PeaksOf(plant, l).Within(tolerable); });
     Gap gap;
-    if (calm) gap = MeasureGap(CoarseRecords(plant, logs, sensors, options), reference, floor, directions, true, options);
+    if (calm)
+      gap = MeasureGap(CoarseRecords(plant, logs, sensors, options), reference, floor, directions, true, options);
     const double distance = calm && gap.Finite() ? std::abs(std::log(std::max(gap.refit, 1e-9) / target)) : kNever;
     if (distance < closest) {
       closest = distance;
@@ -269,11 +277,16 @@ bool MakeCase(const CaseRequest& request, Case* made, std::string* problem) {
   made->sensors = DrawSensors(made->rig, &sensors);
   made->truth = made->base;
   switch (made->kind) {
-    case Kind::kSingle: return MakeListed(request, 1, &random, made, problem);
-    case Kind::kPair: return MakeListed(request, 2, &random, made, problem);
-    case Kind::kUnknown: return MakeUnknown(request, &random, made, problem);
-    case Kind::kAmbiguous: return MakeAmbiguous(&random, made, problem);
-    default: break;
+    case Kind::kSingle:
+      return MakeListed(request, 1, &random, made, problem);
+    case Kind::kPair:
+      return MakeListed(request, 2, &random, made, problem);
+    case Kind::kUnknown:
+      return MakeUnknown(request, &random, made, problem);
+    case Kind::kAmbiguous:
+      return MakeAmbiguous(&random, made, problem);
+    default:
+      break;
   }
   made->logs = DrawCampaign(made->base, false, &random);
   TameAll(made->truth, &made->logs, &random);

@@ -24,9 +24,9 @@ bool ParseKind(std::string_view name, Kind* kind);
 struct CaseRequest {
   std::uint64_t seed = 1, index = 0;
   Kind kind = Kind::kAuto;
-  std::string rig;        // empty: drawn
-  std::string effect;     // empty: drawn; NAME or NAME@ON; for kUnknown the name of an outside effect
-  double severity = 0;    // 0: searched, so that the effect-to-floor ratio is as drawn
+  std::string rig;      // empty: drawn
+  std::string effect;   // empty: drawn; NAME or NAME@ON; for kUnknown the name of an outside effect
+  double severity = 0;  // 0: searched, so that the effect-to-floor ratio is as drawn
 };
 
 struct EffectLabel {
@@ -79,7 +79,8 @@ Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& r
 
 // case_outside.cc and case_ambiguous.cc.
 std::vector<std::string> OutsideNames();
-Values AddOutside(const std::string& name, double severity, std::uint64_t shape_seed, const Motion& motion, Plant* plant);
+Values AddOutside(const std::string& name, double severity, std::uint64_t shape_seed, const Motion& motion,
+                  Plant* plant);
 bool MakeAmbiguous(Random* random, Case* made, std::string* problem);
 
 }  // namespace gapscope::twin

@@ -10,7 +10,7 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kFarthest = 0.5;  // floors: a rival farther than this is no rival
+constexpr double kFarthest = 0.6;  // floors: a rival farther than this is no rival
 constexpr int kTries = 14;
 
 // One member of a group: how it enters a plant with a strength, and how a fit may move it.
@@ -36,23 +36,31 @@ Direction Shift(double* (*field)(Plant*), double step, double spread) {
 }
 
 Member Delay() {
-  return {"command_delay", "motor", [](Plant* p, double s) { p->drive.command_delay_s = 0.004 * s; },
+  return {"command_delay",
+          "motor",
+          [](Plant* p, double s) { p->drive.command_delay_s = 0.004 * s; },
           {Scale([](Plant* p) { return &p->drive.command_delay_s; })}};
 }
 Member Lag() {
-  return {"actuator_lag", "motor", [](Plant* p, double s) { p->drive.lag_s = 0.004 * s; },
-          {Scale([](Plant* p) { return &p->drive.lag_s; })}};
+  return {"actuator_lag", "motor", [](Plant* p, double s) { p->drive.lag_s = 0.004 * s; }, {Scale([](Plant* p) {
+            return &p->drive.lag_s;
+          })}};
 }
 Member Late(Rig rig) {
-  return {"sensor_delay", Names(rig).first_signal, [](Plant* p, double s) { p->sensor_delay_s[0] = 0.004 * s; },
+  return {"sensor_delay",
+          Names(rig).first_signal,
+          [](Plant* p, double s) { p->sensor_delay_s[0] = 0.004 * s; },
           {Scale([](Plant* p) { return &p->sensor_delay_s[0]; })}};
 }
 Member Bias(Rig rig, double torque) {
-  return {"torque_bias", Names(rig).first, [torque](Plant* p, double s) { p->load.bias_n_m = torque * s; },
+  return {"torque_bias",
+          Names(rig).first,
+          [torque](Plant* p, double s) { p->load.bias_n_m = torque * s; },
           {Shift([](Plant* p) { return &p->load.bias_n_m; }, 0.05 * std::abs(torque), 10 * std::abs(torque))}};
 }
 Member Cable(Rig rig, double torque, double rest) {
-  return {"cable_spring", Names(rig).first,
+  return {"cable_spring",
+          Names(rig).first,
           [torque, rest](Plant* p, double s) {
             p->load.cable_stiffness = std::abs(torque) * s / std::max(std::abs(rest), 0.3);
             p->load.cable_rest_rad = rest;
@@ -62,7 +70,8 @@ Member Cable(Rig rig, double torque, double rest) {
 }
 // Where the gravity torque equals the cable's: near its top far from rest, near its slope close to rest.
 Member Gravity(Rig rig, double torque, double rest, bool far) {
-  return {"gravity_offset", Names(rig).first,
+  return {"gravity_offset",
+          Names(rig).first,
           [torque, rest, far](Plant* p, double s) {
             p->load.gravity_n_m = std::abs(torque) * s / (far ? 1.0 : 0.3);
             p->load.gravity_rest_rad = far ? std::copysign(std::numbers::pi / 2, rest) : rest;
@@ -71,11 +80,14 @@ Member Gravity(Rig rig, double torque, double rest, bool far) {
            Shift([](Plant* p) { return &p->load.gravity_rest_rad; }, 0.02, 1.0)}};
 }
 Member DeadZone(double peak) {
-  return {"dead_zone", "motor", [peak](Plant* p, double s) { p->drive.dead_zone = 0.03 * peak * s; },
+  return {"dead_zone",
+          "motor",
+          [peak](Plant* p, double s) { p->drive.dead_zone = 0.03 * peak * s; },
           {Scale([](Plant* p) { return &p->drive.dead_zone; })}};
 }
 Member Coulomb(Rig rig, double peak_torque) {
-  return {"coulomb_friction", Names(rig).first,
+  return {"coulomb_friction",
+          Names(rig).first,
           [peak_torque](Plant* p, double s) {
             p->dry[0].positive_n_m = p->dry[0].negative_n_m = 0.03 * peak_torque * s;
             p->dry[0].presliding_rad = 4e-4;
@@ -87,11 +99,15 @@ Member Coulomb(Rig rig, double peak_torque) {
             0.05, 1.0}}};
 }
 Member Asymmetry() {
-  return {"direction_asymmetry", "motor", [](Plant* p, double s) { p->drive.asymmetry = 0.02 * s; },
+  return {"direction_asymmetry",
+          "motor",
+          [](Plant* p, double s) { p->drive.asymmetry = 0.02 * s; },
           {Shift([](Plant* p) { return &p->drive.asymmetry; }, 2e-3, 1.0)}};
 }
 
-std::vector<LogStyle> Same(LogStyle style, int count) { return std::vector<LogStyle>(static_cast<std::size_t>(count), style); }
+std::vector<LogStyle> Same(LogStyle style, int count) {
+  return std::vector<LogStyle>(static_cast<std::size_t>(count), style);
+}
 
 // All constructions for a rig; torques are of the order of what the drive does in small motions.
 std::vector<Construction> ConstructionsOf(Rig rig, const Plant& plant, Random* random) {
@@ -117,27 +133,36 @@ std::vector<Construction> ConstructionsOf(Rig rig, const Plant& plant, Random* r
   } else {
     small.envelope = {0.06, 0.12, kNever, command, kNever};
     const double rest = side * random->Uniform(1.8, 2.6);
-    list.push_back({{rig}, Same(small, 4), false, 3, 9,
-                    {Bias(rig, side * torque_unit), Cable(rig, torque_unit, rest), Gravity(rig, torque_unit, rest, true)}});
+    list.push_back(
+        {{rig},
+         Same(small, 4),
+         false,
+         3,
+         9,
+         {Bias(rig, side * torque_unit), Cable(rig, torque_unit, rest), Gravity(rig, torque_unit, rest, true)}});
     // Slow and smooth: a delay and a lag differ in the square of frequency times time only.
     LogStyle slow;
     slow.shape = Shape::kMultisine;
-    slow.low_hz = rig == Rig::kQube ? 0.4 : 0.3;
-    slow.high_hz = rig == Rig::kQube ? 1.6 : 2.0;
-    slow.envelope = {1.2, rig == Rig::kQube ? 0.7 : 0.3, kNever, command, kNever};
-    list.push_back({{rig}, Same(slow, 4), false, 3, 25, {Delay(), Lag()}});
+    slow.low_hz = 0.3;
+    slow.high_hz = 1.0;
+    slow.envelope = {2.5, 0.3, kNever, command, kNever};
+    // Voltage drives are out: the Qube's pendulum swings at 1.7 Hz whatever the input, and the winding's lag has the
+    // back-EMF inside.
+    if (rig == Rig::kFlexLink) list.push_back({{rig}, Same(slow, 4), false, 3, 8, {Delay(), Lag()}});
   }
   small.envelope = {0.2, 0.25, joint ? 6.0 : kNever, joint ? kNever : command, joint ? 60.0 : kNever};
   const double rest = random->Uniform(-0.15, 0.15);
-  list.push_back({{rig}, Same(small, 4), joint, 3, 20, {Cable(rig, torque_unit, rest), Gravity(rig, torque_unit, rest, false)}});
+  list.push_back(
+      {{rig}, Same(small, 4), joint, 3, 20, {Cable(rig, torque_unit, rest), Gravity(rig, torque_unit, rest, false)}});
   if (rig == Rig::kFlexJoint) {
     LogStyle slow;
     slow.shape = Shape::kSwept;
-    slow.low_hz = 0.3;
-    slow.high_hz = 0.5;
+    slow.low_hz = 0.15;
+    slow.high_hz = 0.3;
     slow.envelope = {2.5, 0.3, kNever, 8, kNever};
-    const double stall = 8 * plant.base.gear * plant.base.efficiency * plant.base.kt_n_m_per_a / plant.base.resistance_ohm;
-    list.push_back({{rig}, Same(slow, 4), false, 3, 15, {DeadZone(8), Coulomb(rig, stall)}});
+    const double stall =
+        8 * plant.base.gear * plant.base.efficiency * plant.base.kt_n_m_per_a / plant.base.resistance_ohm;
+    list.push_back({{rig}, Same(slow, 4), false, 3, 4.5, {DeadZone(8), Coulomb(rig, stall)}});
   }
   if (rig == Rig::kFlexLink) {
     LogStyle square;
@@ -230,9 +255,9 @@ bool MakeAmbiguous(Random* random, Case* made, std::string* problem) {
     }
     if (member.name == "coulomb_friction") label.parameters = {{"friction_n_m", p.dry[0].positive_n_m}};
     if (member.name == "direction_asymmetry") label.parameters = {{"asymmetry", p.drive.asymmetry}};
-    label.choice.place = member.on == "motor"                           ? Place::kMotor
+    label.choice.place = member.on == "motor"                     ? Place::kMotor
                          : member.on == Names(c.rig).first_signal ? Place::kFirstSignal
-                                                                        : Place::kFirst;
+                                                                  : Place::kFirst;
     c.effects = {label};
     best = c;
   }

@@ -12,7 +12,8 @@ std::vector<std::string> OutsideNames() {
           "sensor_wheel_error", "sensor_play",      "time_stamp_bursts", "clock_drift",      "intermittent_hold"};
 }
 
-Values AddOutside(const std::string& name, double severity, std::uint64_t shape_seed, const Motion& motion, Plant* plant) {
+Values AddOutside(const std::string& name, double severity, std::uint64_t shape_seed, const Motion& motion,
+                  Plant* plant) {
   Random random(shape_seed, 0, name);
   Outside& o = plant->outside;
   const double turn = 2 * std::numbers::pi, s = severity;
@@ -38,7 +39,8 @@ Values AddOutside(const std::string& name, double severity, std::uint64_t shape_
     o.resonator_share = std::min(0.15 * s, 1.0);
     o.resonator_hz = random.Uniform(4, 10);
     o.resonator_damping = random.Uniform(0.01, 0.04);
-    return {{"inertia_share", o.resonator_share}, {"frequency_hz", o.resonator_hz}, {"damping_ratio", o.resonator_damping}};
+    return {
+        {"inertia_share", o.resonator_share}, {"frequency_hz", o.resonator_hz}, {"damping_ratio", o.resonator_damping}};
   }
   if (name == "sensor_scale_drift") {
     o.scale_drift_per_s = random.Sign() * std::min(0.01 * s, 0.08);

@@ -160,8 +160,8 @@ TEST(DriveEffectsTest, EveryListedParameterCanBeSet) {
   for (const Rig rig : kRigs) {
     for (const std::string& name : ParameterNames(rig)) {
       Plant plant = NominalPlant(rig);
-      const bool motor_gain = name.starts_with("direction_asymmetry") && (name.find("@motor") != std::string::npos) !=
-                                                                             name.ends_with(".asymmetry");
+      const bool motor_gain = name.starts_with("direction_asymmetry") &&
+                              (name.find("@motor") != std::string::npos) != name.ends_with(".asymmetry");
       EXPECT_EQ(SetParameter(name, 0.5, &plant), !motor_gain) << name;
     }
     Plant plant = NominalPlant(rig);

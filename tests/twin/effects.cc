@@ -18,10 +18,14 @@ int Signal(Place place) { return place == Place::kSecondSignal ? 1 : 0; }
 
 double PeakTorque(Rig rig) {
   switch (rig) {
-    case Rig::kJoint: return 119.6;       // the seed's motor table
-    case Rig::kQube: return 0.05;         // stalled at 10 V
-    case Rig::kFlexJoint: return 1.284;   // stalled at 10 V
-    case Rig::kFlexLink: break;
+    case Rig::kJoint:
+      return 119.6;  // the seed's motor table
+    case Rig::kQube:
+      return 0.05;  // stalled at 10 V
+    case Rig::kFlexJoint:
+      return 1.284;  // stalled at 10 V
+    case Rig::kFlexLink:
+      break;
   }
   return 1.0015488;  // 3 A
 }
@@ -38,7 +42,9 @@ struct Parameter {
 const std::vector<Parameter>& Parameters() {
   static const std::vector<Parameter> list = [] {
     std::vector<Parameter> p;
-    const auto add = [&p](const char* effect, const char* name, Setter set) { p.push_back({effect, name, std::move(set)}); };
+    const auto add = [&p](const char* effect, const char* name, Setter set) {
+      p.push_back({effect, name, std::move(set)});
+    };
     add("command_delay", "delay_s", [](Plant* a, Place, double v) { a->drive.command_delay_s = v; });
     add("command_delay", "jitter", [](Plant* a, Place, double v) { a->drive.jitter = v; });
     add("torque_delay", "delay_s", [](Plant* a, Place, double v) { a->drive.torque_delay_s = v; });
@@ -203,8 +209,7 @@ Drawn Draw(const EffectChoice& c, const Motion& m, const Plant& plant) {
     DrawSplit(&random, &d.extra);
     const double share = d.extra[0].second;
     const double hz = (rig == Rig::kJoint ? 40 : 30) / std::sqrt(s);
-    v = {{"stiffness_n_m_per_rad",
-          DrivenInertia(plant) * share * (1 - share) * (2 * kPi * hz) * (2 * kPi * hz)}};
+    v = {{"stiffness_n_m_per_rad", DrivenInertia(plant) * share * (1 - share) * (2 * kPi * hz) * (2 * kPi * hz)}};
   } else if (is("cable_spring")) {
     v = {{"stiffness_n_m_per_rad", 0.15 * s * torque / m.angle1_peak_rad},
          {"rest_rad", m.angle1_peak_rad * random.Uniform(-0.8, 0.8)}};
@@ -225,24 +230,29 @@ Drawn Draw(const EffectChoice& c, const Motion& m, const Plant& plant) {
   return d;
 }
 
-constexpr Limits kHighest[] = {
-    {"command_delay", 15},   {"torque_delay", 4},       {"sensor_delay", 15},          {"actuator_lag", 12},
-    {"torque_limit", 6},     {"torque_speed_curve", 8}, {"torque_constant_droop", 5},  {"supply_sag", 4},
-    {"dead_zone", 6},        {"coulomb_friction", 6},   {"stribeck_friction", 6},      {"direction_asymmetry", 6},
-    {"load_friction", 6},    {"quadratic_drag", 15},    {"backlash", 12},              {"joint_compliance", 10},
-    {"cable_spring", 12},    {"gravity_offset", 12},    {"torque_bias", 8},            {"cogging", 8},
-    {"spring_hardening", 10}};
+constexpr Limits kHighest[] = {{"command_delay", 15},        {"torque_delay", 4},      {"sensor_delay", 15},
+                               {"actuator_lag", 12},         {"torque_limit", 6},      {"torque_speed_curve", 8},
+                               {"torque_constant_droop", 5}, {"supply_sag", 4},        {"dead_zone", 6},
+                               {"coulomb_friction", 6},      {"stribeck_friction", 6}, {"direction_asymmetry", 6},
+                               {"load_friction", 6},         {"quadratic_drag", 15},   {"backlash", 12},
+                               {"joint_compliance", 10},     {"cable_spring", 12},     {"gravity_offset", 12},
+                               {"torque_bias", 8},           {"cogging", 8},           {"spring_hardening", 10}};
 
 }  // namespace
 
 std::string PlaceName(Rig rig, Place place) {
   const RigNames& names = Names(rig);
   switch (place) {
-    case Place::kMotor: return "motor";
-    case Place::kFirst: return names.first;
-    case Place::kSecond: return names.second;
-    case Place::kFirstSignal: return names.first_signal;
-    case Place::kSecondSignal: break;
+    case Place::kMotor:
+      return "motor";
+    case Place::kFirst:
+      return names.first;
+    case Place::kSecond:
+      return names.second;
+    case Place::kFirstSignal:
+      return names.first_signal;
+    case Place::kSecondSignal:
+      break;
   }
   return names.second_signal;
 }
@@ -264,8 +274,9 @@ std::vector<EffectRange> EffectsOf(Rig rig) {
     add(name, Place::kMotor);
   }
   if (joint) add("torque_delay", Place::kMotor);
-  for (const char* name : {"coulomb_friction", "stribeck_friction", "direction_asymmetry", "load_friction",
-                           "quadratic_drag", "backlash", "joint_compliance", "cable_spring", "gravity_offset", "cogging"}) {
+  for (const char* name :
+       {"coulomb_friction", "stribeck_friction", "direction_asymmetry", "load_friction", "quadratic_drag", "backlash",
+        "joint_compliance", "cable_spring", "gravity_offset", "cogging"}) {
     add(name, Place::kFirst);
   }
   if (!joint) add("torque_bias", Place::kFirst);  // on a position servo a zero offset, no finding
@@ -310,7 +321,8 @@ bool SetParameter(std::string_view name, double value, Plant* plant) {
   for (const EffectRange& range : EffectsOf(plant->rig)) {
     const std::string place = PlaceName(plant->rig, range.choice.place);
     if (range.choice.name != effect || (!on.empty() && on != place)) continue;
-    if (effect == "direction_asymmetry" && (range.choice.place == Place::kMotor) != (parameter == "asymmetry")) continue;
+    if (effect == "direction_asymmetry" && (range.choice.place == Place::kMotor) != (parameter == "asymmetry"))
+      continue;
     return SetOne(effect, parameter, range.choice.place, value, plant);
   }
   return false;
@@ -331,7 +343,9 @@ std::vector<std::string> ParameterNames(Rig rig) {
 
 bool Clash(Rig rig, const EffectChoice& a, const EffectChoice& b) {
   if (a.name == b.name) return true;
-  const auto both_in = [&](const std::set<std::string>& group) { return group.count(a.name) > 0 && group.count(b.name) > 0; };
+  const auto both_in = [&](const std::set<std::string>& group) {
+    return group.count(a.name) > 0 && group.count(b.name) > 0;
+  };
   if (both_in({"torque_bias", "cable_spring", "gravity_offset", "direction_asymmetry"})) return true;
   if (rig == Rig::kJoint && both_in({"command_delay", "sensor_delay"})) return true;
   if (both_in({"torque_limit", "torque_speed_curve", "supply_sag"})) return true;

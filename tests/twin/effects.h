@@ -1,5 +1,5 @@
-// The effects by the names of the project's documents: where each may sit, its parameters, and how a severity (about one
-// is clearly visible) becomes parameter values on a given rig and motion.
+// The effects by the names of the project's documents: where each may sit, its parameters, and how a severity (about
+// one is clearly visible) becomes parameter values on a given rig and motion.
 #ifndef GAPSCOPE_TESTS_TWIN_EFFECTS_H_
 #define GAPSCOPE_TESTS_TWIN_EFFECTS_H_
 

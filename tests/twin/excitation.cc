@@ -61,7 +61,9 @@ Excitation MakeExcitation(Shape shape, double duration_s, double low_hz, double 
   e.low_hz = low_hz;
   e.high_hz = high_hz;
   switch (shape) {
-    case Shape::kChirp: e.envelope = random->Chance(0.5) ? 0.0 : random->Uniform(0.3, 1.2); break;
+    case Shape::kChirp:
+      e.envelope = random->Chance(0.5) ? 0.0 : random->Uniform(0.3, 1.2);
+      break;
     case Shape::kMultisine: {
       const int tones = random->Integer(8, 16);
       double power = 0;
@@ -74,15 +76,20 @@ Excitation MakeExcitation(Shape shape, double duration_s, double low_hz, double 
       for (double& a : e.amplitude) a /= std::sqrt(2 * power);  // RMS of one half
       break;
     }
-    case Shape::kSteps: DrawLevels(0.4, 1.2, &e, random); break;
-    case Shape::kRamps: DrawLevels(0.6, 1.6, &e, random); break;
+    case Shape::kSteps:
+      DrawLevels(0.4, 1.2, &e, random);
+      break;
+    case Shape::kRamps:
+      DrawLevels(0.6, 1.6, &e, random);
+      break;
     case Shape::kTriangle:
     case Shape::kSquare:
     case Shape::kSwept:
       e.low_hz = random->LogUniform(low_hz, std::min(high_hz, 6 * low_hz));
       e.growth = shape == Shape::kSwept ? 0.95 : random->Chance(0.4) ? 0.8 : 0.0;
       break;
-    default: break;
+    default:
+      break;
   }
   return e;
 }
@@ -91,12 +98,15 @@ double Excitation::At(double time_s) const {
   const double grown = 1 - growth * (1 - time_s / duration_s);
   const double cycle = low_hz * time_s + phase;
   switch (shape) {
-    case Shape::kZero: return 0;
-    case Shape::kConstant: return 1;
+    case Shape::kZero:
+      return 0;
+    case Shape::kConstant:
+      return 1;
     case Shape::kChirp: {
       const double rate = (high_hz - low_hz) / duration_s;
       const double now_hz = low_hz + rate * time_s;
-      return std::pow(now_hz / high_hz, envelope) * std::sin(kTurn * (phase + low_hz * time_s + rate * time_s * time_s / 2));
+      return std::pow(now_hz / high_hz, envelope) *
+             std::sin(kTurn * (phase + low_hz * time_s + rate * time_s * time_s / 2));
     }
     case Shape::kMultisine: {
       // Faded in, so that the first command is no jump.
@@ -104,9 +114,12 @@ double Excitation::At(double time_s) const {
       for (std::size_t i = 0; i < hz.size(); ++i) sum += amplitude[i] * std::sin(kTurn * hz[i] * time_s + phase_rad[i]);
       return sum * std::min(1.0, time_s / 0.2);
     }
-    case Shape::kTriangle: return grown * (4 * std::abs(Fraction(cycle + 0.75) - 0.5) - 1);
-    case Shape::kSquare: return grown * (Fraction(cycle) < 0.5 ? 1 : -1);
-    case Shape::kSwept: return grown * std::sin(kTurn * cycle);
+    case Shape::kTriangle:
+      return grown * (4 * std::abs(Fraction(cycle + 0.75) - 0.5) - 1);
+    case Shape::kSquare:
+      return grown * (Fraction(cycle) < 0.5 ? 1 : -1);
+    case Shape::kSwept:
+      return grown * std::sin(kTurn * cycle);
     case Shape::kSteps:
     case Shape::kRamps: {
       const auto at = std::upper_bound(until_s.begin(), until_s.end(), time_s) - until_s.begin();

@@ -17,10 +17,10 @@ bool ParseShape(std::string_view name, Shape* shape);
 struct Excitation {
   Shape shape = Shape::kZero;
   double duration_s = 5;
-  double low_hz = 0.2, high_hz = 5;  // chirp: from, to; multisine: band; triangle, square, swept: low_hz
-  double envelope = 0;               // chirp: amplitude ~ (f / high)^envelope
-  double growth = 0;                 // square, triangle, swept: amplitude from 1 - growth to 1 over the log
-  double phase = 0;                  // of a turn
+  double low_hz = 0.2, high_hz = 5;              // chirp: from, to; multisine: band; triangle, square, swept: low_hz
+  double envelope = 0;                           // chirp: amplitude ~ (f / high)^envelope
+  double growth = 0;                             // square, triangle, swept: amplitude from 1 - growth to 1 over the log
+  double phase = 0;                              // of a turn
   std::vector<double> hz, amplitude, phase_rad;  // multisine
   std::vector<double> until_s, level;            // steps, ramps
 

@@ -19,7 +19,8 @@ double Typical(const Dry& dry, double load_n_m) {
 // One Maxwell element after `distance`: stiffness is that at which the larger direction slips at `slip`.
 double Element(const Dry& dry, int i, double z, double distance, double speed, double load_n_m) {
   const double limit = kSlip[i] * dry.presliding_rad / Typical(dry, load_n_m);
-  return std::clamp(z + distance, -limit * SlipTorque(dry, -1, speed, load_n_m), limit * SlipTorque(dry, 1, speed, load_n_m));
+  return std::clamp(z + distance, -limit * SlipTorque(dry, -1, speed, load_n_m),
+                    limit * SlipTorque(dry, 1, speed, load_n_m));
 }
 
 double LuGre(const Dry& dry, double z, double distance, double speed, double load_n_m) {
@@ -84,6 +85,8 @@ double CableHysteresis::Torque(const Load& load, double distance_rad) const {
   return load.cable_stiffness * load.cable_hysteresis * Next(deflection_rad_, distance_rad) / kCableSlipRad;
 }
 
-void CableHysteresis::Commit(const Load&, double distance_rad) { deflection_rad_ = Next(deflection_rad_, distance_rad); }
+void CableHysteresis::Commit(const Load&, double distance_rad) {
+  deflection_rad_ = Next(deflection_rad_, distance_rad);
+}
 
 }  // namespace gapscope::twin

@@ -30,7 +30,8 @@ class Window {
   Eigen::VectorXd Logged() const {
     Eigen::VectorXd y(size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
-      for (int s = 0; s < signals_; ++s) y[static_cast<Eigen::Index>(i) * signals_ + s] = record_.angle_rad[rows_[i]][s];
+      for (int s = 0; s < signals_; ++s)
+        y[static_cast<Eigen::Index>(i) * signals_ + s] = record_.angle_rad[rows_[i]][s];
     }
     return y;
   }
@@ -51,7 +52,8 @@ class Window {
         past_.push_back({simulator.q1(), simulator.q2()});
       }
       for (int s = 0; s < signals_; ++s) {
-        const double at = std::clamp((t - plant.sensor_delay_s[s] - start) / h, 0.0, static_cast<double>(past_.size() - 1));
+        const double at =
+            std::clamp((t - plant.sensor_delay_s[s] - start) / h, 0.0, static_cast<double>(past_.size() - 1));
         const auto low = static_cast<std::size_t>(at);
         const auto high = std::min(low + 1, past_.size() - 1);
         y[static_cast<Eigen::Index>(i) * signals_ + s] =
@@ -121,7 +123,8 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
   const Eigen::Index columns = refit ? moves + signals + 1 : 0;
   std::vector<Plant> moved(directions.size(), other);
   for (std::size_t j = 0; j < directions.size(); ++j) directions[j].move(&moved[j], directions[j].step);
-  const std::array<std::array<double, 4>, 4> nudges = {{{1e-3, 0, 0, 0}, {0, 1e-2, 0, 0}, {0, 0, 1e-3, 0}, {0, 0, 0, 1e-2}}};
+  const std::array<std::array<double, 4>, 4> nudges = {
+      {{1e-3, 0, 0, 0}, {0, 1e-2, 0, 0}, {0, 0, 1e-3, 0}, {0, 0, 0, 1e-2}}};
 
   double raw = 0, left = 0, count = 0;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
@@ -147,7 +150,8 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
         const auto i = static_cast<std::size_t>(j);
         global.col(j) = (window.Predicted(moved[i], moved_commands[i], {}) - y).cwiseProduct(weight);
       }
-      for (int s = 0; s < signals; ++s) global.col(moves + s) = window.Offset(s).cwiseProduct(weight) * kOffsetSpread_rad;
+      for (int s = 0; s < signals; ++s)
+        global.col(moves + s) = window.Offset(s).cwiseProduct(weight) * kOffsetSpread_rad;
       global.col(columns - 1) = window.Rate(y).cwiseProduct(weight) * kDelaySpread_s;
       // Take out what the window's own initial state explains.
       Eigen::MatrixXd local(window.size(), 2 * signals);
@@ -174,7 +178,8 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
   }
   for (Eigen::Index j = moves; j < columns; ++j) normal(j, j) += 1;
   const Eigen::VectorXd best = normal.ldlt().solve(right);
-  gap.refit = std::sqrt(std::max(0.0, left - right.dot(best)) / std::max(count, 1.0));
+  const double rest = left - right.dot(best);  // rounding may take it below zero; a diverged plant makes it NaN
+  gap.refit = std::sqrt((rest < 0 ? 0.0 : rest) / std::max(count, 1.0));
   for (Eigen::Index j = 0; j < moves; ++j) gap.moves.push_back(best[j]);
   return gap;
 }
@@ -182,13 +187,19 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
 Gap FitRival(const std::vector<Record>& records, const std::array<double, 2>& floor_rad,
              const std::vector<Direction>& directions, int iterations, const GapOptions& options, Plant* rival) {
   // The linearised remainder at a point is the gap there, nuisances taken out, parameters not.
-  const auto remainder = [&](const Plant& plant) { return MeasureGap(records, plant, floor_rad, {}, true, options).refit; };
+  const auto remainder = [&](const Plant& plant) {
+    return MeasureGap(records, plant, floor_rad, {}, true, options).refit;
+  };
   double now = remainder(*rival);
   Gap best = MeasureGap(records, *rival, floor_rad, directions, true, options);
-  for (int i = 0; i < iterations; ++i) {
+  for (int i = 0; i < iterations && best.Finite(); ++i) {
+    // No parameter moves farther than its spread at once.
     double part = 1;
+    for (std::size_t j = 0; j < directions.size(); ++j) {
+      part = std::min(part, directions[j].spread / std::max(std::abs(directions[j].step * best.moves[j]), 1e-12));
+    }
     bool better = false;
-    for (; part > 0.05 && !better; part /= 3) {
+    for (int halving = 0; halving < 4 && !better; ++halving, part /= 3) {
       Plant trial = *rival;
       for (std::size_t j = 0; j < directions.size(); ++j) {
         directions[j].move(&trial, part * directions[j].step * best.moves[j]);

@@ -1,5 +1,5 @@
-// How much of an effect shows in the logs, measured in sensor floors: the change of the angles between the plant that made
-// the logs and another plant, in windows of about a second that start at the true motion.
+// How much of an effect shows in the logs, measured in sensor floors: the change of the angles between the plant that
+// made the logs and another plant, in windows of about a second that start at the true motion.
 //   raw    root mean square over samples and signals of (change / floor)
 //   refit  the same after the best linearised move of the other plant's own parameters, a zero offset per signal, a
 //          delay, and each window's initial state: what no retuning takes away

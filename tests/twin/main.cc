@@ -82,7 +82,8 @@ int Run(const Options& o) {
   Case c;
   std::string problem;
   CaseRequest request = o.request;
-  if (!ParseKind(o.kind, &request.kind)) return Fail("--kind " + o.kind + ": none, single, pair, unknown, ambiguous or auto");
+  if (!ParseKind(o.kind, &request.kind))
+    return Fail("--kind " + o.kind + ": none, single, pair, unknown, ambiguous or auto");
   const bool manual = o.nominal || !o.set.empty() || !o.shapes.empty();
   if (!(manual ? MakeManual(o, &c, &problem) : MakeCase(request, &c, &problem))) return Fail(problem);
   const std::vector<Record> records = MakeRecords(c, o.noise);
@@ -100,8 +101,9 @@ int Run(const Options& o) {
 
 int main(int argc, char** argv) {
   gapscope::twin::Options o;
-  CLI::App app("Synthetic hardware logs of the contract's rigs, each with a known cause.\n"
-               "Example: gapscope_twin --seed 7 --index 3 --out case_3 --label sealed/case_3.json");
+  CLI::App app(
+      "Synthetic hardware logs of the contract's rigs, each with a known cause.\n"
+      "Example: gapscope_twin --seed 7 --index 3 --out case_3 --label sealed/case_3.json");
   app.add_option("--seed", o.request.seed, "Seed of the whole bank")->capture_default_str();
   app.add_option("--index", o.request.index, "Number of the case")->capture_default_str();
   app.add_option("--out", o.out, "Folder for log_N.csv")->required();

@@ -28,10 +28,14 @@ Json ToJson(const Values& values) {
 
 std::vector<std::string> ExpectedVerdicts(const Case& c) {
   switch (c.kind) {
-    case Kind::kNone: return c.nominal_base ? std::vector<std::string>{"none"} : std::vector<std::string>{"none", "parameters"};
-    case Kind::kUnknown: return {"unknown"};
-    case Kind::kAmbiguous: return {"ambiguous"};
-    default: return {"effects"};
+    case Kind::kNone:
+      return c.nominal_base ? std::vector<std::string>{"none"} : std::vector<std::string>{"none", "parameters"};
+    case Kind::kUnknown:
+      return {"unknown"};
+    case Kind::kAmbiguous:
+      return {"ambiguous"};
+    default:
+      return {"effects"};
   }
 }
 
@@ -81,7 +85,8 @@ std::string LabelText(const Case& c, const std::vector<std::string>& files) {
     json["ambiguous"].push_back(group);
   }
   if (!c.outside.empty()) {
-    json["outside"] = {{"name", c.outside}, {"parameters", ToJson(c.outside_parameters)}, {"severity", c.outside_severity}};
+    json["outside"] = {
+        {"name", c.outside}, {"parameters", ToJson(c.outside_parameters)}, {"severity", c.outside_severity}};
   }
   const Base nominal = NominalBase(c.rig);
   for (const BaseParameter& p : BaseParameters(c.rig)) {

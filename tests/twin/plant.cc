@@ -50,10 +50,14 @@ const std::vector<BaseParameter>& BaseParameters(Rig rig) {
       {"link.stiffness", "N m/rad", &Base::link_stiffness_n_m_per_rad, kSpread},
       {"link.damping", "N m s/rad", &Base::second_damping_n_m_s_per_rad, kSpread}};
   switch (rig) {
-    case Rig::kJoint: return joint;
-    case Rig::kQube: return qube;
-    case Rig::kFlexJoint: return flexjoint;
-    case Rig::kFlexLink: break;
+    case Rig::kJoint:
+      return joint;
+    case Rig::kQube:
+      return qube;
+    case Rig::kFlexJoint:
+      return flexjoint;
+    case Rig::kFlexLink:
+      break;
   }
   return flexlink;
 }
@@ -104,10 +108,14 @@ Base NominalBase(Rig rig) {
 
 const char* RigName(Rig rig) {
   switch (rig) {
-    case Rig::kJoint: return "joint";
-    case Rig::kQube: return "qube";
-    case Rig::kFlexJoint: return "flexjoint";
-    case Rig::kFlexLink: break;
+    case Rig::kJoint:
+      return "joint";
+    case Rig::kQube:
+      return "qube";
+    case Rig::kFlexJoint:
+      return "flexjoint";
+    case Rig::kFlexLink:
+      break;
   }
   return "flexlink";
 }

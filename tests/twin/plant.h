@@ -17,7 +17,7 @@ inline constexpr double kNever = std::numeric_limits<double>::infinity();
 
 // Base parameters; those that a rig does not have stay at zero (gear and efficiency at one).
 struct Base {
-  double kp_n_m_per_rad = 0, kd_n_m_s_per_rad = 0;                 // joint: the servo
+  double kp_n_m_per_rad = 0, kd_n_m_s_per_rad = 0;                  // joint: the servo
   double resistance_ohm = 0, kt_n_m_per_a = 0, km_v_s_per_rad = 0;  // voltage drives
   double gear = 1, efficiency = 1;
   double torque_per_ampere_n_m = 0;  // flexlink
@@ -33,7 +33,7 @@ struct Base {
 // One base parameter by the name of the rig's experiment file.
 struct BaseParameter {
   std::string name, unit;
-  double Base::*field;
+  double Base::* field;
   double relative_spread;  // 0: exact
 };
 const std::vector<BaseParameter>& BaseParameters(Rig rig);
@@ -53,12 +53,12 @@ inline bool VoltageDriven(Rig rig) { return rig == Rig::kQube || rig == Rig::kFl
 // The drive, from the command to the torque at the first joint.
 struct Drive {
   double command_delay_s = 0, torque_delay_s = 0;
-  double jitter = 0;                    // standard deviation of a command's delay over its mean
-  double lag_s = 0, second_lag_s = 0;   // two poles
-  double dead_zone = 0;                 // N m, V or A: half width
+  double jitter = 0;                   // standard deviation of a command's delay over its mean
+  double lag_s = 0, second_lag_s = 0;  // two poles
+  double dead_zone = 0;                // N m, V or A: half width
   double torque_limit_n_m = kNever;
-  double power_w = kNever;              // motoring: torque * speed <= power
-  double corner = 0;                    // 0: sharp limits, otherwise the exponent of the rounded corner
+  double power_w = kNever;  // motoring: torque * speed <= power
+  double corner = 0;        // 0: sharp limits, otherwise the exponent of the rounded corner
   double droop = 0, droop_peak_n_m = 1, droop_exponent = 1;
   double sag_ceiling = kNever, sag_depth = 0, sag_time_s = 1;  // N m, V or A
   double asymmetry = 0;
@@ -80,10 +80,10 @@ struct Dry {
 
 // Between motor side and load side of the first joint, and what pulls on the load side.
 struct Load {
-  double motor_share = 0.5;     // of the driven inertia, when split
-  double gap_rad = 0;           // backlash: whole gap
-  double stiffness = kNever;    // joint compliance
-  double contact_hz = 300;      // backlash without compliance: how stiff the flanks are
+  double motor_share = 0.5;   // of the driven inertia, when split
+  double gap_rad = 0;         // backlash: whole gap
+  double stiffness = kNever;  // joint compliance
+  double contact_hz = 300;    // backlash without compliance: how stiff the flanks are
   double transmission_damping_ratio = 0.1;
   double cable_stiffness = 0, cable_rest_rad = 0, cable_hysteresis = 0;
   double gravity_n_m = 0, gravity_rest_rad = 0;
@@ -95,18 +95,18 @@ struct Load {
 
 // Outside the list: what a diagnosis must call unknown.
 struct Outside {
-  double torque_n_m = 0, torque_hz = 1, torque_phase_rad = 0;           // periodic torque from outside
-  double warm_up = 0, warm_up_time_s = 1;                               // viscous friction times 1 + a exp(-t / T)
-  double gain_swing = 0, gain_hz = 0.2, gain_phase_rad = 0;             // drive gain times 1 + a sin
+  double torque_n_m = 0, torque_hz = 1, torque_phase_rad = 0;              // periodic torque from outside
+  double warm_up = 0, warm_up_time_s = 1;                                  // viscous friction times 1 + a exp(-t / T)
+  double gain_swing = 0, gain_hz = 0.2, gain_phase_rad = 0;                // drive gain times 1 + a sin
   double resonator_share = 0, resonator_hz = 5, resonator_damping = 0.02;  // a mass on a spring on the load
-  double scale_drift_per_s = 0;                                         // sensor: angle times 1 + d t
+  double scale_drift_per_s = 0;                                            // sensor: angle times 1 + d t
   int drift_signal = 0;
-  double wheel_error_rad = 0, wheel_phase_rad = 0;                      // sensor: eccentric code wheel, once a turn
-  double play_rad = 0;                                                  // sensor: coupling with play
+  double wheel_error_rad = 0, wheel_phase_rad = 0;  // sensor: eccentric code wheel, once a turn
+  double play_rad = 0;                              // sensor: coupling with play
   int play_signal = 0;
-  double clock_drift_per_s = 0;                                         // stamp = t + d t^2 / 2
-  int bad_stamp_bursts = 0, bad_stamp_rows = 0;                         // rows lost, the rest stamped as if none were
-  double hold_per_s = 0, hold_time_s = 0.05;                            // the drive keeps an old command now and then
+  double clock_drift_per_s = 0;                  // stamp = t + d t^2 / 2
+  int bad_stamp_bursts = 0, bad_stamp_rows = 0;  // rows lost, the rest stamped as if none were
+  double hold_per_s = 0, hold_time_s = 0.05;     // the drive keeps an old command now and then
 };
 
 struct Plant {

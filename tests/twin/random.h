@@ -13,7 +13,8 @@ namespace gapscope::twin {
 
 class Random {
  public:
-  // One independent stream per purpose ("noise", "base", ...) of a case, so that a change of one draw leaves the others.
+  // One independent stream per purpose ("noise", "base", ...) of a case, so that a change of one draw leaves the
+  // others.
   Random(std::uint64_t seed, std::uint64_t index, std::string_view purpose) {
     std::uint64_t h = Mix(seed + 0x9e3779b97f4a7c15ULL) ^ Mix(index + 0xbf58476d1ce4e5b9ULL);
     for (const char c : purpose) h = Mix(h ^ static_cast<unsigned char>(c));

@@ -186,7 +186,8 @@ Record MakeRecord(const Plant& plant, const LogSpec& log, const Sensors& sensors
     };
     const DriveOutput& drive = simulator.drive();
     const double speed = noisy(simulator.w1(), 0, sensors.speed_noise_rad_per_s, kSpeedQuantum);
-    const double torque = noisy(drive.estimate_n_m, sensors.torque_offset_n_m, sensors.torque_noise_n_m, kTorqueQuantum);
+    const double torque =
+        noisy(drive.estimate_n_m, sensors.torque_offset_n_m, sensors.torque_noise_n_m, kTorqueQuantum);
     const double current = noisy(drive.current_a, sensors.current_offset_a, sensors.current_noise_a, kCurrentQuantum);
     if (losses.unlogged[k] != 0) ++lost;
     if (losses.missed[k] == 0 && losses.unlogged[k] == 0) {

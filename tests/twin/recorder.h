@@ -38,9 +38,9 @@ struct WeakLoop {
 
 struct LogSpec {
   Excitation excitation;
-  double amplitude = 0;        // rad (joint; reference), V or A
-  bool as_reference = false;   // the excitation is the weak loop's reference
-  Excitation feedforward;      // joint
+  double amplitude = 0;       // rad (joint; reference), V or A
+  bool as_reference = false;  // the excitation is the weak loop's reference
+  Excitation feedforward;     // joint
   double feedforward_n_m = 0;
   WeakLoop loop;
   double command_limit = kNever;

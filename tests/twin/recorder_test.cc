@@ -1,4 +1,6 @@
 // Logs: columns, rows, noise, delays, repeatability.
+#include "tests/twin/recorder.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +8,6 @@
 
 #include "tests/twin/output.h"
 #include "tests/twin/plants.h"
-#include "tests/twin/recorder.h"
 
 namespace gapscope::twin {
 namespace {

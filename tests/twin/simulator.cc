@@ -83,7 +83,8 @@ void Simulator::Nudge(double q1_rad, double w1_rad_per_s, double q2_rad, double 
 
 double Simulator::DelayedDemand(double at_s, double newest) const {
   if (demands_.empty()) return newest;
-  const double ago = std::max((at_s - clock_offset_s_) / step_s_, static_cast<double>(steps_ - static_cast<long>(demands_.size()) + 2));
+  const double ago = std::max((at_s - clock_offset_s_) / step_s_,
+                              static_cast<double>(steps_ - static_cast<long>(demands_.size()) + 2));
   const long before = std::min(static_cast<long>(std::floor(ago)), steps_);
   if (before < 0) return demands_[0];
   const double part = ago - static_cast<double>(before);
@@ -122,9 +123,8 @@ DriveOutput Simulator::DriveAt(const State& x, const Inputs& in, State* rate) co
     return u / std::pow(1 + std::pow(std::abs(u / std::max(limit, 1e-9)), d.corner), 1 / d.corner);
   };
   const auto ceiling = [&](double u) {
-    return d.sag_ceiling == kNever
-               ? u
-               : limited(u, d.sag_ceiling * std::max(kLowestCeiling, 1 - d.sag_depth * x[kSag]));
+    return d.sag_ceiling == kNever ? u
+                                   : limited(u, d.sag_ceiling * std::max(kLowestCeiling, 1 - d.sag_depth * x[kSag]));
   };
   // Two poles in series; without lag both outputs follow at once.
   const auto lagged = [&](double u) {
@@ -140,8 +140,7 @@ DriveOutput Simulator::DriveAt(const State& x, const Inputs& in, State* rate) co
 
   double torque = 0, load = 0;
   if (plant_.rig == Rig::kJoint) {
-    out.demand_n_m =
-        b.kp_n_m_per_rad * (in.command - angle) - b.kd_n_m_s_per_rad * speed + in.feedforward_n_m;
+    out.demand_n_m = b.kp_n_m_per_rad * (in.command - angle) - b.kd_n_m_s_per_rad * speed + in.feedforward_n_m;
     const double request = d.torque_delay_s > 0 ? in.delayed_demand_n_m : out.demand_n_m;
     out.effort = dead(lagged(request));
     torque = ceiling(out.effort);
@@ -213,9 +212,9 @@ Simulator::State Simulator::Derivative(const State& x, const Inputs& in) const {
   const double qm = split ? x[kQm] : x[kQ1], wm = split ? x[kWm] : x[kW1];
   const double start = split ? start_[kQm] : start_[kQ1];
   const double motor_inertia = driven_inertia_ * (split ? plant_.load.motor_share : 1.0);
-  const double motor =
-      drive.torque_n_m - b.damping_n_m_s_per_rad * ViscousFactor(o, in.time_s) * wm - Drag(plant_.dry[0], wm) -
-      bristles_[0].Torque(plant_.dry[0], qm - start, wm, drive.torque_n_m, motor_inertia);
+  const double motor = drive.torque_n_m - b.damping_n_m_s_per_rad * ViscousFactor(o, in.time_s) * wm -
+                       Drag(plant_.dry[0], wm) -
+                       bristles_[0].Torque(plant_.dry[0], qm - start, wm, drive.torque_n_m, motor_inertia);
   double first = LoadTorque(x, in.time_s);
   double load_inertia = driven_inertia_;
   if (split) {
@@ -255,8 +254,8 @@ Simulator::State Simulator::Derivative(const State& x, const Inputs& in) const {
     m11 = load_inertia + b.pendulum_mass_kg * b.arm_length_m * b.arm_length_m + inertia2 * s * s;
     m12 = couple * c;
     first += -2 * inertia2 * s * c * x[kW1] * x[kW2] + couple * s * x[kW2] * x[kW2];
-    second += inertia2 * s * c * x[kW1] * x[kW1] -
-              b.pendulum_mass_kg * b.gravity_m_per_s2 * b.pendulum_length_m / 2 * s;
+    second +=
+        inertia2 * s * c * x[kW1] * x[kW1] - b.pendulum_mass_kg * b.gravity_m_per_s2 * b.pendulum_length_m / 2 * s;
   } else {
     m11 = load_inertia + inertia2;
     m12 = inertia2;
@@ -318,9 +317,9 @@ void Simulator::Step(const Commands& commands) {
   }
   output_ = DriveAt(x_, end, &unused);
   // Poles that are not there follow at once, so that another plant can take over here.
-  const double followed = VoltageDriven(plant_.rig)         ? output_.current_a
+  const double followed = VoltageDriven(plant_.rig)      ? output_.current_a
                           : plant_.rig == Rig::kFlexLink ? end.command
-                                                            : output_.demand_n_m;
+                                                         : output_.demand_n_m;
   if (plant_.drive.lag_s == 0) x_[kLag] = followed;
   if (plant_.drive.second_lag_s == 0) x_[kSecondLag] = VoltageDriven(plant_.rig) ? end.command : x_[kLag];
 }
@@ -342,8 +341,8 @@ double Simulator::Energy() const {
     // A thin rod, integrated over its length: velocity of the point at distance s from the hinge.
     const double s = std::sin(x_[kQ2]), c = std::cos(x_[kQ2]);
     const double m = b.pendulum_mass_kg, length = b.pendulum_length_m, arm = b.arm_length_m;
-    energy += m / 2 * (arm * arm * w1 * w1 + arm * w1 * c * w2 * length +
-                       length * length / 3 * (w2 * w2 + s * s * w1 * w1));
+    energy +=
+        m / 2 * (arm * arm * w1 * w1 + arm * w1 * c * w2 * length + length * length / 3 * (w2 * w2 + s * s * w1 * w1));
     energy -= m * b.gravity_m_per_s2 * length / 2 * c;
   } else if (plant_.rig != Rig::kJoint) {
     energy += b.link_inertia_kg_m2 * (w1 + w2) * (w1 + w2) / 2;

@@ -120,6 +120,9 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   std::fill(held_.begin(), held_.end(), window.begin);
   Prime(recording, window);
 
+  // Torques cost a pass over the actuators at each stamp: only when this log has one.
+  reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(), [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
+
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];

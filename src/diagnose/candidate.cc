@@ -14,6 +14,7 @@ std::string Candidate::Name() const {
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .weights = weights, .huber = 0};
+  if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
   if (train) {

@@ -107,7 +107,9 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     prototype.prior = Eigen::Map<Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
     const auto add = [&](ReplayMode mode) {
       const auto rows = MakeWindows(recording, mode, options_.window_s);
-      for (const Window& window : rows) {
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (options_.fold != Fold::kAll && (i % 3 == 1) != (options_.fold == Fold::kHeldOut)) continue;
+        const Window& window = rows[i];
         FitWindow w = prototype;
         w.rows = window;
         w.start = InitialStateAt(model, recording, window.begin, values_);

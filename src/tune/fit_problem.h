@@ -19,6 +19,9 @@
 
 namespace gapscope {
 
+// Which windows of each log a problem takes: with kTrain and kHeldOut every third one, from the second on, is held out.
+enum class Fold { kAll, kTrain, kHeldOut };
+
 enum class Objective { kWindows, kFreeRun, kBoth };
 
 struct FitOptions {
@@ -26,6 +29,7 @@ struct FitOptions {
   Objective objective = Objective::kWindows;
   double window_s = 1.0;
   double lead_in_s = 0.05;          // start of a window that is not scored
+  Fold fold = Fold::kAll;
   std::size_t max_windows = 0;      // 0: all; else evenly chosen ones
   double time_step_s = 0;           // 0: the model's
   bool fit_offsets = true;          // zero offsets of measured positions, per log

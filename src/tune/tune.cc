@@ -79,6 +79,7 @@ DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::si
   if (held_out.empty()) {
     for (std::size_t i = 1; i < recordings.size(); i += 3) keep[i] = 1;
   }
+  split.asked = !held_out.empty();
   std::size_t count = 0;
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     count += keep[i];

@@ -13,6 +13,7 @@ namespace gapscope {
 struct DataSplit {
   std::vector<Recording> train, held_out;
   std::string how;  // one line for the user
+  bool asked = false;  // the user said which
 };
 // `held_out` indices are kept; with none, every third log from the second on; with two logs the second; with one its last 30 % of time.
 DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::size_t>& held_out);

@@ -88,7 +88,7 @@ TEST_F(CliTest, HelpAndVersion) {
 
 TEST_F(CliTest, WrongArguments) {
   ExpectRefused("", {"subcommand"});
-  ExpectRefused("replya", {"replya"});
+  ExpectRefused("replya", {"no command 'replya'", "did you mean 'replay'?"});
   ExpectRefused("replay", {"experiment"});
   ExpectRefused("replay " + Joint(), {"logs"});
   const std::string log = JointLog();
@@ -100,6 +100,8 @@ TEST_F(CliTest, WrongArguments) {
   ExpectRefused("replay " + Joint() + " '" + log + "' --window 0", {"--window"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --time-step -1", {"--time-step"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --time-step nan", {"--time-step"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above nan", {"--fail-above"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --window inf", {"--window"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above 0", {"--fail-above"});
 }
 

@@ -9,7 +9,12 @@ set(GAPSCOPE_MUJOCO_SHA256 be28c0c7587347ef996b4de0487264e9da296282082b092bae211
 if(GAPSCOPE_MUJOCO STREQUAL "system")
   find_package(mujoco 3.14 REQUIRED)
 elseif(GAPSCOPE_MUJOCO STREQUAL "wheel")
-  set(GAPSCOPE_CACHE_DIR "$ENV{HOME}/.cache/gapscope" CACHE PATH "Where scripts/setup keeps downloads")
+  if(DEFINED ENV{GAPSCOPE_CACHE_DIR})
+    set(_cache "$ENV{GAPSCOPE_CACHE_DIR}")
+  else()
+    set(_cache "$ENV{HOME}/.cache/gapscope")
+  endif()
+  set(GAPSCOPE_CACHE_DIR "${_cache}" CACHE PATH "Where scripts/setup keeps downloads")
   file(GLOB _wheel ${GAPSCOPE_CACHE_DIR}/mujoco_core-${GAPSCOPE_MUJOCO_VERSION}-cp311-*.whl)
   if(NOT _wheel)
     message(FATAL_ERROR "No mujoco_core ${GAPSCOPE_MUJOCO_VERSION} wheel in ${GAPSCOPE_CACHE_DIR}. "

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   cli::AddInspect(program, run);
   cli::AddReplay(program, run);
   cli::AddTune(program, run);
+  cli::AddDiagnose(program, run);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

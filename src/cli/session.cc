@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -82,6 +83,20 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
     session.values[index] = value;
   }
   return session;
+}
+
+Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const std::vector<std::string>& hold_out) {
+  HeldOutLogs result{.all = logs};
+  for (const auto& log : hold_out) {
+    if (std::find(result.all.begin(), result.all.end(), log) == result.all.end()) result.all.push_back(log);
+  }
+  for (std::size_t i = 0; i < result.all.size(); ++i) {
+    if (std::find(hold_out.begin(), hold_out.end(), result.all[i]) != hold_out.end()) result.held_out.push_back(i);
+  }
+  if (result.held_out.size() == result.all.size()) {
+    return Error{.what = "every log is held out", .where = "--hold-out", .allowed = "at least one log to fit", .cure = "add logs before --hold-out"};
+  }
+  return result;
 }
 
 void PrintFindings(const std::vector<Recording>& recordings, bool quiet) {

@@ -56,6 +56,13 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common);
 // Reads all logs, in parallel; the first error in the order of the arguments.
 Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths, ThreadPool& pool);
 
+// The logs of a command with --hold-out: all of them once, and which are held out. Error: nothing is left to fit.
+struct HeldOutLogs {
+  std::vector<std::string> all;
+  std::vector<std::size_t> held_out;
+};
+Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const std::vector<std::string>& hold_out);
+
 // Every finding of the logs on stderr, one line each, unless quiet.
 void PrintFindings(const std::vector<Recording>& recordings, bool quiet);
 

@@ -28,20 +28,9 @@ struct TuneFlags {
 const std::vector<std::string> kActuatorEffects = {"command_delay", "actuator_lag", "torque_speed_curve", "load_friction"};
 
 Result<int> RunTune(TuneFlags flags) {
-  // Held-out logs are read with the others; naming a log twice means once.
-  std::vector<std::string> all = flags.model.logs;
-  for (const auto& log : flags.hold_out) {
-    if (std::find(all.begin(), all.end(), log) == all.end()) all.push_back(log);
-  }
-  std::vector<std::size_t> held_out;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (std::find(flags.hold_out.begin(), flags.hold_out.end(), all[i]) != flags.hold_out.end()) held_out.push_back(i);
-  }
-  if (held_out.size() == all.size()) {
-    return Error{.what = "every log is held out", .where = "--hold-out", .allowed = "at least one log to fit", .cure = "add logs before --hold-out"};
-  }
+  GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
   ModelFlags model = flags.model;
-  model.logs = all;
+  model.logs = logs.all;
   if (flags.actuator) {
     GS_ASSIGN(const Session base, LoadSession(model, flags.common));
     GS_ASSIGN(const auto possible, base.model->PossibleEffects());
@@ -93,7 +82,7 @@ Result<int> RunTune(TuneFlags flags) {
       fmt::print(stderr, "\r\033[Kcost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, elapsed, budget > 0 ? fmt::format(" of {:.0f} s", budget) : "");
     };
   }
-  const DataSplit data = SplitData(std::move(session.recordings), held_out);
+  const DataSplit data = SplitData(std::move(session.recordings), logs.held_out);
   auto tuned = Tune(*session.model, data, session.values, options, *session.pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!tuned.ok()) return tuned.error();

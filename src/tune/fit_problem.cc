@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "src/tune/journal.h"
 
@@ -249,6 +250,7 @@ double FitProblem::WindowCost(const Eigen::VectorXd& residual, const FitWindow& 
 
 double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs) {
   ++evaluations_;
+  ++replays_;
   if (!journal_) return CostNow(point, log_costs);
   std::vector<double> record;
   if (!journal_->Next(point, &record)) {
@@ -275,7 +277,6 @@ double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs
     Residuals(window, point, worker.base, worker.residual);
     costs[w] = WindowCost(worker.residual, window, point.states[w]);
   });
-  ++replays_;
   double total = 0;
   if (log_costs) log_costs->assign(recordings_.size(), 0.0);
   for (std::size_t w = 0; w < costs.size(); ++w) {
@@ -307,6 +308,8 @@ void FitProblem::UpdateRobustScale(const FitPoint& point) {
 
 Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns columns) {
   ++evaluations_;
+  const std::size_t parameters = columns == Columns::kStates ? 0 : coordinates_.size() * (columns == Columns::kCentral ? 2 : 1);
+  replays_ += 1 + parameters + (columns != Columns::kStates && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
   if (!journal_) return LinearizeNow(point, step, columns);
   std::vector<double> record;
   if (journal_->Next(point, &record)) return Unpack(record);
@@ -316,7 +319,7 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns 
 }
 
 Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Columns columns, Snapshot* keep) {
-  const bool all = columns == Columns::kAll;
+  const bool all = columns != Columns::kStates;
   const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0;
   struct Part {
     double cost = 0;
@@ -324,7 +327,7 @@ Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Colum
     Eigen::VectorXd gradient;
     Eigen::MatrixXd gain;
     Eigen::VectorXd state_step;
-    std::vector<Eigen::VectorXd> blocks;
+    std::vector<std::pair<long, Eigen::VectorXd>> blocks;  // by half second of the log
     bool valid = false;
   };
   std::vector<Part> parts(windows_.size());
@@ -355,6 +358,13 @@ Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Colum
       for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
         worker.values[c.parameter] = c.ToValue(point.y[i] + h);
         if (difference(i, h, Simulate(worker, window, point, worker.values, state, shift, worker.perturbed))) break;
+      }
+      if (columns == Columns::kCentral && point.y[i] - h >= c.low && point.y[i] - h <= c.high) {
+        worker.values[c.parameter] = c.ToValue(point.y[i] - h);
+        if (Simulate(worker, window, point, worker.values, state, shift, worker.perturbed)) {
+          Residuals(window, point, worker.perturbed, worker.other);
+          worker.jacobian.col(i) = 0.5 * (worker.jacobian.col(i) - (worker.other - worker.residual) / h);
+        }
       }
       worker.values[c.parameter] = values[c.parameter];
     }
@@ -427,32 +437,40 @@ Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Colum
     const Eigen::Index scored = static_cast<Eigen::Index>(window.rows.rows() - window.first_scored);
     const double* time = recordings_[window.log].time_s.data() + window.rows.begin + window.first_scored;
     for (Eigen::Index begin = 0; begin < scored;) {
+      const auto number = static_cast<long>(time[begin] / kBlock_s);
       Eigen::Index end = begin + 1;
-      while (end < scored && time[end] - time[begin] < kBlock_s) ++end;
-      if (end < scored && time[scored - 1] - time[end] < 0.5 * kBlock_s) end = scored;
+      while (end < scored && static_cast<long>(time[end] / kBlock_s) == number) ++end;
       Eigen::VectorXd block = Eigen::VectorXd::Zero(n);
       for (std::size_t s = 0; s < signals; ++s) {
         const Eigen::Index first = static_cast<Eigen::Index>(s) * scored + begin;
         block += reduced.middleRows(first, end - begin).transpose() * after.segment(first, end - begin);
       }
-      part.blocks.push_back(std::move(block));
+      part.blocks.emplace_back(number, std::move(block));
       begin = end;
     }
   });
-  replays_ += 1 + static_cast<std::size_t>(parameters) + (all && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
   Linearization result;
   result.hessian = Eigen::MatrixXd::Zero(n, n);
   result.gradient = Eigen::VectorXd::Zero(n);
   result.valid = true;
-  for (auto& part : parts) {
+  std::map<std::pair<std::size_t, long>, Eigen::VectorXd> blocks;
+  for (std::size_t w = 0; w < parts.size(); ++w) {
+    Part& part = parts[w];
     result.valid = result.valid && part.valid;
     if (!part.valid) continue;
     result.cost += part.cost;
     result.hessian += part.hessian;
     result.gradient += part.gradient;
-    for (auto& block : part.blocks) result.block_gradients.push_back(std::move(block));
+    for (auto& [number, block] : part.blocks) {
+      const auto [entry, added] = blocks.try_emplace({windows_[w].log, number}, block);
+      if (!added) entry->second += block;
+    }
     result.state_gain.push_back(std::move(part.gain));
     result.state_step.push_back(std::move(part.state_step));
+  }
+  for (auto& [key, block] : blocks) {
+    result.block_logs.push_back(static_cast<int>(key.first));
+    result.block_gradients.push_back(std::move(block));
   }
   result.cost += AnchorCost(point);
   result.gradient += anchor_weight_.cwiseProduct(point.y - anchor_);

@@ -58,7 +58,8 @@ struct Linearization {
   double cost = 0;
   Eigen::MatrixXd hessian;                  // Gauss-Newton, of y
   Eigen::VectorXd gradient;                 // of y, at the states' own optimum
-  std::vector<Eigen::VectorXd> block_gradients;   // reduced, per half second: for cluster-robust covariances
+  std::vector<Eigen::VectorXd> block_gradients;   // reduced, per half second of a log, all windows there together: for cluster-robust covariances
+  std::vector<int> block_logs;              // log of each block; blocks of a log stand in the order of time
   std::vector<Eigen::MatrixXd> state_gain;  // dx_w = state_step - state_gain dy
   std::vector<Eigen::VectorXd> state_step;
   bool valid = false;                       // false: the point cannot be simulated
@@ -92,6 +93,7 @@ class FitProblem {
   std::size_t size() const { return low_.size(); }
   const Eigen::VectorXd& low() const { return low_; }
   const Eigen::VectorXd& high() const { return high_; }
+  const Eigen::VectorXd& anchor_weight() const { return anchor_weight_; }  // on the hessian's diagonal
   std::size_t windows() const;
   std::size_t residuals() const;           // scored rows x signals
 
@@ -104,7 +106,9 @@ class FitProblem {
   // Cost; infinity where a replay diverges. `log_costs` receives each log's part.
   double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr);
   // `step`: finite difference in search coordinates. Columns of parameters, offsets and shift may be left out: the gradient and hessian are zero then.
-  enum class Columns { kAll, kStates };
+  // kCentral: all, those of parameters by central differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns
+  // that are parallel to rounding, which one-sided ones are not.
+  enum class Columns { kAll, kStates, kCentral };
   Linearization Linearize(const FitPoint& point, double step, Columns columns = Columns::kAll);
   // Moves y by dy and each window's state by its own best answer to that.
   FitPoint Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const;

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -47,13 +48,13 @@ Result<std::unique_ptr<Journal>> Journal::Open(const std::string& path, std::uin
   std::error_code failure;
   if (resume && std::filesystem::exists(path, failure)) {
     GS_ASSIGN(const std::string bytes, ReadFile(path));
-    std::uint64_t stored = 0;
+    std::uint64_t stored = bytes.size() < 16 && std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, bytes.size())), kMagic) ? key : 0;
     if (bytes.size() >= 16 && std::memcmp(bytes.data(), kMagic, 8) == 0) std::memcpy(&stored, bytes.data() + 8, 8);
     if (stored != key) {
       return Error{.what = "the journal belongs to another job", .where = path, .actual = "", .allowed = "the same experiment, logs and options", .cure = "run without --resume"};
     }
-    good = 16;
-    while (good + 16 <= bytes.size()) {
+    good = bytes.size() < 16 ? 0 : 16;  // cut in its head: nothing is lost
+    while (good > 0 && good + 16 <= bytes.size()) {
       std::uint64_t point = 0, count = 0;
       std::memcpy(&point, bytes.data() + good, 8);
       std::memcpy(&count, bytes.data() + good + 8, 8);
@@ -105,6 +106,7 @@ std::vector<double> Pack(const Linearization& l) {
   Put(out, l.hessian);
   Put(out, l.gradient);
   for (const auto& block : l.block_gradients) Put(out, block);
+  out.insert(out.end(), l.block_logs.begin(), l.block_logs.end());
   for (const auto& gain : l.state_gain) Put(out, gain);
   for (const auto& step : l.state_step) Put(out, step);
   return out;
@@ -118,6 +120,7 @@ Linearization Unpack(const std::vector<double>& in) {
   l.hessian = Take(in, at);
   l.gradient = Take(in, at);
   for (int i = 0; i < static_cast<int>(in[2]); ++i) l.block_gradients.push_back(Take(in, at));
+  for (int i = 0; i < static_cast<int>(in[2]); ++i) l.block_logs.push_back(static_cast<int>(in.at(at++)));
   for (int i = 0; i < static_cast<int>(in[3]); ++i) l.state_gain.push_back(Take(in, at));
   for (int i = 0; i < static_cast<int>(in[3]); ++i) l.state_step.push_back(Take(in, at));
   return l;

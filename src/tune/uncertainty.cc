@@ -9,6 +9,7 @@ namespace {
 constexpr double kFlatShare = 0.25;       // a direction whose deviation exceeds this share of the range is not known
 constexpr double kCorrelated = 0.95;
 constexpr double kBoundShare = 1e-3;      // of the range
+constexpr double kLeastEigenvalue = 1e-13;  // of the largest: below is rounding
 
 // 97.5 % quantile of Student's t (Abramowitz & Stegun 26.7.5, two terms).
 double StudentQuantile(double freedom) {
@@ -24,7 +25,7 @@ Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, cons
   Uncertainty result;
   const auto& coordinates = problem.coordinates();
   const auto n = static_cast<Eigen::Index>(coordinates.size());
-  const Linearization at = problem.Linearize(point, step);
+  const Linearization at = problem.Linearize(point, step, FitProblem::Columns::kCentral);
   const Eigen::Index all = point.y.size();
   Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(all, all);
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(all);
@@ -34,7 +35,7 @@ Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, cons
   for (std::size_t b = 0; b < at.block_gradients.size(); ++b) {
     const Eigen::VectorXd g = at.block_gradients[b] - mean;
     meat += g * g.transpose();
-    if (b + 1 < at.block_gradients.size()) {
+    if (b + 1 < at.block_gradients.size() && at.block_logs[b] == at.block_logs[b + 1]) {
       const Eigen::VectorXd next = at.block_gradients[b + 1] - mean;
       meat += 0.5 * (g * next.transpose() + next * g.transpose());
     }
@@ -42,18 +43,20 @@ Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, cons
   const double freedom = std::max(1.0, blocks - static_cast<double>(all));
   meat *= blocks / freedom;
   const Eigen::VectorXd range = problem.high() - problem.low();
-  // In units of each coordinate's range, so that flat directions mean the same for all.
-  const Eigen::MatrixXd hessian = range.asDiagonal() * at.hessian * range.asDiagonal();
+  // In units of each coordinate's range, so that flat directions mean the same for all. What the anchor adds is no knowledge.
+  Eigen::MatrixXd hessian = at.hessian;
+  hessian.diagonal() -= problem.anchor_weight();
+  hessian = range.asDiagonal() * hessian * range.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian);
   const double largest = std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
-  const Eigen::VectorXd inverse = eigen.eigenvalues().cwiseMax(1e-14 * largest).cwiseInverse();
-  const Eigen::MatrixXd bread = eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
-  const Eigen::MatrixXd scaled_meat = range.asDiagonal() * meat * range.asDiagonal();
-  // The anchor holds what the data leaves open: its own information counts with the noise of the data.
+  // Whitened: sandwich = W meat' W', the model's own covariance = noise W W'. A direction never counts as better known than the model's own covariance
+  // says, which few blocks could pretend; raising eigenvalues keeps the matrix consistent.
+  const Eigen::MatrixXd whitener = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kLeastEigenvalue * largest).cwiseSqrt().cwiseInverse().asDiagonal();
   const double noise = 2 * at.cost / std::max<double>(1, static_cast<double>(problem.residuals()));
-  Eigen::MatrixXd covariance = bread * scaled_meat * bread;
-  const Eigen::MatrixXd model_based = noise * bread;
-  for (Eigen::Index i = 0; i < all; ++i) covariance(i, i) = std::max(covariance(i, i), model_based(i, i));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(whitener.transpose() * range.asDiagonal() * meat * range.asDiagonal() * whitener);
+  const Eigen::MatrixXd half_covariance = whitener * spread.eigenvectors() * spread.eigenvalues().cwiseMax(noise).cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd covariance = half_covariance * half_covariance.transpose();
+  const Eigen::MatrixXd model_based = noise * whitener * whitener.transpose();
 
   const double quantile = StudentQuantile(freedom);
   for (Eigen::Index i = 0; i < n; ++i) {

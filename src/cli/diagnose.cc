@@ -1,0 +1,64 @@
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "src/cli/commands.h"
+#include "src/cli/session.h"
+#include "src/core/file.h"
+#include "src/report/diagnose_report.h"
+
+namespace gapscope::cli {
+namespace {
+
+struct DiagnoseFlags {
+  CommonFlags common;
+  ModelFlags model;
+  std::vector<std::string> hold_out;
+  double budget_s = 60, window_s = 0;
+};
+
+Result<int> RunDiagnose(const DiagnoseFlags& flags) {
+  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+  GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
+  if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
+  GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
+  GS_ASSIGN(auto recordings, LoadRecordings(experiment, logs.all, pool));
+  PrintFindings(recordings, flags.common.quiet);
+  const auto log_values = recordings.front().values;
+  const DataSplit data = SplitData(std::move(recordings), logs.held_out);
+  DiagnoseOptions options{.budget_s = flags.budget_s, .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s, .seed = flags.common.seed};
+  const bool live = !flags.common.quiet && isatty(2);
+  if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
+  auto diagnosed = Diagnose(experiment, data, options, pool);
+  if (live) fmt::print(stderr, "\r\033[K");
+  if (!diagnosed.ok()) return diagnosed.error();
+  const Diagnosis& diagnosis = diagnosed.value();
+  const std::string json = DiagnosisJson(diagnosis, flags.common.seed);
+  if (!flags.common.out.empty()) {
+    const std::filesystem::path out = flags.common.out;
+    GS_ASSIGN(const auto base, Model::Build(experiment));
+    GS_ASSIGN(const std::string xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
+    GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
+    GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
+  }
+  fmt::print("{}", flags.common.json ? json + "\n" : DiagnosisTable(diagnosis));
+  return kDone;
+}
+
+}  // namespace
+
+void AddDiagnose(CLI::App& program, Run& run) {
+  auto flags = std::make_shared<DiagnoseFlags>();
+  CLI::App* command = program.add_subcommand("diagnose", "Where the gap lies, which unmodelled effect causes it, how far it shrinks");
+  AddModelFlags(*command, flags->model, false);
+  AddCommonFlags(*command, flags->common, true);
+  command->add_option("--hold-out", flags->hold_out, "A log to judge by, not to fit")->allow_extra_args(false);
+  command->add_option("--budget", flags->budget_s, "Seconds; the best verdict so far when they are spent")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--window", flags->window_s, "Length of a window, s")->check(CLI::PositiveNumber);
+  command->footer("Example: gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis");
+  command->callback([flags, &run] { run = [flags] { return RunDiagnose(*flags); }; });
+}
+
+}  // namespace gapscope::cli

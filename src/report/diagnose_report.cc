@@ -1,0 +1,80 @@
+#include "src/report/diagnose_report.h"
+
+#include <fmt/core.h>
+
+#include "src/report/json.h"
+
+namespace gapscope {
+
+using nlohmann::ordered_json;
+
+std::string DiagnosisTable(const Diagnosis& d) {
+  std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
+  for (const auto& found : d.effects) {
+    text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap\n", found.use.effect, found.use.on, found.probability, 100 * found.share_of_gap);
+    for (const auto& p : found.parameters) text += fmt::format("    {:<28} {:>11.4g}   {:.4g} .. {:.4g} {}\n", p.key, p.value, p.low, p.high, p.unit);
+  }
+  for (const auto& group : d.ambiguous) {
+    std::string names;
+    for (const auto& name : group) names += (names.empty() ? "" : ", ") + name;
+    text += "  cannot be told apart on these logs: " + names + "\n";
+  }
+  text += fmt::format("\nheld-out error: nominal {:.4g} -> refit {:.4g} -> final {:.4g} -> floor {:.4g}; {:.0f} % of the gap closed\n", d.nominal, d.refit, d.final, d.floor, 100 * d.closed);
+  text += "\n" + d.explanation + "\n";
+  if (!d.where.empty()) {
+    text += fmt::format("\n{:<18} {:<44} {:>9} {:>9}\n", "where", "", "of error", "of time");
+    for (const auto& w : d.where) text += fmt::format("{:<18} {:<44} {:>8.0f}% {:>8.0f}%\n", w.signal, w.condition, 100 * w.share_of_error, 100 * w.share_of_time);
+  }
+  text += fmt::format("\n{:<34} {:>11} {:>9}  {}\n", "candidate", "probability", "error", "why, or why not");
+  std::size_t shown = 0;
+  for (const auto& c : d.candidates) {
+    if (!c.refitted && ++shown > 4) continue;
+    text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", c.name, c.probability, c.refitted ? fmt::format("{:.4g}", c.held_out_error) : "-", c.reason);
+  }
+  if (!d.next_command.empty()) {
+    text += fmt::format("\nnext experiment, to tell {} from {}:\n  {}\n", d.next_separates.front(), d.next_separates.back(), d.next_command);
+  }
+  text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.budget_spent ? ", the whole budget" : "");
+  return text;
+}
+
+std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
+  ordered_json json = {{"schema", "gapscope.diagnosis/1"}, {"verdict", VerdictName(d.verdict)}, {"probability", d.probability}, {"effects", ordered_json::array()}};
+  for (const auto& found : d.effects) {
+    ordered_json parameters = ordered_json::object();
+    for (const auto& p : found.parameters) parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
+    json["effects"].push_back({{"name", found.use.effect}, {"on", found.use.on}, {"probability", found.probability}, {"parameters", parameters}, {"error_before", JsonNumber(found.error_before)},
+                               {"error_after", JsonNumber(found.error_after)}, {"share_of_gap", JsonNumber(found.share_of_gap)}});
+  }
+  json["ambiguous"] = ordered_json::array();
+  for (const auto& group : d.ambiguous) {
+    ordered_json names = ordered_json::array();
+    for (const auto& name : group) names.push_back(name.substr(0, name.find('@')));
+    json["ambiguous"].push_back(names);
+  }
+  json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)}, {"final", JsonNumber(d.final)}, {"floor", JsonNumber(d.floor)}, {"closed", JsonNumber(d.closed)}, {"held_out", true}};
+  json["where"] = ordered_json::array();
+  for (const auto& w : d.where) {
+    json["where"].push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", JsonNumber(w.share_of_error)}, {"share_of_time", JsonNumber(w.share_of_time)}, {"low", JsonNumber(w.low)},
+                             {"high", JsonNumber(w.high)}});
+  }
+  json["candidates"] = ordered_json::array();
+  for (const auto& c : d.candidates) {
+    const std::size_t at = c.name.find('@');
+    ordered_json entry = {{"name", c.name.substr(0, at)}};
+    if (at != std::string::npos) entry["on"] = c.name.substr(at + 1);
+    entry.update({{"probability", c.probability}, {"held_out_error", JsonNumber(c.held_out_error)}, {"screen_drop", c.screen_drop}, {"absorbed", c.absorbed}, {"refitted", c.refitted},
+                  {"converged", c.converged}, {"reason", c.reason}});
+    json["candidates"].push_back(std::move(entry));
+  }
+  json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
+  json["explanation"] = d.explanation;
+  json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
+  json["wall_s"] = d.wall_s;
+  json["budget_spent"] = d.budget_spent;
+  json["seed"] = seed;
+  json["versions"] = JsonVersions();
+  return json.dump(2);
+}
+
+}  // namespace gapscope

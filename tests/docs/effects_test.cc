@@ -1,0 +1,94 @@
+// docs/effects.md says what the catalogue says. Between its markers it is made from the catalogue: GAPSCOPE_WRITE_DOCS=1 build/tests/docs_effects_test
+// rewrites it, without that the test compares.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cstdio>
+#include <cstdlib>
+
+#include "src/core/file.h"
+#include "src/model/effect.h"
+
+namespace gapscope {
+namespace {
+
+const char* PlaceText(EffectPlace place) {
+  switch (place) {
+    case EffectPlace::kMotor: return "an actuator on a joint";
+    case EffectPlace::kServo: return "an actuator that feeds back the position";
+    case EffectPlace::kJoint: return "a hinge or slide joint";
+    case EffectPlace::kDrivenJoint: return "a joint with an actuator";
+    case EffectPlace::kSpringJoint: return "a joint with a spring in the base model";
+    case EffectPlace::kSignal: return "a measured signal";
+  }
+  return "";
+}
+
+const char* ScaleText(ScaleKind kind) {
+  switch (kind) {
+    case ScaleKind::kOne: return "";
+    case ScaleKind::kTorque: return "T";
+    case ScaleKind::kAngle: return "A";
+    case ScaleKind::kSpeed: return "W";
+    case ScaleKind::kStiffness: return "T/A";
+    case ScaleKind::kDrag: return "T/W^2";
+    case ScaleKind::kPower: return "T W";
+    case ScaleKind::kCommand: return "U";
+    case ScaleKind::kCubic: return "T/A^3";
+  }
+  return "";
+}
+
+std::string Number(double value, ScaleKind kind) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%g", value);
+  return value == 0 || kind == ScaleKind::kOne ? text : std::string(text) + " " + ScaleText(kind);
+}
+
+std::string EffectsText() {
+  std::string text;
+  for (const Effect& effect : Catalogue()) {
+    std::string meaning = effect.meaning;
+    meaning[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(meaning[0])));
+    text += "## " + effect.name + "\n\n" + meaning + ". On " + PlaceText(effect.place) + ".\n\n";
+    text += "| parameter | unit | base | bounds |\n|---|---|---|---|\n";
+    for (const EffectParameter& p : effect.parameters) {
+      const std::string key = p.scale == ScaleKind::kCommand ? "`" + p.key + "_v`, `" + p.key + "_a` or `" + p.key + "_n_m`" : "`" + p.key + "`";
+      const std::string unit = p.scale == ScaleKind::kCommand ? "V, A or N m" : p.unit;
+      text += "| " + key + " | " + unit + " | " + Number(p.neutral, p.scale) + " | " + Number(p.low, p.scale) + " .. " + Number(p.high, p.scale) + " |\n";
+    }
+    text += "\nShows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
+    for (std::size_t i = 0; i < effect.partners.size(); ++i) text += (i ? ", " : "") + ("`" + effect.partners[i] + "`");
+    text += ".\n\n";
+  }
+  return text;
+}
+
+TEST(EffectsDocTest, IsWhatTheCatalogueSays) {
+  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/effects.md", begin = "<!-- made from src/model/effects -->\n\n", end = "<!-- end -->";
+  const auto file = ReadFile(path);
+  ASSERT_TRUE(file.ok()) << file.error().Text();
+  const std::string& text = file.value();
+  const std::size_t from = text.find(begin), to = text.find(end);
+  ASSERT_NE(from, std::string::npos);
+  ASSERT_NE(to, std::string::npos);
+  const std::string made = text.substr(0, from + begin.size()) + EffectsText() + text.substr(to);
+  if (std::getenv("GAPSCOPE_WRITE_DOCS")) {
+    ASSERT_TRUE(WriteFile(path, made).ok());
+    return;
+  }
+  EXPECT_EQ(text, made) << "run GAPSCOPE_WRITE_DOCS=1 build/tests/docs_effects_test";
+}
+
+TEST(EffectsDocTest, PartnersAreEffects) {
+  for (const Effect& effect : Catalogue()) {
+    for (const auto& partner : effect.partners) {
+      bool known = false;
+      for (const Effect& other : Catalogue()) known = known || other.name == partner;
+      EXPECT_TRUE(known) << effect.name << " names " << partner;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace gapscope

@@ -1,0 +1,121 @@
+#include "tests/tune/fixture.h"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "src/core/file.h"
+
+namespace gapscope::testing {
+namespace {
+
+const char kCartXml[] = R"(<mujoco>
+  <option timestep="0.004" integrator="Euler" gravity="0 0 0"><flag contact="disable"/></option>
+  <worldbody><body>
+    <joint name="cart" type="slide" axis="1 0 0" stiffness="8"/>
+    <inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+  </body></worldbody>
+  <actuator><general name="motor" joint="cart"/></actuator>
+</mujoco>)";
+
+Rig Build(const std::string& path, const std::vector<std::string>& effects) {
+  auto experiment = LoadExperiment(path);
+  Rig rig{.experiment = std::move(experiment).value()};
+  rig.model = Model::Build(rig.experiment).value();
+  if (!effects.empty()) {
+    const auto uses = rig.model->ParseEffects(effects);
+    rig.model = Model::Build(rig.experiment, uses.value(), {}).value();
+  }
+  return rig;
+}
+
+}  // namespace
+
+std::vector<double> Rig::Values(const std::map<std::string, double>& changed) const {
+  std::vector<double> values = model->Nominal();
+  for (const auto& [name, value] : changed) values[static_cast<std::size_t>(Index(name))] = value;
+  return values;
+}
+
+int Rig::Index(const std::string& parameter) const { return model->Find(parameter, "test").value(); }
+
+Rig LoadRig(const std::string& rig, const std::vector<std::string>& effects) {
+  return Build(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/experiment.yaml", effects);
+}
+
+// The model is read again by whoever builds a variant, so the files stay until the end.
+struct Folder {
+  std::filesystem::path path = std::filesystem::temp_directory_path() / ("gapscope_cart_" + std::to_string(getpid()));
+  Folder() { std::filesystem::create_directories(path); }
+  ~Folder() { std::filesystem::remove_all(path); }
+};
+
+Rig LoadCart(double low, double high) {
+  static const Folder owner;
+  const auto& folder = owner.path;
+  const std::string bounds = "[" + std::to_string(low) + ", " + std::to_string(high) + "]";
+  const std::string yaml = "schema: gapscope.experiment/1\nmodel: cart.xml\nlog: {time: {column: t, unit: s}}\n"
+      "commands: [{actuator: motor, column: u, unit: N}]\n"
+      "measured: [{signal: cart_m, column: x, joint: cart, unit: m}]\n"
+      "parameters:\n"
+      "  cart.gain: {unit: \"1\", nominal: 1.5, bounds: " + bounds + "}\n"
+      "  cart.damping: {unit: N s/m, nominal: 0, bounds: [0, 4], frozen: true}\n"
+      "set:\n  actuator/motor/gain: cart.gain\n  joint/cart/damping: cart.damping\n";
+  WriteFile((folder / "cart.xml").string(), kCartXml).value();
+  WriteFile((folder / "experiment.yaml").string(), yaml).value();
+  return Build((folder / "experiment.yaml").string(), {});
+}
+
+std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command) {
+  std::vector<double> q = {q0};
+  double v = v0;
+  for (std::size_t k = 0; k + 1 < command.size(); ++k) {
+    v += kCartStep_s * (gain * command[k] - kCartStiffness_n_per_m * q.back()) / kCartMass_kg;
+    q.push_back(q.back() + kCartStep_s * v);
+  }
+  return q;
+}
+
+Recording MakeRecording(const Rig& rig, std::vector<double> command, std::vector<double> measured, double period_s) {
+  Recording recording{.log_path = "made"};
+  for (std::size_t k = 0; k < command.size(); ++k) recording.time_s.push_back(static_cast<double>(k) * period_s);
+  recording.commands.push_back({.actuator = rig.experiment.commands.front().actuator, .column = "u", .values = std::move(command)});
+  for (std::size_t c = 1; c < rig.experiment.commands.size(); ++c) {
+    recording.commands.push_back({.actuator = rig.experiment.commands[c].actuator, .column = "constant", .values = std::vector<double>(recording.rows(), 0.0)});
+  }
+  for (std::size_t s = 0; s < rig.experiment.measured.size(); ++s) {
+    if (rig.experiment.measured[s].kind != SignalKind::kPosition) continue;
+    recording.measured.push_back({.spec = rig.experiment.measured[s], .index = s, .column = "x", .values = std::vector<double>(recording.rows(), 0.0)});
+  }
+  if (!measured.empty()) recording.measured.front().values = std::move(measured);
+  recording.timeline.median_step_s = period_s;
+  return recording;
+}
+
+Recording MakeLog(const Rig& rig, const std::vector<double>& values, const std::function<double(double)>& command, double duration_s, double period_s,
+                  double noise_deviation, unsigned long seed, double time_step_s) {
+  const auto rows = static_cast<std::size_t>(std::lround(duration_s / period_s)) + 1;
+  std::vector<double> commands(rows);
+  for (std::size_t k = 0; k < rows; ++k) commands[k] = command(static_cast<double>(k) * period_s);
+  Recording recording = MakeRecording(rig, std::move(commands), {}, period_s);
+  Simulator simulator(*rig.model, time_step_s);
+  const mjModel& m = rig.model->compiled();
+  const InitialState rest{.qpos = {m.qpos0, m.qpos0 + m.nq}, .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
+  const std::size_t signals = recording.measured.size();
+  std::vector<double> predicted(rows * signals);
+  GS_CHECK(simulator.SetParameters(values, recording));
+  GS_CHECK(simulator.Run(recording, {0, rows}, rest, predicted).outcome == Outcome::kCompleted);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0, 1);
+  for (std::size_t k = 0; k < rows; ++k) {
+    for (std::size_t s = 0; s < signals; ++s) {
+      const double count = recording.measured[s].spec.resolution, y = predicted[k * signals + s] + noise_deviation * noise(random);
+      recording.measured[s].values[k] = count > 0 ? count * std::round(y / count) : y;
+    }
+  }
+  return recording;
+}
+
+}  // namespace gapscope::testing

@@ -1,0 +1,122 @@
+// An interrupted run continues to the same bytes, wherever it was cut.
+#include "src/tune/journal.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "src/core/file.h"
+#include "src/report/tune_report.h"
+#include "tests/tune/fixture.h"
+
+namespace gapscope::testing {
+namespace {
+
+class JournalTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() / ("gapscope_journal_" + std::to_string(getpid()));
+    std::filesystem::create_directories(folder_);
+    rig_ = LoadRig("joint");
+    const auto truth = rig_.Values({{"joint.damping", 1.2}, {"joint.inertia", 0.14}});
+    for (int k = 0; k < 3; ++k) {
+      const auto command = [k](double t) { return 0.3 * std::sin((8 + k) * t + 4 * t * t); };
+      logs_.push_back(MakeLog(rig_, truth, command, 1.5, 0.004, 1e-3, static_cast<unsigned long>(k)));
+    }
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
+
+  Result<TuneSummary> Run(const std::string& journal, bool resume, int jobs = 1, unsigned long seed = 0) {
+    ThreadPool pool(jobs);
+    TuneOptions options{.starts = 2, .journal = journal, .resume = resume};
+    options.solve.seed = seed;
+    options.solve.max_iterations = 8;
+    return Tune(*rig_.model, SplitData(logs_, {}), rig_.model->Nominal(), options, pool);
+  }
+  // The whole result but the time that it took.
+  std::string Bytes(Result<TuneSummary> summary) {
+    TuneSummary value = std::move(summary).value();
+    value.wall_s = 0;
+    return TuneJson(value, *rig_.model, 0);
+  }
+
+  std::filesystem::path folder_;
+  Rig rig_;
+  std::vector<Recording> logs_;
+};
+
+TEST_F(JournalTest, ResumedRunEndsInTheSameBytes) {
+  const std::string whole = Bytes(Run(Path("journal"), false));
+  EXPECT_TRUE(whole == Bytes(Run("", false)));
+  const std::string bytes = ReadFile(Path("journal")).value();
+  ASSERT_GT(bytes.size(), 1000u);
+  for (const double share : {0.0, 0.001, 0.2, 0.5, 0.83, 0.999, 1.0}) {
+    const auto size = std::max<std::size_t>(16, static_cast<std::size_t>(share * static_cast<double>(bytes.size())));
+    ASSERT_TRUE(WriteFile(Path("cut"), bytes.substr(0, size)).ok());
+    EXPECT_TRUE(whole == Bytes(Run(Path("cut"), true))) << "cut after " << size << " bytes";
+    // What was lost has been written again.
+    EXPECT_TRUE(bytes == ReadFile(Path("cut")).value()) << "cut after " << size << " bytes";
+  }
+}
+
+TEST_F(JournalTest, JournalCutInItsHeadStartsAnew) {
+  const std::string whole = Bytes(Run(Path("journal"), false)), bytes = ReadFile(Path("journal")).value();
+  for (const std::size_t size : {0u, 5u, 15u}) {
+    ASSERT_TRUE(WriteFile(Path("cut"), bytes.substr(0, size)).ok());
+    EXPECT_TRUE(whole == Bytes(Run(Path("cut"), true))) << size;
+    EXPECT_TRUE(bytes == ReadFile(Path("cut")).value()) << size;
+  }
+}
+
+TEST_F(JournalTest, GarbageAfterTheLastRecordIsDropped) {
+  const std::string whole = Bytes(Run(Path("journal"), false)), bytes = ReadFile(Path("journal")).value();
+  // A record that says it is longer than the file; a record whose numbers were flipped.
+  for (const std::string& tail : {std::string(8, '\x11') + std::string(8, '\x7f'), std::string(40, '\xff')}) {
+    ASSERT_TRUE(WriteFile(Path("torn"), bytes.substr(0, bytes.size() / 2) + tail).ok());
+    EXPECT_TRUE(whole == Bytes(Run(Path("torn"), true)));
+  }
+  std::string flipped = bytes;
+  flipped[bytes.size() / 2] = static_cast<char>(flipped[bytes.size() / 2] ^ 0x40);
+  ASSERT_TRUE(WriteFile(Path("flipped"), flipped).ok());
+  EXPECT_TRUE(whole == Bytes(Run(Path("flipped"), true)));
+}
+
+TEST_F(JournalTest, JournalOfAnotherJobIsRefused) {
+  ASSERT_TRUE(Run(Path("journal"), false).ok());
+  const auto other = Run(Path("journal"), true, 1, 7);
+  ASSERT_FALSE(other.ok());
+  EXPECT_NE(other.error().Text().find("another job"), std::string::npos);
+  ASSERT_TRUE(WriteFile(Path("text"), "this is no journal at all\n").ok());
+  EXPECT_FALSE(Run(Path("text"), true).ok());
+}
+
+TEST_F(JournalTest, NumberOfWorkersDoesNotMatter) {
+  const std::string one = Bytes(Run("", false, 1));
+  EXPECT_TRUE(one == Bytes(Run("", false, 2)));
+  EXPECT_TRUE(one == Bytes(Run("", false, 5)));
+}
+
+TEST(JournalPackTest, LinearizationComesBack) {
+  Linearization l{.cost = 2.5, .valid = true};
+  l.hessian = Eigen::MatrixXd::Random(3, 3);
+  l.gradient = Eigen::VectorXd::Random(3);
+  l.block_gradients = {Eigen::VectorXd::Random(3), Eigen::VectorXd::Random(3)};
+  l.block_logs = {0, 4};
+  l.state_gain = {Eigen::MatrixXd::Random(2, 3), Eigen::MatrixXd(0, 3)};
+  l.state_step = {Eigen::VectorXd::Random(2), Eigen::VectorXd(0)};
+  const auto again = Unpack(Pack(l));
+  ASSERT_TRUE(again.valid);
+  EXPECT_EQ(again.hessian, l.hessian);
+  EXPECT_EQ(again.gradient, l.gradient);
+  EXPECT_EQ(again.block_gradients[1], l.block_gradients[1]);
+  EXPECT_EQ(again.block_logs, l.block_logs);
+  EXPECT_EQ(again.state_gain[0], l.state_gain[0]);
+  EXPECT_EQ(again.state_step[1].size(), 0);
+}
+
+}  // namespace
+}  // namespace gapscope::testing

@@ -1,0 +1,153 @@
+// What a fit promises: known parameters come back, what cannot be known is named, and the held-out data is never looked at.
+#include "src/tune/tune.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/tune/fixture.h"
+
+namespace gapscope::testing {
+namespace {
+
+Recording QubeLog(const Rig& rig, const std::vector<double>& values, int k, double duration_s = 3) {
+  const auto command = [k](double t) { return (1.2 + 0.2 * k) * std::sin((4 + k) * t + 1.5 * t * t); };
+  Recording log = MakeLog(rig, values, command, duration_s, 0.004, 1e-3, static_cast<unsigned long>(10 + k));
+  log.log_path = "log" + std::to_string(k);
+  return log;
+}
+
+const TunedParameter& Of(const TuneSummary& summary, int index) {
+  for (const auto& t : summary.tuned) {
+    if (t.index == index) return t;
+  }
+  throw std::logic_error("not tuned");
+}
+
+TEST(SplitDataTest, EveryThirdLogIsKept) {
+  const Rig rig = LoadCart();
+  std::vector<Recording> logs;
+  for (int k = 0; k < 7; ++k) {
+    logs.push_back(MakeRecording(rig, std::vector<double>(100, 0.0), {}, kCartStep_s));
+    logs.back().log_path = std::to_string(k);
+  }
+  const DataSplit split = SplitData(logs, {});
+  ASSERT_EQ(split.held_out.size(), 2u);
+  EXPECT_EQ(split.held_out[0].log_path, "1");
+  EXPECT_EQ(split.held_out[1].log_path, "4");
+  EXPECT_EQ(split.train.size(), 5u);
+  const DataSplit two = SplitData({logs[0], logs[1]}, {});
+  ASSERT_EQ(two.held_out.size(), 1u);
+  EXPECT_EQ(two.held_out[0].log_path, "1");
+  const DataSplit asked = SplitData(logs, {0, 6});
+  ASSERT_EQ(asked.held_out.size(), 2u);
+  EXPECT_EQ(asked.held_out[1].log_path, "6");
+  EXPECT_NE(asked.how.find("as asked"), std::string::npos);
+}
+
+TEST(SplitDataTest, SingleLogKeepsItsEnd) {
+  const Rig rig = LoadCart();
+  Recording log = MakeRecording(rig, std::vector<double>(101, 1.0), {}, kCartStep_s);
+  for (std::size_t k = 0; k < log.rows(); ++k) log.measured[0].values[k] = static_cast<double>(k);
+  const DataSplit split = SplitData({log}, {});
+  ASSERT_EQ(split.train.size(), 1u);
+  ASSERT_EQ(split.held_out.size(), 1u);
+  EXPECT_EQ(split.train[0].rows() + split.held_out[0].rows(), 101u);
+  EXPECT_EQ(split.held_out[0].measured[0].values.front(), 70.0);
+  EXPECT_EQ(split.held_out[0].time_s.front(), 0.0);
+  EXPECT_NEAR(split.held_out[0].duration_s(), 0.3 * log.duration_s(), 2 * kCartStep_s);
+}
+
+TEST(TuneTest, KnownParametersComeBackWithinTheirIntervals) {
+  const Rig rig = LoadRig("qube");
+  const auto truth = rig.Values({{"arm.damping", 4e-4}, {"pendulum.damping", 6e-5}, {"pendulum.length", 0.124}, {"arm.mass", 0.105}});
+  ThreadPool pool(2);
+  TuneOptions options{.starts = 1};
+  for (const char* name : {"arm.damping", "pendulum.damping", "pendulum.length", "arm.mass"}) options.free.push_back(rig.Index(name));
+  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, truth, 0), QubeLog(rig, truth, 1), QubeLog(rig, truth, 2)}, {}), rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(found.ok()) << found.error().Text();
+  const TuneSummary& summary = found.value();
+  EXPECT_EQ(summary.termination, Termination::kConverged);
+  EXPECT_TRUE(summary.flat.empty());
+  for (const int index : options.free) {
+    const TunedParameter& t = Of(summary, index);
+    const double true_value = truth[static_cast<std::size_t>(index)];
+    EXPECT_TRUE(t.identifiable);
+    EXPECT_LE(t.low, t.value);
+    EXPECT_GE(t.high, t.value);
+    // Five times the interval's half-width: one draw of noise in a test must not depend on luck; coverage is counted by scripts/recovery.
+    EXPECT_NEAR(t.value, true_value, 2.5 * (t.high - t.low)) << rig.model->parameters()[static_cast<std::size_t>(index)].name;
+    EXPECT_NEAR(t.value, true_value, 0.1 * true_value) << rig.model->parameters()[static_cast<std::size_t>(index)].name;
+  }
+  EXPECT_LT(summary.error_held_out, 0.05);
+  EXPECT_GT(summary.error_nominal, 2 * summary.error_held_out);
+}
+
+TEST(TuneTest, TorqueConstantAndResistanceAreNamedAsFlat) {
+  // Angles know kt / R and kt km / R alone, and masses only relative to them: with both constants tied, scaling is open.
+  const Rig rig = LoadRig("qube");
+  ThreadPool pool(2);
+  TuneOptions options{.starts = 1};
+  for (const char* name : {"motor.resistance", "motor.kt", "motor.km"}) options.free.push_back(rig.Index(name));
+  const auto truth = rig.Values();
+  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, truth, 0), QubeLog(rig, truth, 1)}, {}), rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(found.ok()) << found.error().Text();
+  ASSERT_EQ(found.value().flat.size(), 1u);
+  const auto& parts = found.value().flat[0].parts;
+  const int kt = rig.Index("motor.kt"), resistance = rig.Index("motor.resistance");
+  double weight_kt = 0, weight_resistance = 0;
+  for (const auto& [index, weight] : parts) {
+    if (index == kt) weight_kt = weight;
+    if (index == resistance) weight_resistance = weight;
+  }
+  // Along the flat direction both grow alike: kt / R stays.
+  EXPECT_NEAR(weight_kt, weight_resistance, 0.05);
+  EXPECT_FALSE(Of(found.value(), kt).identifiable);
+  EXPECT_FALSE(Of(found.value(), resistance).identifiable);
+}
+
+TEST(TuneTest, HeldOutDataIsNeverFitted) {
+  const Rig rig = LoadRig("qube");
+  const auto truth = rig.Values({{"arm.damping", 4e-4}});
+  ThreadPool pool(2);
+  TuneOptions options{.free = {rig.Index("arm.damping"), rig.Index("motor.kt")}, .starts = 2};
+  const std::vector<Recording> logs = {QubeLog(rig, truth, 0, 2), QubeLog(rig, truth, 1, 2)};
+  auto spoilt = logs;
+  for (auto& measured : spoilt[1].measured) {
+    for (double& y : measured.values) y = 3 * y + 0.5;
+  }
+  const auto a = Tune(*rig.model, SplitData(logs, {1}), rig.model->Nominal(), options, pool);
+  const auto b = Tune(*rig.model, SplitData(spoilt, {1}), rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_EQ(a.value().values, b.value().values);
+  EXPECT_EQ(a.value().shift_s, b.value().shift_s);
+  EXPECT_EQ(a.value().time_step_s, b.value().time_step_s);
+  EXPECT_EQ(a.value().error_train, b.value().error_train);
+  EXPECT_GT(b.value().error_held_out, 5 * a.value().error_held_out);
+}
+
+TEST(TuneTest, SpentBudgetStillGivesAScoredResult) {
+  const Rig rig = LoadRig("qube");
+  ThreadPool pool(2);
+  TuneOptions options{.starts = 3};
+  options.solve.deadline = std::chrono::steady_clock::now();
+  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, rig.Values({{"arm.damping", 4e-4}}), 0, 2)}, {}), rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(found.ok());
+  EXPECT_EQ(found.value().termination, Termination::kBudget);
+  EXPECT_EQ(found.value().start_costs.size(), 1u);
+  EXPECT_TRUE(std::isfinite(found.value().error_held_out));
+}
+
+TEST(TuneTest, NothingFreeIsAnError) {
+  const Rig rig = LoadCart(1.5, 1.5 + 1e-9);
+  Experiment experiment = rig.experiment;
+  for (auto& p : experiment.parameters) p.frozen = true;
+  const auto model = Model::Build(experiment).value();
+  ThreadPool pool(1);
+  const auto found = Tune(*model, SplitData({MakeRecording(rig, std::vector<double>(100, 1.0), CartMotion(1, 0, 0, std::vector<double>(100, 1.0)), kCartStep_s)}, {}), model->Nominal(), {}, pool);
+  ASSERT_FALSE(found.ok());
+  EXPECT_NE(found.error().Text().find("--free"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gapscope::testing

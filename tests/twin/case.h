@@ -1,0 +1,88 @@
+// One blind-check case: a plant whose truth is known, the logs that it made, and the label that says what was done.
+#ifndef GAPSCOPE_TESTS_TWIN_CASE_H_
+#define GAPSCOPE_TESTS_TWIN_CASE_H_
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/twin/campaign.h"
+#include "tests/twin/effects.h"
+#include "tests/twin/gap.h"
+#include "tests/twin/plant.h"
+#include "tests/twin/recorder.h"
+
+namespace gapscope::twin {
+
+enum class Kind { kAuto, kNone, kSingle, kPair, kUnknown, kAmbiguous };
+const char* KindName(Kind kind);
+bool ParseKind(std::string_view name, Kind* kind);
+
+struct CaseRequest {
+  std::uint64_t seed = 1, index = 0;
+  Kind kind = Kind::kAuto;
+  std::string rig;      // empty: drawn
+  std::string effect;   // empty: drawn; NAME or NAME@ON; for kUnknown the name of an outside effect
+  double severity = 0;  // 0: searched, so that the effect-to-floor ratio is as drawn
+};
+
+struct EffectLabel {
+  EffectChoice choice;
+  Values parameters, extra;
+  Gap gap;  // what the logs change when this effect alone is taken away
+};
+
+struct Case {
+  Rig rig = Rig::kJoint;
+  Kind kind = Kind::kNone;
+  std::uint64_t seed = 0, index = 0;
+  bool nominal_base = false;
+  Plant base, truth;  // without and with everything
+  Sensors sensors;
+  std::vector<LogSpec> logs;
+  std::vector<EffectLabel> effects;
+  std::string outside;  // name, for kUnknown
+  Values outside_parameters;
+  double outside_severity = 0;
+  // kAmbiguous: names and places of the group, and how far each rival's best imitation stays from the logs, in floors.
+  struct Member {
+    std::string name, on;
+    double distance_to_floor = 0;
+  };
+  std::vector<Member> group;
+  Gap gap;  // all effects together
+  std::array<double, 2> Floor() const { return {sensors.angle[0].Floor(), sensors.angle[1].Floor()}; }
+};
+
+// Errors (unknown rig, effect or place; an effect that cannot be made visible) come as text in `problem`.
+bool MakeCase(const CaseRequest& request, Case* made, std::string* problem);
+
+// The case's records for writing, at the fine step.
+std::vector<Record> MakeRecords(const Case& c, bool noise, double step_s = 5e-5);
+
+// For the builders of cases.
+std::vector<Record> CoarseRecords(const Plant& plant, const std::vector<LogSpec>& logs, const Sensors& sensors,
+                                  const GapOptions& options);
+struct Search {
+  double severity = 0;
+  Gap gap;
+  bool reached = false;  // the ratio is within a quarter of the target
+};
+// Severity at which plant_at(severity) differs from `reference` by `target` floors after refit; plants beyond what the
+// rig tolerates count as too severe.
+Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& reference,
+                    const std::vector<LogSpec>& logs, const Sensors& sensors, double target, double lowest,
+                    double highest);
+
+// case_outside.cc and case_ambiguous.cc.
+std::vector<std::string> OutsideNames();
+Values AddOutside(const std::string& name, double severity, std::uint64_t shape_seed, const Motion& motion,
+                  Plant* plant);
+bool MakeAmbiguous(Random* random, Case* made, std::string* problem);
+
+}  // namespace gapscope::twin
+
+#endif  // GAPSCOPE_TESTS_TWIN_CASE_H_

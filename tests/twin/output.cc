@@ -1,0 +1,133 @@
+#include "tests/twin/output.h"
+
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+namespace gapscope::twin {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+// Nine digits: far below any sensor's noise, and the same on every platform.
+void Append(double value, std::string* text) {
+  char buffer[32];
+  const auto [end, code] = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general, 9);
+  text->append(buffer, code == std::errc() ? end : buffer);
+}
+
+Json ToJson(const Values& values) {
+  Json json = Json::object();
+  for (const auto& [name, value] : values) json[name] = value;
+  return json;
+}
+
+std::vector<std::string> ExpectedVerdicts(const Case& c) {
+  switch (c.kind) {
+    case Kind::kNone:
+      return c.nominal_base ? std::vector<std::string>{"none"} : std::vector<std::string>{"none", "parameters"};
+    case Kind::kUnknown:
+      return {"unknown"};
+    case Kind::kAmbiguous:
+      return {"ambiguous"};
+    default:
+      return {"effects"};
+  }
+}
+
+}  // namespace
+
+std::string CsvText(const Record& record) {
+  std::string text;
+  for (std::size_t i = 0; i < record.names.size(); ++i) text += (i ? "," : "") + record.names[i];
+  text += '\n';
+  for (const auto& row : record.rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (i) text += ',';
+      Append(row[i], &text);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string LabelText(const Case& c, const std::vector<std::string>& files) {
+  const RigNames& names = Names(c.rig);
+  Json json;
+  json["schema"] = "gapscope.twin.label/1";
+  json["rig"] = RigName(c.rig);
+  json["kind"] = KindName(c.kind);
+  json["expected_verdicts"] = ExpectedVerdicts(c);
+  json["seed"] = c.seed;
+  json["index"] = c.index;
+  json["effect_to_floor"] = c.gap.raw;
+  json["effect_to_floor_refit"] = c.gap.refit;
+  json["effects"] = Json::array();
+  for (const EffectLabel& e : c.effects) {
+    json["effects"].push_back({{"name", e.choice.name},
+                               {"on", PlaceName(c.rig, e.choice.place)},
+                               {"parameters", ToJson(e.parameters)},
+                               {"twin_parameters", ToJson(e.extra)},
+                               {"severity", e.choice.severity},
+                               {"effect_to_floor", e.gap.raw},
+                               {"effect_to_floor_refit", e.gap.refit}});
+  }
+  json["ambiguous"] = Json::array();
+  if (!c.group.empty()) {
+    Json group = Json::array();
+    for (const Case::Member& m : c.group) {
+      group.push_back({{"name", m.name}, {"on", m.on}, {"distance_to_floor", m.distance_to_floor}});
+    }
+    json["ambiguous"].push_back(group);
+  }
+  if (!c.outside.empty()) {
+    json["outside"] = {
+        {"name", c.outside}, {"parameters", ToJson(c.outside_parameters)}, {"severity", c.outside_severity}};
+  }
+  const Base nominal = NominalBase(c.rig);
+  for (const BaseParameter& p : BaseParameters(c.rig)) {
+    json["base"][p.name] = {{"unit", p.unit}, {"true", c.truth.base.*p.field}, {"nominal", nominal.*p.field}};
+  }
+  for (int s = 0; s < SignalCount(c.rig); ++s) {
+    const Sensor& sensor = c.sensors.angle[static_cast<std::size_t>(s)];
+    json["sensors"][s == 0 ? names.first_signal : names.second_signal] = {{"floor_rad", sensor.Floor()},
+                                                                          {"offset_rad", sensor.offset_rad},
+                                                                          {"resolution_rad", sensor.resolution_rad},
+                                                                          {"white_rad", sensor.white_rad},
+                                                                          {"coloured_rad", sensor.coloured_rad},
+                                                                          {"colour_time_s", sensor.colour_time_s}};
+  }
+  for (std::size_t i = 0; i < c.logs.size(); ++i) {
+    const LogSpec& log = c.logs[i];
+    json["logs"].push_back({{"file", i < files.size() ? files[i] : ""},
+                            {"excitation", ShapeName(log.excitation.shape)},
+                            {"amplitude", log.amplitude},
+                            {"reference_of_loop", log.as_reference},
+                            {"weak_loop", log.loop.On()},
+                            {"rate_hz", log.rate_hz},
+                            {"duration_s", log.excitation.duration_s}});
+  }
+  return json.dump(2) + "\n";
+}
+
+bool WriteText(const std::string& path, const std::string& text, std::string* problem) {
+  std::error_code error;
+  const fs::path target(path);
+  if (target.has_parent_path()) fs::create_directories(target.parent_path(), error);
+  const fs::path temporary = path + ".partial";
+  std::ofstream file(temporary, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  if (file) fs::rename(temporary, target, error);
+  if (!file || error) {
+    *problem = path + ": cannot be written" + (error ? ": " + error.message() : "");
+    return false;
+  }
+  return true;
+}
+
+}  // namespace gapscope::twin

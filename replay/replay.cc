@@ -157,16 +157,21 @@ TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& record
     trial.time_step_s = step;
     return ReplayError(Replay(model, recordings, trial, pool).logs);
   };
-  // One step per sample where that is fine enough: stamps are landed on in any case.
+  // One step per sample where that is fine enough: stamps are landed on in any case, so a longer step does not exist.
   double sample = 0;
   for (const auto& recording : recordings) sample = std::max(sample, recording.timeline.median_step_s);
-  TimeStep chosen{.step_s = std::max(model.compiled().opt.timestep, sample), .error_change = 0};
+  const double own = model.compiled().opt.timestep;
+  TimeStep chosen{.step_s = sample > 0 ? sample : own, .error_change = 0};
+  const double finest = std::min(own, chosen.step_s) / (1 << kMaxHalvings);
   double error = error_at(chosen.step_s);
-  for (int halving = 0;; ++halving) {
+  while (true) {
     const double finer = error_at(chosen.step_s / 2);
     chosen.error_change = std::abs(error - finer);
-    if (!std::isfinite(finer) && !std::isfinite(error)) break;
-    if (chosen.error_change < kStepTolerance * finer || halving == kMaxHalvings) break;
+    // What diverges at a slow log's samples may be sound at the model's own step.
+    const bool diverges = !std::isfinite(finer) && !std::isfinite(error);
+    if (diverges && chosen.step_s <= own) break;
+    if (!diverges && chosen.error_change < kStepTolerance * finer) break;
+    if (chosen.step_s <= finest * 1.001) break;
     chosen.step_s /= 2;
     error = finer;
   }

@@ -49,7 +49,8 @@ std::vector<Window> MakeWindows(const Recording& recording, ReplayMode mode, dou
 
 ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool);
 
-// The largest step, of the model's own or one per sample halved up to five times, whose halving changes the combined error by less than 1 % of it.
+// The largest step, of the log's own sample time halved again and again (down to a 32nd of the model's time step), whose halving changes the combined
+// error by less than 1 % of it.
 struct TimeStep {
   double step_s = 0;
   double error_change = 0;  // of the combined error

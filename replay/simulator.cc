@@ -17,7 +17,10 @@ ModelPtr CopyForReplay(const mjModel& model) {
 }
 
 bool IsSane(const mjModel& m, const mjData& d) {
-  if (d.warning[mjWARN_BADQPOS].number || d.warning[mjWARN_BADQVEL].number || d.warning[mjWARN_BADQACC].number) return false;
+  // A command that MuJoCo finds too large is zeroed by it: no replay of that command either.
+  for (const int bad : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL}) {
+    if (d.warning[bad].number > 0) return false;
+  }
   for (int i = 0; i < m.nq; ++i) {
     if (!(std::abs(d.qpos[i]) < kRunaway)) return false;
   }

@@ -1,11 +1,13 @@
 // gapscope: finds why a simulated mechanism does not move like the real one.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 
 #include "src/cli/commands.h"
 #include "src/cli/session.h"
+#include "src/core/units.h"
 #include "src/report/version.h"
 
 int main(int argc, char** argv) {
@@ -24,6 +26,12 @@ int main(int argc, char** argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     const bool asked = e.get_exit_code() == 0;  // --help, --version
+    std::vector<std::string> names;
+    for (const CLI::App* command : program.get_subcommands({})) names.push_back(command->get_name());
+    if (!asked && argc > 1 && argv[1][0] != '-' && std::find(names.begin(), names.end(), argv[1]) == names.end()) {
+      const std::string nearest = Nearest(argv[1], names);
+      fmt::print(stderr, "gapscope: no command '{}'{}\n", argv[1], nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
+    }
     program.exit(e);
     return asked ? cli::kDone : cli::kBadInput;
   }

@@ -57,9 +57,9 @@ void AddReplay(CLI::App& program, Run& run) {
   AddModelFlags(*command, flags->model, true);
   AddCommonFlags(*command, flags->common, true);
   command->add_option("--mode", flags->mode, "free_run, windows or closed_loop (default: the experiment's)")->check(CLI::IsMember({"free_run", "windows", "closed_loop"}));
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(CLI::PositiveNumber);
-  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen so that halving it changes the error by < 1 %)")->check(CLI::PositiveNumber);
-  command->add_option("--fail-above", flags->fail_above, "Exit status 1 when the error is above this")->check(CLI::PositiveNumber);
+  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
+  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen so that halving it changes the error by < 1 %)")->check(FinitePositive());
+  command->add_option("--fail-above", flags->fail_above, "Exit status 1 when the error is above this")->check(FinitePositive());
   command->footer("Example: gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out out");
   command->callback([flags, &run] { run = [flags] { return RunReplay(*flags); }; });
 }

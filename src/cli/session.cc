@@ -10,6 +10,17 @@
 
 namespace gapscope::cli {
 
+CLI::Validator FinitePositive() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool good = code == std::errc() && end == text.data() + text.size() && std::isfinite(value) && value > 0;
+        return good ? std::string() : "'" + text + "' is not a finite number above zero";
+      },
+      "POSITIVE");
+}
+
 void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
   command.add_flag("--json", flags.json, "Print the result as JSON on stdout, nothing else");
   command.add_flag("--quiet", flags.quiet, "No messages on stderr but errors");

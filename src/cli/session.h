@@ -25,6 +25,9 @@ struct CommonFlags {
   std::string out;
 };
 
+// Accepts finite numbers above zero: CLI11's own check lets nan and inf through.
+CLI::Validator FinitePositive();
+
 // Adds --json, --jobs, --seed, --quiet; and --out where the command writes a folder.
 void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder);
 

@@ -113,11 +113,11 @@ void AddTune(CLI::App& program, Run& run) {
       ->allow_extra_args(false);
   command->add_option("--optimizer", flags->optimizer, "lm, or NLopt's slsqp, mma, bobyqa, crs2, isres, direct")->check(CLI::IsMember(OptimizerNames()))->capture_default_str();
   command->add_option("--objective", flags->objective, "windows, free_run or both")->check(CLI::IsMember({"windows", "free_run", "both"}))->capture_default_str();
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(CLI::PositiveNumber);
-  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")->check(CLI::PositiveNumber);
+  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
+  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")->check(FinitePositive());
   command->add_option("--huber", flags->huber, "Weigh residuals beyond this many standard deviations down; 0: plain squares")->check(CLI::NonNegativeNumber)->capture_default_str();
   command->add_option("--starts", flags->starts, "Starting points: the nominal values, then random ones")->check(CLI::Range(1, 1000))->capture_default_str();
-  command->add_option("--budget", flags->budget_s, "Seconds; the best so far is reported when they are spent")->check(CLI::PositiveNumber);
+  command->add_option("--budget", flags->budget_s, "Seconds; the best so far is reported when they are spent")->check(FinitePositive());
   command->add_flag("--resume", flags->resume, "Go on with the interrupted run in --out, to the same result");
   command->add_flag("--actuator", flags->actuator, "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none");
   command->footer("Example: gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm --out tuned");

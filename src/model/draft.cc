@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <set>
 
 #include "src/core/mujoco_handles.h"
 #include "src/core/units.h"
@@ -198,11 +199,50 @@ class Drafter {
     return best;
   }
 
+  // The column's own unit where it is one of `usual`'s kind ("1": any), else `usual`, with a doubt.
   std::string UnitOf(const Guess& guess, const char* usual, std::string* doubt) {
-    if (!guess.unit.empty() && guess.unit_stated) return guess.unit;
+    const auto stated = ParseUnit(guess.unit);
+    const bool known = !guess.unit.empty() && guess.unit_stated && stated.ok();
+    const bool any = std::string(usual) == "1";
+    if (known && (any || stated.value().si == ParseUnit(usual).value().si)) return guess.unit;
     const bool degrees = std::string(usual) == "rad" && Spread(guess.column->values) > 13;
-    *doubt += std::string(doubt->empty() ? "" : "; ") + "unit of '" + guess.column->name + "' is not stated";
+    *doubt += std::string(doubt->empty() ? "" : "; ") + (known ? "unit '" + guess.unit + "' of '" + guess.column->name + "' does not fit" : "unit of '" + guess.column->name + "' is not stated");
     return degrees ? "deg" : usual;
+  }
+
+  // The velocity column of each joint: the best pair of a column and a joint's derivative first, whatever the joints' order; a name that fits decides.
+  std::vector<Guess*> PairVelocities(std::vector<bool>* by_correlation) {
+    constexpr double kFollows = 0.3;
+    std::vector<Guess*> speeds(m_.njnt, nullptr);
+    by_correlation->assign(m_.njnt, false);
+    while (true) {
+      Guess* best = nullptr;
+      int joint = -1;
+      double score = kFollows;
+      for (int j = 0; j < m_.njnt; ++j) {
+        if (!positions_[j] || speeds[j]) continue;
+        const std::vector<double> slope = Derivative(positions_[j]->values);
+        for (Guess& guess : guesses_) {
+          if (guess.used || guess.role != Role::kVelocity) continue;
+          const double follows = std::abs(Correlation(guess.column->values, slope));
+          const double match = follows + (follows > kFollows && NameMatch(guess.column->name, JointName(j)) >= 0.99 ? 1 : 0);
+          if (match > score) best = &guess, joint = j, score = match;
+        }
+      }
+      if (!best) break;
+      best->used = true;
+      speeds[joint] = best;
+      (*by_correlation)[joint] = true;
+    }
+    for (int j = 0; j < m_.njnt; ++j) {
+      bool certain = false;
+      if (!positions_[j] || speeds[j]) continue;
+      if (Guess* named = BestByName(Role::kVelocity, JointName(j), &certain)) {
+        named->used = true;
+        speeds[j] = named;
+      }
+    }
+    return speeds;
   }
 
   std::string WriteMeasured() {
@@ -225,20 +265,17 @@ class Drafter {
         positions_[j] = found->column;
         std::string doubt = certain ? "" : "'" + found->column->name + "' is taken for the position of joint '" + JointName(j) + "'";
         const bool slide = m_.jnt_type[j] == mjJNT_SLIDE;
-        const std::string unit = slide ? "m" : UnitOf(*found, "rad", &doubt);
+        const std::string unit = UnitOf(*found, slide ? "m" : "rad", &doubt);
         text += "  - {signal: " + Quote(JointName(j)) + ", column: " + Quote(found->column->name) + ", joint: " + Quote(JointName(j)) + ", unit: " + unit + "}" + (doubt.empty() ? "" : Unsure(doubt)) + "\n";
       }
     }
+    std::vector<bool> by_correlation;
+    const std::vector<Guess*> speeds = PairVelocities(&by_correlation);
     for (int j = 0; j < m_.njnt; ++j) {
-      if (!positions_[j]) continue;
-      bool certain = false;
-      Guess* speed = BestByCorrelation(Role::kVelocity, Derivative(positions_[j]->values));
-      const bool by_correlation = speed != nullptr;
-      if (!speed) speed = BestByName(Role::kVelocity, JointName(j), &certain);
-      if (!speed) continue;
-      speed->used = true;
-      std::string doubt = by_correlation ? "" : "'" + speed->column->name + "' does not follow the derivative of '" + positions_[j]->name + "'";
-      const std::string unit = UnitOf(*speed, "rad/s", &doubt);
+      if (!speeds[j]) continue;
+      Guess* speed = speeds[j];
+      std::string doubt = by_correlation[j] ? "" : "'" + speed->column->name + "' does not follow the derivative of '" + positions_[j]->name + "'";
+      const std::string unit = UnitOf(*speed, m_.jnt_type[j] == mjJNT_SLIDE ? "m/s" : "rad/s", &doubt);
       text += "  - {signal: " + Quote(JointName(j) + "_speed") + ", kind: velocity, column: " + Quote(speed->column->name) + ", joint: " + Quote(JointName(j)) + ", unit: " + unit + ", optional: true, score: false}" +
               (doubt.empty() ? "" : Unsure(doubt)) + "\n";
     }
@@ -282,7 +319,19 @@ class Drafter {
     return text;
   }
 
-  void Propose(const std::string& name, const std::string& unit, double nominal, double low, double high, const std::string& field, const std::string& comment) {
+  // A name that expressions can use, and no other parameter has.
+  std::string ParameterName(std::string name) {
+    for (char& c : name) {
+      const bool good = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
+      if (!good) c = '_';
+    }
+    if (name.empty() || name[0] == '.' || (name[0] >= '0' && name[0] <= '9')) name.insert(0, "_");
+    while (!names_.insert(name).second) name += "_";
+    return name;
+  }
+
+  void Propose(const std::string& element, const std::string& unit, double nominal, double low, double high, const std::string& field, const std::string& comment) {
+    const std::string name = ParameterName(element);
     parameters_ += "  " + Quote(name) + ": {unit: " + Quote(unit) + ", nominal: " + Num(nominal) + ", bounds: [" + Num(low) + ", " + Num(high) + "]}" + (comment.empty() ? "" : "  # " + comment) + "\n";
     set_ += "  " + Quote(field) + ": " + Quote(name) + "\n";
   }
@@ -319,6 +368,7 @@ class Drafter {
   std::vector<const Column*> positions_;  // per joint
   std::vector<std::string> unsure_;
   std::string yaml_, parameters_, set_;
+  std::set<std::string> names_;  // of parameters
 };
 
 }  // namespace

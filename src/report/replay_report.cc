@@ -42,12 +42,12 @@ void AppendNumber(std::string& text, double value) {
 
 std::string ReplayTable(const ReplayReport& report) {
   const auto& [result, comparison, model, values, seed] = report;
-  std::string text = fmt::format("{:<40} {:<18} {:>8} {:>8} {:>7} {:>8} {:>6}\n", "log", "signal", "RMSE", "MAE", "nRMSE", "lag ms", "corr");
+  std::string text = fmt::format("{:<39} {:<18} {:>8} {:>8} {:>7} {:>8} {:>6}\n", "log", "signal", "RMSE", "MAE", "nRMSE", "lag ms", "corr");
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
     const LogComparison& log = comparison.logs[l];
     bool first = true;
     for (const SignalScore& s : log.signals) {
-      text += fmt::format("{:<40} {:<18} {:>8.4g} {:>8.4g} {:>7.4g} {:>8.2f} {:>6.3f}\n", first ? Shorten(log.log_path, 40) : "", s.signal, s.rmse, s.mae, s.nrmse, 1e3 * s.lag_s,
+      text += fmt::format("{:<39} {:<18} {:>8.4g} {:>8.4g} {:>7.4g} {:>8.2f} {:>6.3f}\n", first ? Shorten(log.log_path, 39) : "", s.signal, s.rmse, s.mae, s.nrmse, 1e3 * s.lag_s,
                           s.correlation);
       first = false;
     }

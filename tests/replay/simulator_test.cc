@@ -96,19 +96,19 @@ TEST_F(SimulatorTest, HoldsCommandsByStampOnAnIrregularLog) {
 TEST_F(SimulatorTest, LandsOnEveryStampWithTheFewestSteps) {
   Recording recording = MakeRecording(experiment_, 5, 1, [](int, double) { return 0.0; });
   recording.time_s = {0, 0.0005, 0.0035, 0.0055, 0.0055 + 0.00201};
-  Simulator simulator(*model_, 0.001);
-  ASSERT_TRUE(simulator.SetParameters(model_->Nominal(), recording));
   std::vector<double> predicted(10);
-  const RunResult run = simulator.Run(recording, {0, 5}, AtRest(*model_), predicted);
-  EXPECT_EQ(run.steps, 1u + 3 + 2 + 3);
-  EXPECT_EQ(simulator.data().time, recording.time_s.back());
+  const auto steps = [&](double max_step_s, Window window) {
+    Simulator simulator(*model_, max_step_s);
+    EXPECT_TRUE(simulator.SetParameters(model_->Nominal(), recording));
+    const std::size_t taken = simulator.Run(recording, window, AtRest(*model_), predicted).steps;
+    EXPECT_EQ(simulator.data().time, recording.time_s[window.end - 1]);
+    return taken;
+  };
+  EXPECT_EQ(steps(0.001, {0, 5}), 1u + 3 + 2 + 3);
   // A finer limit makes more steps, a coarser one never fewer than one per stamp.
-  simulator.set_max_step_s(0.0005);
-  EXPECT_EQ(simulator.Run(recording, {0, 5}, AtRest(*model_), predicted).steps, 1u + 6 + 4 + 5);
-  simulator.set_max_step_s(1);
-  EXPECT_EQ(simulator.Run(recording, {0, 5}, AtRest(*model_), predicted).steps, 4u);
-  EXPECT_EQ(simulator.Run(recording, {3, 4}, AtRest(*model_), predicted).steps, 0u);
-  EXPECT_EQ(simulator.data().time, recording.time_s[3]);
+  EXPECT_EQ(steps(0.0005, {0, 5}), 1u + 6 + 4 + 5);
+  EXPECT_EQ(steps(1, {0, 5}), 4u);
+  EXPECT_EQ(steps(0.001, {3, 4}), 0u);
 }
 
 TEST_F(SimulatorTest, AWindowFromTheTrueStateIsAPieceOfTheFreeRun) {

@@ -1,0 +1,233 @@
+// The built program as a user runs it: exit statuses, streams, files.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "tests/experiment/scratch.h"
+
+namespace gapscope::testing {
+namespace {
+
+const std::string kModels = std::string(GAPSCOPE_SOURCE_DIR) + "/models/";
+
+class CliTest : public ::testing::Test {
+ protected:
+  struct Answer {
+    int status = -1;
+    std::string out, err;
+  };
+  // Runs `gapscope ARGUMENTS` (a shell line) in the scratch folder's own sub-folder "cwd".
+  Answer Run(const std::string& arguments) {
+    std::filesystem::create_directories(scratch_.Path("cwd"));
+    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
+    const int raw = std::system(("cd '" + scratch_.Path("cwd") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments + " > '" + out + "' 2> '" + err + "' < /dev/null").c_str());
+    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
+  }
+  // Status 2, one line on stderr that says all of this, nothing on stdout.
+  void ExpectRefused(const std::string& arguments, const std::vector<std::string>& says) {
+    SCOPED_TRACE(arguments);
+    const Answer answer = Run(arguments);
+    EXPECT_EQ(answer.status, 2) << answer.err;
+    EXPECT_EQ(answer.out, "");
+    for (const auto& part : says) EXPECT_NE(answer.err.find(part), std::string::npos) << answer.err << "\nlacks: " << part;
+    EXPECT_EQ(answer.err.find("internal error"), std::string::npos) << answer.err;
+  }
+  // A log of the joint rig: a servo that follows a sine with a lag and hangs back by `offset`.
+  std::string JointLog(const std::string& name = "run.csv", double offset = 0.02) {
+    std::string text = "time_s,target_rad,position_rad\n";
+    for (int k = 0; k < 400; ++k) {
+      const double t = 0.002 * k, s = std::max(t - 0.05, 0.0);
+      text += std::to_string(t) + "," + std::to_string(0.4 * std::sin(8 * s)) + "," + std::to_string(0.4 * std::sin(8 * s - 0.3 * std::min(1.0, 8 * s)) + offset * std::min(1.0, 4 * s)) + "\n";
+    }
+    return scratch_.Write(name, text);
+  }
+  std::set<std::string> Files(const std::string& folder) {
+    std::set<std::string> files;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+      if (entry.is_regular_file()) files.insert(std::filesystem::relative(entry.path(), folder).string());
+    }
+    return files;
+  }
+  std::string Joint() const { return "'" + kModels + "joint/experiment.yaml'"; }
+  Scratch scratch_;
+};
+
+TEST_F(CliTest, HelpAndVersion) {
+  const Answer help = Run("--help");
+  EXPECT_EQ(help.status, 0);
+  EXPECT_NE(help.out.find("Exit status: 0 done"), std::string::npos);
+  EXPECT_EQ(help.err, "");
+  // Every subcommand that it lists has a help of its own with an example.
+  std::istringstream lines(help.out);
+  std::set<std::string> commands;
+  bool listing = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("Subcommands:", 0) == 0) {
+      listing = true;
+    } else if (listing && line.rfind("  ", 0) == 0 && line[2] != ' ') {
+      commands.insert(line.substr(2, line.find(' ', 2) - 2));
+    }
+  }
+  for (const char* name : {"init", "inspect", "replay"}) EXPECT_TRUE(commands.contains(name)) << name;
+  for (const auto& command : commands) {
+    const Answer answer = Run(command + " --help");
+    EXPECT_EQ(answer.status, 0) << command;
+    EXPECT_NE(answer.out.find("Example: gapscope " + command), std::string::npos) << answer.out;
+  }
+  const Answer version = Run("--version");
+  EXPECT_EQ(version.status, 0);
+  EXPECT_EQ(version.out.rfind("gapscope ", 0), 0u);
+  EXPECT_NE(version.out.find("MuJoCo 4.0.1"), std::string::npos);
+}
+
+TEST_F(CliTest, WrongArguments) {
+  ExpectRefused("", {"subcommand"});
+  ExpectRefused("replya", {"no command 'replya'", "did you mean 'replay'?"});
+  ExpectRefused("replay", {"experiment"});
+  ExpectRefused("replay " + Joint(), {"logs"});
+  const std::string log = JointLog();
+  ExpectRefused("replay " + Joint() + " '" + log + "' --jsno", {"--jsno"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --jobs -1", {"--jobs"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --jobs many", {"--jobs"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --mode sideways", {"--mode"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --mode closed_loop", {"no controller"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --window 0", {"--window"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --time-step -1", {"--time-step"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --time-step nan", {"--time-step"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above nan", {"--fail-above"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --window inf", {"--window"});
+  ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above 0", {"--fail-above"});
+}
+
+TEST_F(CliTest, FilesEffectsAndParametersThatAreWrong) {
+  const std::string log = JointLog(), replay = "replay " + Joint() + " '" + log + "' ";
+  ExpectRefused("replay none.yaml '" + log + "'", {"none.yaml"});
+  ExpectRefused("replay " + Joint() + " none.csv", {"none.csv"});
+  ExpectRefused("replay " + Joint() + " .", {"a folder"});
+  ExpectRefused("replay '" + log + "' '" + log + "'", {"run.csv:"});
+  ExpectRefused("replay " + Joint() + " '" + kModels + "joint/joint.xml'", {"joint.xml:"});
+  ExpectRefused(replay + "--with coulomb_fricton", {"did you mean 'coulomb_friction'?"});
+  ExpectRefused(replay + "--with backlash@elbow", {"allowed: joint"});
+  ExpectRefused(replay + "--with backlash --with backlash@joint", {"stands twice"});
+  ExpectRefused(replay + "--with backlash --with joint_compliance", {"split twice"});
+  ExpectRefused(replay + "--set motor.kq=1", {"did you mean 'motor.kp'?"});
+  ExpectRefused(replay + "--set motor.kp", {"NAME=VALUE"});
+  ExpectRefused(replay + "--set motor.kp=", {"NAME=VALUE"});
+  ExpectRefused(replay + "--set motor.kp=1,5", {"NAME=VALUE"});
+  ExpectRefused(replay + "--set motor.kp=nan", {"NAME=VALUE"});
+  ExpectRefused(replay + "--set =3", {"--set"});
+  ExpectRefused(replay + "--params none.yaml", {"none.yaml"});
+  ExpectRefused(replay + "--params '" + scratch_.Write("p.yaml", "motor.kp: much\n") + "'", {"p.yaml:1:"});
+  ExpectRefused(replay + "--params '" + scratch_.Write("q.yaml", "motor.kq: 1\n") + "'", {"q.yaml", "did you mean 'motor.kp'?"});
+  ExpectRefused(replay + "--while torque_enable", {"no column 'torque_enable' for 'while'"});
+  const std::string experiment = scratch_.Write("e.yaml", "modle: x\n");
+  ExpectRefused("replay '" + experiment + "' '" + log + "'", {"e.yaml:1:"});
+}
+
+TEST_F(CliTest, JsonAloneOnStdoutMessagesOnStderr) {
+  // A gap and a repeated stamp: both are reported.
+  std::string text = ReadAll(JointLog());
+  text += "5.000,0,0\n5.000,0,0\n5.002,0,0\n";
+  const std::string log = scratch_.Write("gap.csv", text);
+  const Answer answer = Run("replay " + Joint() + " '" + log + "' --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto json = nlohmann::json::parse(answer.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded()) << answer.out.substr(0, 200);
+  EXPECT_EQ(json["schema"], "gapscope.replay/1");
+  EXPECT_EQ(json["mode"], "free_run");
+  EXPECT_EQ(json["logs"][0]["outcome"], "completed");
+  EXPECT_EQ(json["logs"][0]["log"], log);
+  EXPECT_EQ(json["logs"][0]["samples"], 402);
+  for (const char* key : {"rmse", "mae", "nrmse", "max", "lag_s", "correlation"}) EXPECT_TRUE(json["logs"][0]["signals"]["position_rad"][key].is_number()) << key;
+  for (const char* key : {"wall_s", "simulated_s", "steps"}) EXPECT_TRUE(json["cost"][key].is_number()) << key;
+  EXPECT_TRUE(json["error"].is_number() && json["time_step_s"].is_number());
+  EXPECT_NE(answer.err.find("gap.csv"), std::string::npos) << "findings go to stderr";
+  const Answer quiet = Run("replay " + Joint() + " '" + log + "' --json --quiet");
+  EXPECT_EQ(quiet.err, "");
+  EXPECT_TRUE(Files(scratch_.Path("cwd")).empty()) << "nothing is left in the working folder";
+}
+
+TEST_F(CliTest, ADivergenceIsAResultAndLeavesTheStreamsClean) {
+  std::string text = "time_s,target_rad,position_rad\n";
+  for (int k = 0; k < 200; ++k) text += std::to_string(0.002 * k) + (k < 20 ? ",0,0\n" : ",1e9,0.1\n");
+  const Answer answer = Run("replay " + Joint() + " '" + scratch_.Write("wild.csv", text) + "' --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto json = nlohmann::json::parse(answer.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded()) << answer.out.substr(0, 300);
+  EXPECT_EQ(json["logs"][0]["outcome"], "diverged");
+  EXPECT_TRUE(json["error"].is_null());
+  EXPECT_NEAR(json["logs"][0]["diverged_at_s"].get<double>(), 0.04, 0.01);
+  EXPECT_TRUE(Files(scratch_.Path("cwd")).empty()) << "MuJoCo left its log";
+  EXPECT_EQ(Run("replay " + Joint() + " '" + scratch_.Path("wild.csv") + "' --fail-above 100").status, 1) << "a diverged log is above any threshold";
+}
+
+TEST_F(CliTest, OutWritesResultTracesAndModelAndNothingElse) {
+  const std::string a = JointLog("a/run.csv"), b = JointLog("b/run.csv", 0.05), out = scratch_.Path("out/deep");
+  const Answer answer = Run("replay " + Joint() + " '" + a + "' '" + b + "' --with torque_limit --set torque_limit@motor.limit_n_m=20 --json --out '" + out + "'");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto files = Files(out);
+  for (const char* name : {"result.json", "model.xml", "traces/run.csv", "traces/1_run.csv"}) EXPECT_TRUE(files.contains(name)) << name;
+  for (const auto& name : files) EXPECT_TRUE(name.ends_with(".json") || name.ends_with(".xml") || name.ends_with(".csv") || name.ends_with(".html")) << "left over: " << name;
+  EXPECT_EQ(ReadAll(out + "/result.json"), answer.out);
+  EXPECT_NE(ReadAll(out + "/model.xml").find("gapscope.motor"), std::string::npos);
+  const std::string trace = ReadAll(out + "/traces/run.csv");
+  EXPECT_EQ(trace.substr(0, trace.find('\n')), "__time,command/motor,command/motor.feedforward,measured/position_rad,predicted/position_rad");
+  EXPECT_EQ(std::count(trace.begin(), trace.end(), '\n'), 401);
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_EQ(json["effects"][0]["name"], "torque_limit");
+  EXPECT_EQ(json["parameters"]["torque_limit@motor.limit_n_m"], 20);
+  EXPECT_TRUE(Files(scratch_.Path("cwd")).empty());
+}
+
+TEST_F(CliTest, AnUnwritableOutIsRefused) {
+  const std::string log = JointLog();
+  const std::string file = scratch_.Write("in_the_way", "x");
+  const Answer blocked = Run("replay " + Joint() + " '" + log + "' --out '" + file + "'");
+  EXPECT_EQ(blocked.status, 2);
+  EXPECT_NE(blocked.err.find("in_the_way"), std::string::npos) << blocked.err;
+  EXPECT_EQ(ReadAll(file), "x");
+  const Answer nowhere = Run("replay " + Joint() + " '" + log + "' --out /proc/none");
+  EXPECT_EQ(nowhere.status, 2) << nowhere.err;
+  EXPECT_EQ(nowhere.out, "") << "no result is printed that was not written";
+}
+
+TEST_F(CliTest, FailAboveIsStatusOne) {
+  const std::string replay = "replay " + Joint() + " '" + JointLog() + "' --quiet --json";
+  const auto json = nlohmann::json::parse(Run(replay).out);
+  const double error = json["error"];
+  ASSERT_GT(error, 0);
+  const Answer above = Run(replay + " --fail-above " + std::to_string(0.5 * error)), below = Run(replay + " --fail-above " + std::to_string(2 * error));
+  EXPECT_EQ(above.status, 1);
+  EXPECT_FALSE(nlohmann::json::parse(above.out, nullptr, false).is_discarded()) << "the result is printed all the same";
+  EXPECT_EQ(below.status, 0);
+}
+
+TEST_F(CliTest, TheSameBytesWhateverTheJobs) {
+  const std::string a = JointLog("a.csv"), b = JointLog("b.csv", 0.05);
+  std::vector<nlohmann::json> results;
+  for (const char* jobs : {"1", "2", "7"}) {
+    auto json = nlohmann::json::parse(Run("replay " + Joint() + " '" + a + "' '" + b + "' --mode windows --window 0.1 --json --quiet --jobs " + jobs).out);
+    json["cost"].erase("wall_s");
+    results.push_back(std::move(json));
+  }
+  EXPECT_EQ(results[0].dump(), results[1].dump());
+  EXPECT_EQ(results[0].dump(), results[2].dump());
+}
+
+TEST_F(CliTest, TheTableFitsAHundredColumns) {
+  const std::string log = JointLog("a_folder_with_a_rather_long_name/and_a_log_with_a_rather_long_name_too.csv");
+  const Answer answer = Run("replay " + Joint() + " '" + log + "' --quiet");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  std::istringstream lines(answer.out);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
+  EXPECT_NE(answer.out.find("position_rad"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gapscope::testing

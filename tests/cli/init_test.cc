@@ -1,0 +1,179 @@
+// `gapscope init` on a robot of one's own: what it pairs, what it doubts, and that the draft replays.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cmath>
+
+#include "src/experiment/experiment.h"
+#include "tests/experiment/scratch.h"
+
+namespace gapscope::testing {
+namespace {
+
+constexpr const char* kArm = R"(<mujoco model="two_link">
+  <compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast" gravity="0 0 0"><flag contact="disable"/></option>
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" axis="0 0 1" damping="0.4"/>
+      <inertial pos="0.15 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+      <body name="fore" pos="0.3 0 0">
+        <joint name="elbow" axis="0 0 1" damping="0.2" armature="0.01"/>
+        <inertial pos="0.1 0 0" mass="0.5" diaginertia="0.004 0.004 0.004"/>
+        <body name="hand" pos="0.2 0 0"><joint name="wrist" type="slide" axis="1 0 0" damping="5" stiffness="100"/><inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/></body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="shoulder_servo" joint="shoulder" kp="40" kv="2"/>
+    <motor name="elbow_motor" joint="elbow" gear="2"/>
+    <velocity name="wrist_drive" joint="wrist" kv="8"/>
+    <general name="trim" joint="elbow" gainprm="0.3" biastype="affine" biasprm="0 0 -0.1"/>
+  </actuator>
+</mujoco>)";
+
+class InitTest : public ::testing::Test {
+ protected:
+  struct Answer {
+    int status = -1;
+    std::string out, err;
+  };
+  Answer Run(const std::string& arguments) {
+    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
+    const int raw = std::system(("cd '" + scratch_.Path("") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments + " > '" + out + "' 2> '" + err + "'").c_str());
+    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, ReadAll(out), ReadAll(err)};
+  }
+  // Shoulder follows its target late, elbow and wrist swing on their own; `names` are the columns' in this order:
+  // time [ms], shoulder angle, elbow angle, wrist travel, shoulder target, elbow torque command, elbow speed.
+  std::string Log(const std::vector<std::string>& names, const std::string& file = "log.csv") {
+    std::string text;
+    for (const auto& name : names) text += (text.empty() ? "" : ",") + name;
+    text += "\n";
+    for (int k = 0; k < 500; ++k) {
+      const double t = 0.004 * k, target = 0.5 * std::sin(3 * t) + 0.2 * std::sin(7.3 * t), elbow = 0.8 * std::sin(5 * t + 0.4), speed = 4 * std::cos(5 * t + 0.4);
+      const double late = t > 0.05 ? 0.5 * std::sin(3 * (t - 0.05)) + 0.2 * std::sin(7.3 * (t - 0.05)) : 0;
+      for (const double y : {1000 * t, late, elbow, 0.02 * std::sin(11 * t), target, 0.3 * std::cos(2 * t), speed}) text += std::to_string(y) + ",";
+      text.back() = '\n';
+    }
+    return scratch_.Write(file, text);
+  }
+  Experiment Drafted(const std::string& arguments) {
+    const Answer answer = Run(arguments + " --out drafted/robot.yaml");
+    EXPECT_EQ(answer.status, 0) << answer.err;
+    err_ = answer.err;
+    const auto loaded = LoadExperiment(scratch_.Path("drafted/robot.yaml"));
+    EXPECT_TRUE(loaded.ok()) << loaded.error().Text() << "\n" << ReadAll(scratch_.Path("drafted/robot.yaml"));
+    return loaded.ok() ? loaded.value() : Experiment{};
+  }
+  static const MeasuredSpec* Position(const Experiment& e, const std::string& joint) {
+    for (const auto& m : e.measured) {
+      if (m.on == joint && m.kind == SignalKind::kPosition) return &m;
+    }
+    return nullptr;
+  }
+  static const CommandSpec* Command(const Experiment& e, const std::string& actuator) {
+    for (const auto& c : e.commands) {
+      if (c.actuator == actuator) return &c;
+    }
+    return nullptr;
+  }
+  Scratch scratch_;
+  std::string err_;
+};
+
+TEST_F(InitTest, PairsByNameAndTheDraftReplays) {
+  scratch_.Write("arm.xml", kArm);
+  Log({"time_ms", "shoulder_pos_rad", "elbow_pos_rad", "wrist_pos", "shoulder_target_rad", "elbow_torque_cmd", "elbow_vel_rad"});
+  const Experiment e = Drafted("init arm.xml log.csv");
+  EXPECT_EQ(e.model_path, scratch_.Path("arm.xml"));
+  EXPECT_EQ(e.timeline.time_column, "time_ms");
+  EXPECT_EQ(e.timeline.time_unit, "ms");
+  for (const auto& [joint, column] : {std::pair{"shoulder", "shoulder_pos_rad"}, {"elbow", "elbow_pos_rad"}, {"wrist", "wrist_pos"}}) {
+    const MeasuredSpec* measured = Position(e, joint);
+    ASSERT_NE(measured, nullptr) << joint;
+    EXPECT_EQ(measured->columns.front(), column);
+  }
+  ASSERT_NE(Command(e, "shoulder_servo"), nullptr);
+  EXPECT_EQ(Command(e, "shoulder_servo")->columns.front(), "shoulder_target_rad");
+  ASSERT_NE(Command(e, "elbow_motor"), nullptr);
+  ASSERT_FALSE(Command(e, "elbow_motor")->columns.empty());
+  EXPECT_EQ(Command(e, "elbow_motor")->columns.front(), "elbow_torque_cmd");
+  // What has no column gets none, and says so.
+  ASSERT_NE(Command(e, "wrist_drive"), nullptr);
+  EXPECT_TRUE(Command(e, "wrist_drive")->columns.empty());
+  EXPECT_NE(err_.find("wrist_drive"), std::string::npos) << err_;
+  bool speed = false;
+  for (const auto& m : e.measured) speed = speed || (m.kind == SignalKind::kVelocity && m.on == "elbow" && m.columns.front() == "elbow_vel_rad");
+  EXPECT_TRUE(speed);
+  // Parameters start at the MJCF's own values, within their bounds.
+  for (const auto& p : e.parameters) {
+    EXPECT_LE(p.low, p.nominal) << p.name;
+    EXPECT_LT(p.low, p.high) << p.name;
+    EXPECT_TRUE(p.name != "shoulder_servo.kp" || p.nominal == 40);
+    EXPECT_TRUE(p.name != "shoulder.damping" || p.nominal == 0.4);
+  }
+  EXPECT_FALSE(e.parameters.empty());
+  const Answer replay = Run("replay drafted/robot.yaml log.csv --quiet --time-step 0.002");
+  EXPECT_EQ(replay.status, 0) << replay.err;
+  EXPECT_NE(replay.out.find("elbow"), std::string::npos);
+}
+
+TEST_F(InitTest, PairsTheServosCommandByCorrelation) {
+  scratch_.Write("arm.xml", kArm);
+  Log({"t", "shoulder", "elbow", "wrist", "cmd_a", "cmd_b", "w_1"});
+  const Experiment e = Drafted("init arm.xml log.csv");
+  ASSERT_NE(Command(e, "shoulder_servo"), nullptr);
+  ASSERT_FALSE(Command(e, "shoulder_servo")->columns.empty());
+  EXPECT_EQ(Command(e, "shoulder_servo")->columns.front(), "cmd_a") << "the column that the shoulder follows";
+  ASSERT_FALSE(Command(e, "elbow_motor")->columns.empty());
+  EXPECT_EQ(Command(e, "elbow_motor")->columns.front(), "cmd_b");
+  EXPECT_NE(ReadAll(scratch_.Path("drafted/robot.yaml")).find("# unsure: "), std::string::npos);
+  EXPECT_NE(err_.find("unsure: "), std::string::npos);
+  for (const auto& m : e.measured) {
+    EXPECT_TRUE(m.columns.front() != "w_1" || m.on == "elbow") << "it follows the elbow's derivative";
+  }
+}
+
+TEST_F(InitTest, StdoutHoldsTheDraftAlone) {
+  scratch_.Write("arm.xml", kArm);
+  Log({"t", "shoulder", "elbow", "wrist", "cmd_a", "cmd_b", "w_1"});
+  const Answer answer = Run("init arm.xml log.csv --quiet");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  EXPECT_EQ(answer.err, "");
+  const auto loaded = LoadExperiment(scratch_.Write("from_stdout.yaml", answer.out));
+  EXPECT_TRUE(loaded.ok()) << loaded.error().Text();
+}
+
+TEST_F(InitTest, NamesThatYamlAndExpressionsDislike) {
+  std::string robot = kArm;
+  for (const auto& [from, to] : {std::pair{"shoulder_servo", "servo: #1"}, {"name=\"elbow\"", "name=\"joint 2\""}, {"joint=\"elbow\"", "joint=\"joint 2\""}, {"joint=\"elbow\"", "joint=\"joint 2\""}}) robot = Replaced(robot, from, to);
+  scratch_.Write("arm.xml", robot);
+  Log({"t", "shoulder", "joint 2", "wrist", "\"servo: #1 cmd\"", "cmd_b", "w_1"});
+  const Experiment e = Drafted("init arm.xml log.csv");
+  EXPECT_NE(Position(e, "joint 2"), nullptr);
+  EXPECT_NE(Command(e, "servo: #1"), nullptr);
+  EXPECT_EQ(Run("replay drafted/robot.yaml log.csv --quiet --time-step 0.002").status, 0) << ReadAll(scratch_.Path("stderr"));
+}
+
+TEST_F(InitTest, WhatCannotBeDraftedIsRefused) {
+  scratch_.Write("arm.xml", kArm);
+  Log({"t", "shoulder", "elbow", "wrist", "cmd_a", "cmd_b", "w_1"});
+  const auto refused = [&](const std::string& arguments, const std::string& says) {
+    const Answer answer = Run(arguments);
+    EXPECT_EQ(answer.status, 2) << arguments;
+    EXPECT_NE(answer.err.find(says), std::string::npos) << arguments << ": " << answer.err;
+    EXPECT_EQ(answer.out, "");
+  };
+  refused("init none.xml log.csv", "none.xml");
+  refused("init arm.xml none.csv", "none.csv");
+  refused("init log.csv log.csv", "log.csv");
+  refused("init arm.xml", "logs");
+  scratch_.Write("still.xml", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>");
+  refused("init still.xml log.csv", "joint");
+  scratch_.Write("constant.csv", "t,shoulder\n0,1\n1,1\n2,1\n");
+  refused("init arm.xml constant.csv", "no column of the log pairs");
+  refused("init arm.xml log.csv --out /proc/none/robot.yaml", "/proc/none");
+}
+
+}  // namespace
+}  // namespace gapscope::testing

@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   cli::AddInspect(program, run);
   cli::AddReplay(program, run);
   cli::AddTune(program, run);
+  cli::AddPlan(program, run);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

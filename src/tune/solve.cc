@@ -13,6 +13,7 @@ bool Late(const Deadline& deadline) { return deadline && std::chrono::steady_clo
 // The damped step inside the bounds: a coordinate that the step would push through its bound is put on it and the rest is solved again.
 Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, const Eigen::VectorXd& low, const Eigen::VectorXd& high, double damping) {
   const Eigen::Index n = point.y.size();
+  if (n == 0) return Eigen::VectorXd();
   Eigen::MatrixXd hessian = at.hessian;
   hessian.diagonal() += damping * at.hessian.diagonal().cwiseMax(1e-12 * std::max(at.hessian.diagonal().maxCoeff(), 1e-300));
   Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
@@ -51,6 +52,11 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
   SolveResult result{.point = start, .cost = problem.Cost(start), .termination = Termination::kIterations};
   if (!std::isfinite(result.cost)) {
     result.termination = Termination::kNotSimulated;
+    return result;
+  }
+  const bool any_state = std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
+  if (start.y.size() == 0 && !any_state) {
+    result.termination = Termination::kConverged;
     return result;
   }
   double damping = 1e-2, difference = options.coarse_step;

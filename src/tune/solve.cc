@@ -48,7 +48,7 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
 }
 
 SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
-  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8, kSmallDamping = 1e-3;
+  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8, kSmallDamping = 1e-3, kWorthwhile = 0.1;
   SolveResult result{.point = start, .cost = problem.Cost(start), .termination = Termination::kIterations};
   if (!std::isfinite(result.cost)) {
     result.termination = Termination::kNotSimulated;
@@ -72,8 +72,12 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
       return result;
     }
     bool accepted = false, small = false, undamped = false;
-    while (damping <= kMostDamping && !Late(options.deadline)) {
-      const FitPoint trial = problem.Move(result.point, at, BoundedStep(at, result.point, problem.low(), problem.high(), damping));
+    for (int rejected = 0; damping <= kMostDamping && !Late(options.deadline); ++rejected) {
+      const Eigen::VectorXd step = BoundedStep(at, result.point, problem.low(), problem.high(), damping);
+      // More damping only makes the step smaller: what it promises must be worth the replay.
+      const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
+      if (rejected >= 2 && promised < kWorthwhile * options.tolerance * result.cost) break;
+      const FitPoint trial = problem.Move(result.point, at, step);
       const double cost = problem.Cost(trial);
       if (cost < result.cost) {
         small = result.cost - cost < options.tolerance * result.cost;

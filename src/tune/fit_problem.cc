@@ -86,7 +86,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       const double deviation = std::max(std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count))), measured.spec.resolution);
       if (!(deviation > 0)) continue;
       scalings[s].deviation = deviation;
-      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / deviation : options_.weights[measured.index];
+      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / (options_.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, mean)) : options_.weights[measured.index];
       if (measured.spec.kind != SignalKind::kPosition) continue;
       const SignalSource& source = model.source(measured.index);
       if (options_.fit_offsets) {

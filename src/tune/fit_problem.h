@@ -22,6 +22,9 @@ namespace gapscope {
 // Which windows of each log a problem takes: with kTrain and kHeldOut every third one, from the second on, is held out.
 enum class Fold { kAll, kTrain, kHeldOut };
 
+// What makes signals of different size comparable: 1 / standard deviation over the log, or 1 / root mean square (mujoco.sysid's choice).
+enum class Normalization { kDeviation, kRootMeanSquare };
+
 enum class Objective { kWindows, kFreeRun, kBoth };
 
 struct FitOptions {
@@ -37,6 +40,7 @@ struct FitOptions {
   bool fit_states = true;           // initial state of each window
   double shift_s = 0;               // where no shift is fitted: this one
   std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
+  Normalization normalization = Normalization::kDeviation;
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 

@@ -15,7 +15,7 @@ constexpr double kAgree = 0.01;  // starts agree when their costs differ by less
 
 FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& free, double time_step_s) {
   return {.free = free, .objective = options.objective, .window_s = options.window_s, .time_step_s = time_step_s, .fit_offsets = options.fit_offsets,
-          .fit_shift = options.fit_shift, .fit_states = options.fit_states, .huber = options.huber};
+          .fit_shift = options.fit_shift, .fit_states = options.fit_states, .normalization = options.normalization, .huber = options.huber};
 }
 
 // A random start inside the middle of the bounds.
@@ -42,7 +42,7 @@ std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vecto
   }
   const double numbers[] = {static_cast<double>(options.objective), options.window_s, static_cast<double>(options.fit_offsets), static_cast<double>(options.fit_shift),
                             static_cast<double>(options.fit_states), options.huber, options.time_step_s, static_cast<double>(options.starts), static_cast<double>(options.solve.optimizer),
-                            options.solve.tolerance, static_cast<double>(options.solve.max_iterations), static_cast<double>(options.solve.seed)};
+                            options.solve.tolerance, static_cast<double>(options.normalization), static_cast<double>(options.solve.max_iterations), static_cast<double>(options.solve.seed)};
   key = Hash(numbers, sizeof numbers, key);
   return Hash(options.free.data(), sizeof(int) * options.free.size(), key);
 }

@@ -25,6 +25,7 @@ struct TuneOptions {
   Objective objective = Objective::kBoth;
   double window_s = 1.0;
   bool fit_offsets = true, fit_shift = true, fit_states = true;
+  Normalization normalization = Normalization::kDeviation;
   double huber = 4;                 // see FitOptions
   double time_step_s = 0;           // 0: chosen
   int starts = 2;                   // the given values, then random ones inside the bounds

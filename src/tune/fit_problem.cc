@@ -148,6 +148,15 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     scale *= scale;
   }
   anchor_weight_ = kAnchor * scale * static_cast<double>(residuals()) * (high_ - low_).cwiseAbs2().cwiseMax(1e-12).cwiseInverse();
+  if (options_.prior_share > 0) {
+    // In units of the noise: only meaningful with weights of 1 / noise. An effect's parameters are what is asked for.
+    for (std::size_t i = 0; i < coordinates_.size(); ++i) {
+      if (model.parameters()[coordinates_[i].parameter].name.find('@') != std::string::npos) continue;
+      const auto k = static_cast<Eigen::Index>(i);
+      const double deviation = options_.prior_share * (high_[k] - low_[k]);
+      anchor_weight_[k] += 1 / (deviation * deviation);
+    }
+  }
 }
 
 double FitProblem::AnchorCost(const FitPoint& point) const { return 0.5 * anchor_weight_.cwiseProduct((point.y - anchor_).cwiseAbs2()).sum(); }

@@ -41,6 +41,7 @@ struct FitOptions {
   double shift_s = 0;               // where no shift is fitted: this one
   std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
   Normalization normalization = Normalization::kDeviation;
+  double prior_share = 0;           // standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 

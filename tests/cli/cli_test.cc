@@ -26,7 +26,9 @@ class CliTest : public ::testing::Test {
   Answer Run(const std::string& arguments) {
     std::filesystem::create_directories(scratch_.Path("cwd"));
     const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
-    const int raw = std::system(("cd '" + scratch_.Path("cwd") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments + " > '" + out + "' 2> '" + err + "' < /dev/null").c_str());
+    const int raw = std::system(("cd '" + scratch_.Path("cwd") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments +
+                                 " > '" + out + "' 2> '" + err + "' < /dev/null")
+                                    .c_str());
     return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
   }
   // Status 2, one line on stderr that says all of this, nothing on stdout.
@@ -35,7 +37,8 @@ class CliTest : public ::testing::Test {
     const Answer answer = Run(arguments);
     EXPECT_EQ(answer.status, 2) << answer.err;
     EXPECT_EQ(answer.out, "");
-    for (const auto& part : says) EXPECT_NE(answer.err.find(part), std::string::npos) << answer.err << "\nlacks: " << part;
+    for (const auto& part : says)
+      EXPECT_NE(answer.err.find(part), std::string::npos) << answer.err << "\nlacks: " << part;
     EXPECT_EQ(answer.err.find("internal error"), std::string::npos) << answer.err;
   }
   // A log of the joint rig: a servo that follows a sine with a lag and hangs back by `offset`.
@@ -43,7 +46,8 @@ class CliTest : public ::testing::Test {
     std::string text = "time_s,target_rad,position_rad\n";
     for (int k = 0; k < 400; ++k) {
       const double t = 0.002 * k, s = std::max(t - 0.05, 0.0);
-      text += std::to_string(t) + "," + std::to_string(0.4 * std::sin(8 * s)) + "," + std::to_string(0.4 * std::sin(8 * s - 0.3 * std::min(1.0, 8 * s)) + offset * std::min(1.0, 4 * s)) + "\n";
+      text += std::to_string(t) + "," + std::to_string(0.4 * std::sin(8 * s)) + "," +
+              std::to_string(0.4 * std::sin(8 * s - 0.3 * std::min(1.0, 8 * s)) + offset * std::min(1.0, 4 * s)) + "\n";
     }
     return scratch_.Write(name, text);
   }
@@ -124,7 +128,8 @@ TEST_F(CliTest, FilesEffectsAndParametersThatAreWrong) {
   ExpectRefused(replay + "--set =3", {"--set"});
   ExpectRefused(replay + "--params none.yaml", {"none.yaml"});
   ExpectRefused(replay + "--params '" + scratch_.Write("p.yaml", "motor.kp: much\n") + "'", {"p.yaml:1:"});
-  ExpectRefused(replay + "--params '" + scratch_.Write("q.yaml", "motor.kq: 1\n") + "'", {"q.yaml", "did you mean 'motor.kp'?"});
+  ExpectRefused(replay + "--params '" + scratch_.Write("q.yaml", "motor.kq: 1\n") + "'",
+                {"q.yaml", "did you mean 'motor.kp'?"});
   ExpectRefused(replay + "--while torque_enable", {"no column 'torque_enable' for 'while'"});
   const std::string experiment = scratch_.Write("e.yaml", "modle: x\n");
   ExpectRefused("replay '" + experiment + "' '" + log + "'", {"e.yaml:1:"});
@@ -144,7 +149,8 @@ TEST_F(CliTest, JsonAloneOnStdoutMessagesOnStderr) {
   EXPECT_EQ(json["logs"][0]["outcome"], "completed");
   EXPECT_EQ(json["logs"][0]["log"], log);
   EXPECT_EQ(json["logs"][0]["samples"], 402);
-  for (const char* key : {"rmse", "mae", "nrmse", "max", "lag_s", "correlation"}) EXPECT_TRUE(json["logs"][0]["signals"]["position_rad"][key].is_number()) << key;
+  for (const char* key : {"rmse", "mae", "nrmse", "max", "lag_s", "correlation"})
+    EXPECT_TRUE(json["logs"][0]["signals"]["position_rad"][key].is_number()) << key;
   for (const char* key : {"wall_s", "simulated_s", "steps"}) EXPECT_TRUE(json["cost"][key].is_number()) << key;
   EXPECT_TRUE(json["error"].is_number() && json["time_step_s"].is_number());
   EXPECT_NE(answer.err.find("gap.csv"), std::string::npos) << "findings go to stderr";
@@ -164,20 +170,26 @@ TEST_F(CliTest, ADivergenceIsAResultAndLeavesTheStreamsClean) {
   EXPECT_TRUE(json["error"].is_null());
   EXPECT_NEAR(json["logs"][0]["diverged_at_s"].get<double>(), 0.04, 0.01);
   EXPECT_TRUE(Files(scratch_.Path("cwd")).empty()) << "MuJoCo left its log";
-  EXPECT_EQ(Run("replay " + Joint() + " '" + scratch_.Path("wild.csv") + "' --fail-above 100").status, 1) << "a diverged log is above any threshold";
+  EXPECT_EQ(Run("replay " + Joint() + " '" + scratch_.Path("wild.csv") + "' --fail-above 100").status, 1)
+      << "a diverged log is above any threshold";
 }
 
 TEST_F(CliTest, OutWritesResultTracesAndModelAndNothingElse) {
   const std::string a = JointLog("a/run.csv"), b = JointLog("b/run.csv", 0.05), out = scratch_.Path("out/deep");
-  const Answer answer = Run("replay " + Joint() + " '" + a + "' '" + b + "' --with torque_limit --set torque_limit@motor.limit_n_m=20 --json --out '" + out + "'");
+  const Answer answer = Run("replay " + Joint() + " '" + a + "' '" + b +
+                            "' --with torque_limit --set torque_limit@motor.limit_n_m=20 --json --out '" + out + "'");
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto files = Files(out);
-  for (const char* name : {"result.json", "model.xml", "traces/run.csv", "traces/1_run.csv"}) EXPECT_TRUE(files.contains(name)) << name;
-  for (const auto& name : files) EXPECT_TRUE(name.ends_with(".json") || name.ends_with(".xml") || name.ends_with(".csv") || name.ends_with(".html")) << "left over: " << name;
+  for (const char* name : {"result.json", "model.xml", "traces/run.csv", "traces/1_run.csv"})
+    EXPECT_TRUE(files.contains(name)) << name;
+  for (const auto& name : files)
+    EXPECT_TRUE(name.ends_with(".json") || name.ends_with(".xml") || name.ends_with(".csv") || name.ends_with(".html"))
+        << "left over: " << name;
   EXPECT_EQ(ReadAll(out + "/result.json"), answer.out);
   EXPECT_NE(ReadAll(out + "/model.xml").find("gapscope.motor"), std::string::npos);
   const std::string trace = ReadAll(out + "/traces/run.csv");
-  EXPECT_EQ(trace.substr(0, trace.find('\n')), "__time,command/motor,command/motor.feedforward,measured/position_rad,predicted/position_rad");
+  EXPECT_EQ(trace.substr(0, trace.find('\n')),
+            "__time,command/motor,command/motor.feedforward,measured/position_rad,predicted/position_rad");
   EXPECT_EQ(std::count(trace.begin(), trace.end(), '\n'), 401);
   const auto json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json["effects"][0]["name"], "torque_limit");
@@ -202,7 +214,8 @@ TEST_F(CliTest, FailAboveIsStatusOne) {
   const auto json = nlohmann::json::parse(Run(replay).out);
   const double error = json["error"];
   ASSERT_GT(error, 0);
-  const Answer above = Run(replay + " --fail-above " + std::to_string(0.5 * error)), below = Run(replay + " --fail-above " + std::to_string(2 * error));
+  const Answer above = Run(replay + " --fail-above " + std::to_string(0.5 * error)),
+               below = Run(replay + " --fail-above " + std::to_string(2 * error));
   EXPECT_EQ(above.status, 1);
   EXPECT_FALSE(nlohmann::json::parse(above.out, nullptr, false).is_discarded()) << "the result is printed all the same";
   EXPECT_EQ(below.status, 0);
@@ -212,7 +225,9 @@ TEST_F(CliTest, TheSameBytesWhateverTheJobs) {
   const std::string a = JointLog("a.csv"), b = JointLog("b.csv", 0.05);
   std::vector<nlohmann::json> results;
   for (const char* jobs : {"1", "2", "7"}) {
-    auto json = nlohmann::json::parse(Run("replay " + Joint() + " '" + a + "' '" + b + "' --mode windows --window 0.1 --json --quiet --jobs " + jobs).out);
+    auto json = nlohmann::json::parse(
+        Run("replay " + Joint() + " '" + a + "' '" + b + "' --mode windows --window 0.1 --json --quiet --jobs " + jobs)
+            .out);
     json["cost"].erase("wall_s");
     results.push_back(std::move(json));
   }

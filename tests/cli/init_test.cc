@@ -40,7 +40,9 @@ class InitTest : public ::testing::Test {
   };
   Answer Run(const std::string& arguments) {
     const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
-    const int raw = std::system(("cd '" + scratch_.Path("") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments + " > '" + out + "' 2> '" + err + "'").c_str());
+    const int raw = std::system(("cd '" + scratch_.Path("") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments + " > '" +
+                                 out + "' 2> '" + err + "'")
+                                    .c_str());
     return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, ReadAll(out), ReadAll(err)};
   }
   // Shoulder follows its target late, elbow and wrist swing on their own; `names` are the columns' in this order:
@@ -50,9 +52,11 @@ class InitTest : public ::testing::Test {
     for (const auto& name : names) text += (text.empty() ? "" : ",") + name;
     text += "\n";
     for (int k = 0; k < 500; ++k) {
-      const double t = 0.004 * k, target = 0.5 * std::sin(3 * t) + 0.2 * std::sin(7.3 * t), elbow = 0.8 * std::sin(5 * t + 0.4), speed = 4 * std::cos(5 * t + 0.4);
+      const double t = 0.004 * k, target = 0.5 * std::sin(3 * t) + 0.2 * std::sin(7.3 * t),
+                   elbow = 0.8 * std::sin(5 * t + 0.4), speed = 4 * std::cos(5 * t + 0.4);
       const double late = t > 0.05 ? 0.5 * std::sin(3 * (t - 0.05)) + 0.2 * std::sin(7.3 * (t - 0.05)) : 0;
-      for (const double y : {1000 * t, late, elbow, 0.02 * std::sin(11 * t), target, 0.3 * std::cos(2 * t), speed}) text += std::to_string(y) + ",";
+      for (const double y : {1000 * t, late, elbow, 0.02 * std::sin(11 * t), target, 0.3 * std::cos(2 * t), speed})
+        text += std::to_string(y) + ",";
       text.back() = '\n';
     }
     return scratch_.Write(file, text);
@@ -83,12 +87,14 @@ class InitTest : public ::testing::Test {
 
 TEST_F(InitTest, PairsByNameAndTheDraftReplays) {
   scratch_.Write("arm.xml", kArm);
-  Log({"time_ms", "shoulder_pos_rad", "elbow_pos_rad", "wrist_pos", "shoulder_target_rad", "elbow_torque_cmd", "elbow_vel_rad"});
+  Log({"time_ms", "shoulder_pos_rad", "elbow_pos_rad", "wrist_pos", "shoulder_target_rad", "elbow_torque_cmd",
+       "elbow_vel_rad"});
   const Experiment e = Drafted("init arm.xml log.csv");
   EXPECT_EQ(e.model_path, scratch_.Path("arm.xml"));
   EXPECT_EQ(e.timeline.time_column, "time_ms");
   EXPECT_EQ(e.timeline.time_unit, "ms");
-  for (const auto& [joint, column] : {std::pair{"shoulder", "shoulder_pos_rad"}, {"elbow", "elbow_pos_rad"}, {"wrist", "wrist_pos"}}) {
+  for (const auto& [joint, column] :
+       {std::pair{"shoulder", "shoulder_pos_rad"}, {"elbow", "elbow_pos_rad"}, {"wrist", "wrist_pos"}}) {
     const MeasuredSpec* measured = Position(e, joint);
     ASSERT_NE(measured, nullptr) << joint;
     EXPECT_EQ(measured->columns.front(), column);
@@ -103,7 +109,8 @@ TEST_F(InitTest, PairsByNameAndTheDraftReplays) {
   EXPECT_TRUE(Command(e, "wrist_drive")->columns.empty());
   EXPECT_NE(err_.find("wrist_drive"), std::string::npos) << err_;
   bool speed = false;
-  for (const auto& m : e.measured) speed = speed || (m.kind == SignalKind::kVelocity && m.on == "elbow" && m.columns.front() == "elbow_vel_rad");
+  for (const auto& m : e.measured)
+    speed = speed || (m.kind == SignalKind::kVelocity && m.on == "elbow" && m.columns.front() == "elbow_vel_rad");
   EXPECT_TRUE(speed);
   // Parameters start at the MJCF's own values, within their bounds.
   for (const auto& p : e.parameters) {
@@ -146,13 +153,18 @@ TEST_F(InitTest, StdoutHoldsTheDraftAlone) {
 
 TEST_F(InitTest, NamesThatYamlAndExpressionsDislike) {
   std::string robot = kArm;
-  for (const auto& [from, to] : {std::pair{"shoulder_servo", "servo: #1"}, {"name=\"elbow\"", "name=\"joint 2\""}, {"joint=\"elbow\"", "joint=\"joint 2\""}, {"joint=\"elbow\"", "joint=\"joint 2\""}}) robot = Replaced(robot, from, to);
+  for (const auto& [from, to] : {std::pair{"shoulder_servo", "servo: #1"},
+                                 {"name=\"elbow\"", "name=\"joint 2\""},
+                                 {"joint=\"elbow\"", "joint=\"joint 2\""},
+                                 {"joint=\"elbow\"", "joint=\"joint 2\""}})
+    robot = Replaced(robot, from, to);
   scratch_.Write("arm.xml", robot);
   Log({"t", "shoulder", "joint 2", "wrist", "\"servo: #1 cmd\"", "cmd_b", "w_1"});
   const Experiment e = Drafted("init arm.xml log.csv");
   EXPECT_NE(Position(e, "joint 2"), nullptr);
   EXPECT_NE(Command(e, "servo: #1"), nullptr);
-  EXPECT_EQ(Run("replay drafted/robot.yaml log.csv --quiet --time-step 0.002").status, 0) << ReadAll(scratch_.Path("stderr"));
+  EXPECT_EQ(Run("replay drafted/robot.yaml log.csv --quiet --time-step 0.002").status, 0)
+      << ReadAll(scratch_.Path("stderr"));
 }
 
 TEST_F(InitTest, WhatCannotBeDraftedIsRefused) {

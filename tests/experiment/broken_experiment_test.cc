@@ -12,7 +12,8 @@
 namespace gapscope::testing {
 namespace {
 
-// The good file with `from` replaced by `to`; `says` are parts of the message. The error stands on the line of the change, or on `line` (1-based).
+// The good file with `from` replaced by `to`; `says` are parts of the message. The error stands on the line of the
+// change, or on `line` (1-based).
 struct Broken {
   const char* from;
   const char* to;
@@ -79,12 +80,23 @@ const std::vector<Broken>& Table() {
       {"mode: windows", "mode: window", {"'mode'", "did you mean 'windows'?"}},
       {"optional: true, score: false", "optional: yes, score: false", {"'optional'", "false, true"}},
       // Types.
-      {"log:\n  format: csv\n  time: {column: time_s, unit: s}\n  repair: {missing: hold, repeated: drop_rows, reversed: error, gap_factor: 7}\n", "log: none\n", {"'log' is not a map"}, 4},
+      {"log:\n  format: csv\n  time: {column: time_s, unit: s}\n  repair: {missing: hold, repeated: drop_rows, "
+       "reversed: error, gap_factor: 7}\n",
+       "log: none\n",
+       {"'log' is not a map"},
+       4},
       {"time: {column: time_s, unit: s}", "time: time_s", {"'time' is not a map"}},
-      {"repair: {missing: hold, repeated: drop_rows, reversed: error, gap_factor: 7}", "repair: [hold]", {"'repair' is not a map"}},
+      {"repair: {missing: hold, repeated: drop_rows, reversed: error, gap_factor: 7}",
+       "repair: [hold]",
+       {"'repair' is not a map"}},
       {"{column: kp, default: 2}", "7", {"'log.kp'", "is not a map"}},
-      {"  - {actuator: motor, column: u, unit: mV, add: 0.5}\n  - {actuator: aux, default: log.kp * 2}\n", "  motor: u\n", {"'commands' is not a list"}, 11},
-      {"commands:\n  - {actuator: motor, column: u, unit: mV, add: 0.5}\n  - {actuator: aux, default: log.kp * 2}\n", "commands: motor\n", {"'commands' is not a list"}},
+      {"  - {actuator: motor, column: u, unit: mV, add: 0.5}\n  - {actuator: aux, default: log.kp * 2}\n",
+       "  motor: u\n",
+       {"'commands' is not a list"},
+       11},
+      {"commands:\n  - {actuator: motor, column: u, unit: mV, add: 0.5}\n  - {actuator: aux, default: log.kp * 2}\n",
+       "commands: motor\n",
+       {"'commands' is not a list"}},
       {"  - {actuator: aux, default: log.kp * 2}", "  - aux", {"a command is not a map"}},
       {"  - {signal: w,", "  - [signal]\n  - {signal: w,", {"a measured signal is not a map"}},
       {"repair:", "companions: {find: a}\n  repair:", {"'companions' is not a list"}},
@@ -93,7 +105,10 @@ const std::vector<Broken>& Table() {
       {"columns: [speed, w]", "columns: [[speed], w]", {"'columns'", "not a text or a list of texts"}},
       {"joint/hinge/damping: hinge.damping", "joint/hinge/damping:", {"has no expression"}},
       {"joint/hinge/damping: hinge.damping", "joint/hinge/damping: {a: b}", {"joint/hinge/damping"}},
-      {"set:\n  joint/hinge/damping: hinge.damping\n  body/bar/inertia: [\"1e-4\", \"2 * hinge.damping\", \"1e-4\"]\n", "set: [a]\n", {"'set' is not a map"}, 21},
+      {"set:\n  joint/hinge/damping: hinge.damping\n  body/bar/inertia: [\"1e-4\", \"2 * hinge.damping\", \"1e-4\"]\n",
+       "set: [a]\n",
+       {"'set' is not a map"},
+       21},
       // Numbers.
       {"nominal: 0.1", "nominal: abc", {"'nominal'", "'hinge.damping'", "not a finite number", "'abc'"}},
       {"nominal: 0.1", "nominal: .nan", {"not a finite number", "'.nan'"}},
@@ -166,14 +181,16 @@ TEST(BrokenExperimentTest, EveryDefectIsNamedWithItsPlace) {
       ADD_FAILURE() << "accepted";
       continue;
     }
-    for (const char* part : broken.says) EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
+    for (const char* part : broken.says)
+      EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
     if (broken.line >= 0) {
       int expected = broken.line;
       if (expected == 0) {
         // The line of the first character that differs.
         std::size_t same = 0;
         while (broken.from[same] && broken.from[same] == broken.to[same]) ++same;
-        expected = 1 + static_cast<int>(std::count(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(at + same), '\n'));
+        expected =
+            1 + static_cast<int>(std::count(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(at + same), '\n'));
       }
       EXPECT_EQ(line, expected) << message;
     }
@@ -183,7 +200,9 @@ TEST(BrokenExperimentTest, EveryDefectIsNamedWithItsPlace) {
 TEST(BrokenExperimentTest, SomethingMustBeMeasured) {
   const Scratch scratch;
   for (const char* measured : {"", "measured:\n", "measured: q\n", "measured: {q: 1}\n", "measured: []\n"}) {
-    EXPECT_NE(MessageOf(scratch, std::string("model: robot.xml\n") + measured).find("nothing is measured"), std::string::npos) << measured;
+    EXPECT_NE(MessageOf(scratch, std::string("model: robot.xml\n") + measured).find("nothing is measured"),
+              std::string::npos)
+        << measured;
   }
 }
 
@@ -199,7 +218,9 @@ TEST(BrokenExperimentTest, TheColumnIsThatOfTheKeyOrValue) {
 TEST(BrokenExperimentTest, WholeFilesThatAreNoExperiment) {
   const Scratch scratch;
   const std::string good = kGoodExperiment;
-  std::string binary = "\x7f""ELF\x02\x01\x01";
+  std::string binary =
+      "\x7f"
+      "ELF\x02\x01\x01";
   binary += std::string(64, '\0');
   std::string noise;
   for (int i = 0; i < 4096; ++i) noise += static_cast<char>(1 + (i * 7919) % 255);
@@ -213,13 +234,51 @@ TEST(BrokenExperimentTest, WholeFilesThatAreNoExperiment) {
   }
   std::string staircase;
   for (int i = 0; i < 1400; ++i) staircase += std::string(static_cast<std::size_t>(i), ' ') + "a:\n";
-  const std::vector<std::string> files = {
-      "", " \n\n", "# only a comment\n", "---\n", "~\n", "[]\n", "{}\n", "hello\n", "- a\n- b\n", "42\n", binary, noise, "\xff\xfe" "m\0o\0", "time_s,q\n0,1\n", "{\"kp\": 32, \"entries\": []}\n",
-      "<mujoco/>\n", bomb, bomb + good, "a: &a [*a]\n", "model: &m\n  x: *m\n", "<<: *x\n", std::string(100000, '['), std::string(100000, '{'),
-      "#" + std::string(100000, ']') + "\n" + std::string(100000, '['), std::string(5000, '-') + " a", dashes + "a",
-      marks + "a", staircase, brackets,
-      "model: " + std::string(1 << 20, 'x') + "\n", "model: robot.xml\n" + std::string(900000, '\n') + "bad key\n", std::string(900000, 'a') + "\n", std::string(300000, '!'), std::string(300000, '&'),
-      "%YAML 9.9\n---\nmodel: x\n", "%TAG ! !!\n---\n!!binary abc\n", "model: !!int robot.xml\nmeasured: !!set {}\n", "\"\\U00110000\": 1\n", "? \n", ": \n", "|\n", "key: |99\n x\n", "&a &b c\n", "*a : b\n"};
+  const std::vector<std::string> files = {"",
+                                          " \n\n",
+                                          "# only a comment\n",
+                                          "---\n",
+                                          "~\n",
+                                          "[]\n",
+                                          "{}\n",
+                                          "hello\n",
+                                          "- a\n- b\n",
+                                          "42\n",
+                                          binary,
+                                          noise,
+                                          "\xff\xfe"
+                                          "m\0o\0",
+                                          "time_s,q\n0,1\n",
+                                          "{\"kp\": 32, \"entries\": []}\n",
+                                          "<mujoco/>\n",
+                                          bomb,
+                                          bomb + good,
+                                          "a: &a [*a]\n",
+                                          "model: &m\n  x: *m\n",
+                                          "<<: *x\n",
+                                          std::string(100000, '['),
+                                          std::string(100000, '{'),
+                                          "#" + std::string(100000, ']') + "\n" + std::string(100000, '['),
+                                          std::string(5000, '-') + " a",
+                                          dashes + "a",
+                                          marks + "a",
+                                          staircase,
+                                          brackets,
+                                          "model: " + std::string(1 << 20, 'x') + "\n",
+                                          "model: robot.xml\n" + std::string(900000, '\n') + "bad key\n",
+                                          std::string(900000, 'a') + "\n",
+                                          std::string(300000, '!'),
+                                          std::string(300000, '&'),
+                                          "%YAML 9.9\n---\nmodel: x\n",
+                                          "%TAG ! !!\n---\n!!binary abc\n",
+                                          "model: !!int robot.xml\nmeasured: !!set {}\n",
+                                          "\"\\U00110000\": 1\n",
+                                          "? \n",
+                                          ": \n",
+                                          "|\n",
+                                          "key: |99\n x\n",
+                                          "&a &b c\n",
+                                          "*a : b\n"};
   EXPECT_GE(files.size(), 40u);
   for (const std::string& file : files) {
     SCOPED_TRACE(file.substr(0, 60));
@@ -229,7 +288,8 @@ TEST(BrokenExperimentTest, WholeFilesThatAreNoExperiment) {
 
 TEST(BrokenExperimentTest, FilesThatAreNotThere) {
   const Scratch scratch;
-  for (const std::string& path : {scratch.Path("none.yaml"), scratch.Path(""), std::string(""), scratch.Path("none/none.yaml"), std::string("/dev/null")}) {
+  for (const std::string& path : {scratch.Path("none.yaml"), scratch.Path(""), std::string(""),
+                                  scratch.Path("none/none.yaml"), std::string("/dev/null")}) {
     const auto loaded = LoadExperiment(path);
     ASSERT_FALSE(loaded.ok()) << path;
     EXPECT_EQ(loaded.error().Text().rfind(path, 0), 0u) << loaded.error().Text();
@@ -242,7 +302,8 @@ TEST(BrokenExperimentTest, ParameterFiles) {
   const auto good = load("doc: a fit\nmotor.gain: 2.5\nhinge.damping: +1e-3\n");
   ASSERT_TRUE(good.ok());
   EXPECT_EQ(good.value(), (std::map<std::string, double>{{"motor.gain", 2.5}, {"hinge.damping", 1e-3}}));
-  for (const char* text : {"motor.gain: a\n", "motor.gain: .nan\n", "motor.gain: [1]\n", "motor.gain: 1\nmotor.gain: 2\n", "- 1\n", "1\n", "[a]: 1\n", "motor.gain:\n", ""}) {
+  for (const char* text : {"motor.gain: a\n", "motor.gain: .nan\n", "motor.gain: [1]\n",
+                           "motor.gain: 1\nmotor.gain: 2\n", "- 1\n", "1\n", "[a]: 1\n", "motor.gain:\n", ""}) {
     const auto bad = load(text);
     ASSERT_FALSE(bad.ok()) << text;
     EXPECT_NE(bad.error().Text().find("params.yaml:"), std::string::npos) << bad.error().Text();

@@ -93,7 +93,8 @@ TEST(ExperimentTest, EveryKeyArrives) {
 
 TEST(ExperimentTest, TheShortestFileTakesTheDefaults) {
   const Scratch scratch;
-  const auto loaded = LoadExperiment(scratch.Write("e.yaml", "model: /rigs/robot.xml\nmeasured:\n  - {signal: q, joint: hinge}\n"));
+  const auto loaded =
+      LoadExperiment(scratch.Write("e.yaml", "model: /rigs/robot.xml\nmeasured:\n  - {signal: q, joint: hinge}\n"));
   ASSERT_TRUE(loaded.ok()) << loaded.error().Text();
   const Experiment& e = loaded.value();
   EXPECT_EQ(e.model_path, "/rigs/robot.xml");
@@ -108,7 +109,10 @@ TEST(ExperimentTest, TheShortestFileTakesTheDefaults) {
 TEST(ExperimentTest, WindowsLineEndsAndAByteOrderMarkAreRead) {
   const Scratch scratch;
   std::string text = "\xef\xbb\xbf";
-  for (const char c : std::string(kGoodExperiment)) text += c == '\n' ? std::string("\r\n") : std::string(1, c);
+  for (const char c : std::string(kGoodExperiment)) {
+    if (c == '\n') text += '\r';
+    text += c;
+  }
   const auto loaded = LoadExperiment(scratch.Write("e.yaml", text));
   ASSERT_TRUE(loaded.ok()) << loaded.error().Text();
   EXPECT_EQ(loaded.value().replay.while_column, "on");
@@ -131,14 +135,21 @@ TEST(ExperimentTest, EveryShippedFileLoads) {
 // Seeded: the same mutants in every run. GAPSCOPE_MUTATION_SECONDS makes it a longer hunt.
 TEST(ExperimentTest, MutatedFilesNeverCrash) {
   const Scratch scratch;
-  const std::string csv = scratch.Write("log.csv", "time_s,u,q,w,on\n0,1,2,3,1\n0.1,1,2,3,1\n0.2,1,2,3,1\n0.3,1,2,3,1\n");
+  const std::string csv =
+      scratch.Write("log.csv", "time_s,u,q,w,on\n0,1,2,3,1\n0.1,1,2,3,1\n0.2,1,2,3,1\n0.3,1,2,3,1\n");
   const char* seconds = std::getenv("GAPSCOPE_MUTATION_SECONDS");
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds ? std::atof(seconds) : 0);
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds ? std::atof(seconds) : 0);
   constexpr int kMutants = 1500;
-  const std::vector<std::string> seeds = {kGoodExperiment, ReadAll(std::string(GAPSCOPE_SOURCE_DIR) + "/models/qube/experiment.yaml"),
+  const std::vector<std::string> seeds = {kGoodExperiment,
+                                          ReadAll(std::string(GAPSCOPE_SOURCE_DIR) + "/models/qube/experiment.yaml"),
                                           ReadAll(std::string(GAPSCOPE_SOURCE_DIR) + "/models/ak80/experiment.yaml")};
-  const std::vector<std::string> tokens = {"{",  "}",     "[",    "]",   ":",        ",",    "-",       "- ",   "\n", "  ", "\t",   "#", "&a ", "*a", "!!", "|\n", ">\n",  "? ",  "---\n", "...\n", "\"", "'",
-                                           "~",  "null",  ".nan", "1e999", "-1e308", "0",    "true",    "<<: ", "%",  "\\", "\xff", "\xc3", "model: x\n", "unit: rpm", "wrap: 1e-300"};
+  const std::vector<std::string> tokens = {"{",         "}",           "[",    "]",    ":",     ",",      "-",
+                                           "- ",        "\n",          "  ",   "\t",   "#",     "&a ",    "*a",
+                                           "!!",        "|\n",         ">\n",  "? ",   "---\n", "...\n",  "\"",
+                                           "'",         "~",           "null", ".nan", "1e999", "-1e308", "0",
+                                           "true",      "<<: ",        "%",    "\\",   "\xff",  "\xc3",   "model: x\n",
+                                           "unit: rpm", "wrap: 1e-300"};
   std::mt19937 random(20240601);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
   int accepted = 0, mutants = 0;
@@ -147,12 +158,24 @@ TEST(ExperimentTest, MutatedFilesNeverCrash) {
     for (std::size_t edits = 1 + below(4); edits > 0; --edits) {
       const std::size_t at = below(text.size());
       switch (below(6)) {
-        case 0: text[at] = static_cast<char>(below(256)); break;
-        case 1: text.erase(at, 1 + below(20)); break;
-        case 2: text.insert(at, tokens[below(tokens.size())]); break;
-        case 3: text.insert(at, text.substr(below(text.size()), 1 + below(80))); break;
-        case 4: text.resize(std::max<std::size_t>(at, 1)); break;
-        case 5: text.replace(at, 1, tokens[below(tokens.size())]); break;
+        case 0:
+          text[at] = static_cast<char>(below(256));
+          break;
+        case 1:
+          text.erase(at, 1 + below(20));
+          break;
+        case 2:
+          text.insert(at, tokens[below(tokens.size())]);
+          break;
+        case 3:
+          text.insert(at, text.substr(below(text.size()), 1 + below(80)));
+          break;
+        case 4:
+          text.resize(std::max<std::size_t>(at, 1));
+          break;
+        case 5:
+          text.replace(at, 1, tokens[below(tokens.size())]);
+          break;
       }
       if (text.empty()) text = " ";
     }

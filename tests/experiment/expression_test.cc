@@ -61,9 +61,44 @@ TEST(ExpressionTest, UndefinedValuesAreNotFinite) {
 
 TEST(ExpressionTest, BadOnesSayWhatAndWhere) {
   std::vector<double> variables(kNames.size(), 1.0);
-  const std::vector<std::string> bad = {"",       "   ",     "1 +",      "(1",       "1)",     "motor.kt motor.kt", "1..2", "2x",  "x = 5",   "motor.kt = motor.kt", "x += 1", "1, 2", "\"text\"",
-                                        "f(x)",   "min()",   "sin",      "motor",    "x.y",    "a # b",             "x[0]", "x; x", "import os", std::string(5000, '1') + "+", std::string(100, '(') + "x" + std::string(100, ')'),
-                                        "inf",    "nan",     "1e999",    "x ? 1",    "x : 1",  "?:",                "\x01", "\xff\xfe", "x\n+", "+",      "**",     "x ** 2", "0x", "."};
+  const std::vector<std::string> bad = {"",
+                                        "   ",
+                                        "1 +",
+                                        "(1",
+                                        "1)",
+                                        "motor.kt motor.kt",
+                                        "1..2",
+                                        "2x",
+                                        "x = 5",
+                                        "motor.kt = motor.kt",
+                                        "x += 1",
+                                        "1, 2",
+                                        "\"text\"",
+                                        "f(x)",
+                                        "min()",
+                                        "sin",
+                                        "motor",
+                                        "x.y",
+                                        "a # b",
+                                        "x[0]",
+                                        "x; x",
+                                        "import os",
+                                        std::string(5000, '1') + "+",
+                                        std::string(100, '(') + "x" + std::string(100, ')'),
+                                        "inf",
+                                        "nan",
+                                        "1e999",
+                                        "x ? 1",
+                                        "x : 1",
+                                        "?:",
+                                        "\x01",
+                                        "\xff\xfe",
+                                        "x\n+",
+                                        "+",
+                                        "**",
+                                        "x ** 2",
+                                        "0x",
+                                        "."};
   for (const auto& text : bad) {
     const auto parsed = Expression::Parse(text, kNames, variables.data(), "e.yaml:7:3");
     ASSERT_FALSE(parsed.ok()) << "accepted: " << text;

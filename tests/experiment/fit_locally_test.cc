@@ -53,7 +53,8 @@ TEST(FitLocallyTest, IrregularStampsChangeNothing) {
 
 TEST(FitLocallyTest, ALogThatBeginsAtRestStartsAtRest) {
   // Still for 12 ms, then off with 40 rad/s^2.
-  const Recording r = Sampled(200, 0.002, [](double t) { return 0.3 + (t > 0.012 ? 20 * (t - 0.012) * (t - 0.012) : 0); }, 1e-3);
+  const Recording r =
+      Sampled(200, 0.002, [](double t) { return 0.3 + (t > 0.012 ? 20 * (t - 0.012) * (t - 0.012) : 0); }, 1e-3);
   const LocalFit fit = Fit(r, 0);
   EXPECT_EQ(fit.value, r.measured[0].values[0]);
   EXPECT_EQ(fit.slope, 0);

@@ -77,8 +77,10 @@ TEST_F(RecordingTest, ValuesAreMeansOfColumnsOrDefaults) {
 }
 
 TEST_F(RecordingTest, ValuesOfTheHeader) {
-  const std::string experiment = "model: robot.xml\nlog: {format: bam_json}\nvalues:\n  log.kp: {header: kp, scale: 2}\n"
-                                 "commands:\n  - {actuator: motor, column: goal_position, unit: rad}\nmeasured:\n  - {signal: q, column: position, joint: hinge}\n";
+  const std::string experiment =
+      "model: robot.xml\nlog: {format: bam_json}\nvalues:\n  log.kp: {header: kp, scale: 2}\n"
+      "commands:\n  - {actuator: motor, column: goal_position, unit: rad}\nmeasured:\n  - {signal: q, column: "
+      "position, joint: hinge}\n";
   const std::string json = R"({"kp": 32, "mass": 0.5, "dt": 0.01, "entries": [
     {"timestamp": 0.0, "position": 0.1, "goal_position": 0.2, "torque_enable": true},
     {"timestamp": 0.01, "position": 0.2, "goal_position": 0.3, "torque_enable": true},
@@ -98,17 +100,21 @@ TEST_F(RecordingTest, MissingColumnsNameTheNearest) {
   EXPECT_NE(command.find("did you mean 'uu'?"), std::string::npos) << command;
   const std::string measured = MessageOf("time_s,u,Q\n0,1,2\n1,1,2\n");
   EXPECT_NE(measured.find("no column 'q' for the signal 'q'"), std::string::npos) << measured;
-  const std::string value = MessageOf("time_s,u,q\n0,1,2\n1,1,2\n", Replaced(kExperiment, "{column: kp, default: 3}", "{column: kp}"));
+  const std::string value =
+      MessageOf("time_s,u,q\n0,1,2\n1,1,2\n", Replaced(kExperiment, "{column: kp, default: 3}", "{column: kp}"));
   EXPECT_NE(value.find("log.kp"), std::string::npos) << value;
-  const std::string cut = MessageOf("time_s,u,q\n0,1,2\n1,1,2\n", std::string(kExperiment) + "replay: {while: enabled}\n");
+  const std::string cut =
+      MessageOf("time_s,u,q\n0,1,2\n1,1,2\n", std::string(kExperiment) + "replay: {while: enabled}\n");
   EXPECT_NE(cut.find("no column 'enabled' for 'while'"), std::string::npos) << cut;
 }
 
 TEST_F(RecordingTest, NothingToScoreIsAnError) {
   std::string experiment = Replaced(kExperiment, "joint: hinge, unit: deg", "joint: hinge, unit: deg, optional: true");
-  EXPECT_NE(MessageOf("time_s,u\n0,1\n1,1\n", experiment).find("none of the signals that are scored"), std::string::npos);
+  EXPECT_NE(MessageOf("time_s,u\n0,1\n1,1\n", experiment).find("none of the signals that are scored"),
+            std::string::npos);
   experiment = Replaced(kExperiment, "joint: hinge, unit: deg", "joint: hinge, unit: deg, score: false");
-  EXPECT_NE(MessageOf("time_s,u,q\n0,1,2\n1,1,2\n", experiment).find("none of the signals that are scored"), std::string::npos);
+  EXPECT_NE(MessageOf("time_s,u,q\n0,1,2\n1,1,2\n", experiment).find("none of the signals that are scored"),
+            std::string::npos);
 }
 
 TEST_F(RecordingTest, ABadDefaultExpressionNamesTheCommand) {
@@ -127,16 +133,20 @@ TEST_F(RecordingTest, StartAndWhileCutTheLogAndSaySo) {
   EXPECT_EQ(r.time_s, (std::vector<double>{0, 1, 2}));
   EXPECT_EQ(r.commands[0].values, (std::vector<double>{1.002, 1.003, 1.004}));
   EXPECT_NEAR(r.measured[0].values[0], std::numbers::pi / 180, 1e-15);
-  const auto cut = std::find_if(r.findings.begin(), r.findings.end(), [](const Finding& f) { return f.kind == "cut" && f.column == "on"; });
+  const auto cut = std::find_if(r.findings.begin(), r.findings.end(),
+                                [](const Finding& f) { return f.kind == "cut" && f.column == "on"; });
   ASSERT_NE(cut, r.findings.end());
   EXPECT_EQ(cut->count, 2u);
   EXPECT_EQ(cut->first_row, 4u);
   // What start_s leaves out is said too.
-  EXPECT_TRUE(std::any_of(r.findings.begin(), r.findings.end(), [](const Finding& f) { return f.kind == "cut" && f.text.find("start_s") != std::string::npos; }));
+  EXPECT_TRUE(std::any_of(r.findings.begin(), r.findings.end(), [](const Finding& f) {
+    return f.kind == "cut" && f.text.find("start_s") != std::string::npos;
+  }));
 }
 
 TEST_F(RecordingTest, AWhileColumnWithoutAValueIsOff) {
-  const auto loaded = Load("time_s,u,q,on\n0,1,0,1\n1,2,1,1\n2,3,2,\n3,4,3,1\n", std::string(kExperiment) + "replay: {while: on}\n");
+  const auto loaded =
+      Load("time_s,u,q,on\n0,1,0,1\n1,2,1,1\n2,3,2,\n3,4,3,1\n", std::string(kExperiment) + "replay: {while: on}\n");
   ASSERT_TRUE(loaded.ok()) << loaded.error().Text();
   EXPECT_EQ(loaded.value().rows(), 2u);
 }
@@ -151,7 +161,8 @@ TEST_F(RecordingTest, ACutThatLeavesNothingIsAnError) {
 }
 
 TEST_F(RecordingTest, WrappedAnglesAreUnwrapped) {
-  const auto loaded = Load("time_s,u,q\n0,1,170\n1,1,-170\n2,1,-150\n3,1,175\n", Replaced(kExperiment, "unit: deg", "unit: deg, wrap: 6.283185307179586"));
+  const auto loaded = Load("time_s,u,q\n0,1,170\n1,1,-170\n2,1,-150\n3,1,175\n",
+                           Replaced(kExperiment, "unit: deg", "unit: deg, wrap: 6.283185307179586"));
   ASSERT_TRUE(loaded.ok()) << loaded.error().Text();
   const double degree = std::numbers::pi / 180;
   const std::vector<double> expected = {170, 190, 210, 175};
@@ -159,7 +170,8 @@ TEST_F(RecordingTest, WrappedAnglesAreUnwrapped) {
 }
 
 TEST_F(RecordingTest, ScalingThatOverflowsIsAnError) {
-  const std::string message = MessageOf("time_s,u,q\n0,1e307,2\n1,1,2\n", Replaced(kExperiment, "unit: mV, add: 1", "unit: V, scale: 1e3"));
+  const std::string message =
+      MessageOf("time_s,u,q\n0,1e307,2\n1,1,2\n", Replaced(kExperiment, "unit: mV, add: 1", "unit: V, scale: 1e3"));
   EXPECT_NE(message, "");
 }
 

@@ -1,4 +1,5 @@
-// A folder of its own for one test, removed afterwards, and files in it. Shared by the tests that read what users write.
+// A folder of its own for one test, removed afterwards, and files in it. Shared by the tests that read what users
+// write.
 #ifndef GAPSCOPE_TESTS_EXPERIMENT_SCRATCH_H_
 #define GAPSCOPE_TESTS_EXPERIMENT_SCRATCH_H_
 
@@ -19,7 +20,9 @@ class Scratch {
   Scratch() {
     // In memory where there is such a place: some tests write thousands of files.
     const std::filesystem::path memory = "/dev/shm";
-    std::string name = ((access(memory.c_str(), W_OK) == 0 ? memory : std::filesystem::temp_directory_path()) / "gapscope_test.XXXXXX").string();
+    std::string name =
+        ((access(memory.c_str(), W_OK) == 0 ? memory : std::filesystem::temp_directory_path()) / "gapscope_test.XXXXXX")
+            .string();
     if (!mkdtemp(name.data())) throw std::runtime_error("no scratch folder");
     folder_ = name;
   }

@@ -1,4 +1,5 @@
-// Each effect acts in the physically right direction and, where there is one, by the closed form: one hinge of 0.02 kg m^2 that a torque drives.
+// Each effect acts in the physically right direction and, where there is one, by the closed form: one hinge of 0.02 kg
+// m^2 that a torque drives.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,20 +19,34 @@ class DirectionTest : public ::testing::Test {
  protected:
   // Sets the rig up with one effect (none: the base). `attributes` go to the joint.
   void Build(const std::string& use, const std::string& actuator = kMotor, const std::string& attributes = "") {
-    const std::string mjcf = "<mujoco><compiler angle=\"radian\"/><option timestep=\"0.001\" integrator=\"RK4\" gravity=\"0 0 0\"><flag contact=\"disable\"/></option><worldbody><body name=\"disc\">"
-                             "<joint name=\"hinge\" axis=\"0 0 1\" " + attributes + "/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.015 0.015 0.02\"/></body></worldbody><actuator>" + actuator + "</actuator></mujoco>";
-    experiment_ = MakeExperiment(scratch_, mjcf, "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, unit: rad}\n  - {signal: w, column: w, kind: velocity, joint: hinge}\n");
+    const std::string mjcf =
+        "<mujoco><compiler angle=\"radian\"/><option timestep=\"0.001\" integrator=\"RK4\" gravity=\"0 0 0\"><flag "
+        "contact=\"disable\"/></option><worldbody><body name=\"disc\">"
+        "<joint name=\"hinge\" axis=\"0 0 1\" " +
+        attributes +
+        "/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.015 0.015 0.02\"/></body></worldbody><actuator>" +
+        actuator + "</actuator></mujoco>";
+    experiment_ =
+        MakeExperiment(scratch_, mjcf,
+                       "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, "
+                       "joint: hinge, unit: rad}\n  - {signal: w, column: w, kind: velocity, joint: hinge}\n");
     model_ = MakeModel(experiment_);
     use_ = use;
     if (use.empty()) return;
     const auto uses = model_->ParseEffects({use});
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     use_ = uses.value()[0].Text();
-    const Scales scales{.torque_n_m = 1, .angle_rad = 1, .speed_rad_per_s = 10, .sample_s = 0.002, .command = 1, .inertia_kg_m2 = kInertia};
+    const Scales scales{.torque_n_m = 1,
+                        .angle_rad = 1,
+                        .speed_rad_per_s = 10,
+                        .sample_s = 0.002,
+                        .command = 1,
+                        .inertia_kg_m2 = kInertia};
     model_ = MakeModel(experiment_, uses.value(), {{"hinge", scales}, {"motor", scales}});
   }
   // Runs 0.5 s under command(t) from (q, w); parameters by key. Fills q_, w_.
-  void Run(const std::function<double(double)>& command, double q = 0, double w = 0, const std::map<std::string, double>& keys = {}, double max_step_s = 0) {
+  void Run(const std::function<double(double)>& command, double q = 0, double w = 0,
+           const std::map<std::string, double>& keys = {}, double max_step_s = 0) {
     const Recording recording = MakeRecording(experiment_, 251, 0.002, [&](int, double t) { return command(t); });
     InitialState start = AtRest(*model_);
     std::fill(start.qpos.begin(), start.qpos.end(), q);
@@ -65,7 +80,8 @@ TEST_F(DirectionTest, CoulombFrictionStopsACoastingJointAndHoldsIt) {
 
 TEST_F(DirectionTest, StribeckFrictionHoldsMoreThanItBrakes) {
   Build("stribeck_friction");
-  const std::map<std::string, double> keys = {{"friction_n_m", 0.05}, {"breakaway_n_m", 0.15}, {"stribeck_speed_rad_per_s", 0.05}};
+  const std::map<std::string, double> keys = {
+      {"friction_n_m", 0.05}, {"breakaway_n_m", 0.15}, {"stribeck_speed_rad_per_s", 0.05}};
   Run([](double) { return 0.14; }, 0, 0, keys);
   EXPECT_LT(std::abs(q_.back()), 1e-4);
   Run([](double) { return 0.14; }, 0, 1, keys);
@@ -129,7 +145,10 @@ TEST_F(DirectionTest, CoggingRepeatsOverTheTurn) {
 TEST_F(DirectionTest, SpringHardeningRaisesTheFrequency) {
   Build("spring_hardening", kMotor, "stiffness=\"0.5\"");
   Run(Zero, 0.5, 0, {{"cubic_n_m_per_rad3", 0}});
-  const auto first_crossing = [&] { return t_[static_cast<std::size_t>(std::find_if(q_.begin(), q_.end(), [](double q) { return q < 0; }) - q_.begin())]; };
+  const auto first_crossing = [&] {
+    return t_[static_cast<std::size_t>(std::find_if(q_.begin(), q_.end(), [](double q) { return q < 0; }) -
+                                       q_.begin())];
+  };
   const double soft = first_crossing();
   Run(Zero, 0.5, 0, {{"cubic_n_m_per_rad3", 2}});
   EXPECT_LT(first_crossing(), 0.9 * soft);
@@ -146,7 +165,8 @@ TEST_F(DirectionTest, LimitsCapTheTorque) {
   const double start_s = 2 * kInertia, energy = 0.5 * kInertia * 4 + 2 * (0.5 - start_s);
   EXPECT_NEAR(w_.back(), std::sqrt(2 * energy / kInertia), 0.05);
   Build("supply_sag");
-  Run([](double t) { return t < 0.1 ? 0.0 : 1.0; }, 0, 0, {{"time_constant_s", 0.05}, {"sag_fraction", 0.5}, {"limit_n_m", 0.5}});
+  Run([](double t) { return t < 0.1 ? 0.0 : 1.0; }, 0, 0,
+      {{"time_constant_s", 0.05}, {"sag_fraction", 0.5}, {"limit_n_m", 0.5}});
   // Full at first; in the end the ceiling has sagged by half of its own load: T = 0.5 (1 - 0.5 T / 0.5).
   EXPECT_NEAR((w_[52] - w_[50]) / 0.004 * kInertia, 0.5, 0.02);
   EXPECT_NEAR((w_[250] - w_[240]) / 0.02 * kInertia, 1.0 / 3, 1e-3);
@@ -204,7 +224,8 @@ TEST_F(DirectionTest, ABacklashLosesTheMotorAndASpringGivesWay) {
   EXPECT_GT(LargestDifference(gap, q_), 0.005);
   EXPECT_LT(LargestDifference(gap, q_), 0.08);
   Build("joint_compliance");
-  Run([](double) { return 0.1; }, 0, 0, {{"stiffness_n_m_per_rad", 2}, {"motor_share", 0.5}, {"damping_ratio", 0.05}}, 2e-4);
+  Run([](double) { return 0.1; }, 0, 0, {{"stiffness_n_m_per_rad", 2}, {"motor_share", 0.5}, {"damping_ratio", 0.05}},
+      2e-4);
   // On average the whole inertia accelerates; the load rings about it at sqrt(k / reduced inertia).
   EXPECT_NEAR(w_.back(), 0.1 / kInertia * 0.5, 0.25);
   EXPECT_LT(q_[5], 0.2 * 0.5 * 0.1 / kInertia * t_[5] * t_[5]);

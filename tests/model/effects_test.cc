@@ -1,4 +1,5 @@
-// Every effect of the catalogue on every place it claims, on the rigs of the contract and on a servo with the motor plugin.
+// Every effect of the catalogue on every place it claims, on the rigs of the contract and on a servo with the motor
+// plugin.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,7 +13,8 @@ namespace {
 
 struct Rig {
   explicit Rig(const std::string& name) : experiment(ShippedExperiment(name)), model(MakeModel(experiment)) {
-    const std::map<std::string, double> amplitude = {{"joint", 0.5}, {"qube", 1.5}, {"flexjoint", 2}, {"flexlink", 0.5}, {"xl330", 0.6}};
+    const std::map<std::string, double> amplitude = {
+        {"joint", 0.5}, {"qube", 1.5}, {"flexjoint", 2}, {"flexlink", 0.5}, {"xl330", 0.6}};
     recording = MakeRecording(
         experiment, 401, 0.002,
         [&](int c, double t) {
@@ -37,7 +39,8 @@ struct Rig {
 // Largest difference of any signal, in that signal's own largest value.
 double Change(const Rig& rig, const std::vector<std::vector<double>>& predicted) {
   double change = 0;
-  for (std::size_t s = 0; s < predicted.size(); ++s) change = std::max(change, LargestDifference(predicted[s], rig.base[s]) / Largest(rig.base[s]));
+  for (std::size_t s = 0; s < predicted.size(); ++s)
+    change = std::max(change, LargestDifference(predicted[s], rig.base[s]) / Largest(rig.base[s]));
   return change;
 }
 
@@ -50,7 +53,8 @@ constexpr double kNearNeutral = 0.03;
 
 bool IsFriction(const EffectUse& use, const Model& model) {
   const bool on_joint = mj_name2id(&model.compiled(), mjOBJ_JOINT, use.on.c_str()) >= 0;
-  return use.effect.ends_with("friction") || (on_joint && (use.effect == "direction_asymmetry" || use.effect == "quadratic_drag"));
+  return use.effect.ends_with("friction") ||
+         (on_joint && (use.effect == "direction_asymmetry" || use.effect == "quadratic_drag"));
 }
 
 class EffectsTest : public ::testing::TestWithParam<const char*> {};
@@ -92,12 +96,16 @@ TEST_P(EffectsTest, EachIsNeutralAtNeutralAndActsElsewhere) {
     EXPECT_GT(acting, 3 * neutral);
   }
   // Every effect of diagnosis.md finds a place on one rig or another; on these at least the general ones.
-  for (const char* name : {"command_delay", "actuator_lag", "torque_limit", "torque_bias", "quadratic_drag", "sensor_delay", "backlash", "cogging"}) EXPECT_TRUE(names.contains(name)) << name;
+  for (const char* name : {"command_delay", "actuator_lag", "torque_limit", "torque_bias", "quadratic_drag",
+                           "sensor_delay", "backlash", "cogging"})
+    EXPECT_TRUE(names.contains(name)) << name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Rigs, EffectsTest, ::testing::Values("joint", "qube", "flexjoint", "flexlink", "xl330"), [](const auto& test) { return std::string(test.param); });
+INSTANTIATE_TEST_SUITE_P(Rigs, EffectsTest, ::testing::Values("joint", "qube", "flexjoint", "flexlink", "xl330"),
+                         [](const auto& test) { return std::string(test.param); });
 
-// All pairs that meet on the driven joint and its motor: where plugins, springs and splits could get in each other's way.
+// All pairs that meet on the driven joint and its motor: where plugins, springs and splits could get in each other's
+// way.
 class PairsTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(PairsTest, CompileAndRun) {
@@ -146,7 +154,8 @@ TEST_P(PairsTest, CompileAndRun) {
 }
 
 // A native servo with a feed-forward motor beside it, and a servo that is a plugin already.
-INSTANTIATE_TEST_SUITE_P(Rigs, PairsTest, ::testing::Values("joint", "xl330"), [](const auto& test) { return std::string(test.param); });
+INSTANTIATE_TEST_SUITE_P(Rigs, PairsTest, ::testing::Values("joint", "xl330"),
+                         [](const auto& test) { return std::string(test.param); });
 
 TEST(CatalogueTest, EveryEffectFindsAPlaceSomewhere) {
   std::set<std::string> placed, all;

@@ -40,10 +40,14 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
   };
   // The setting's key stands in line 9 (line 1 is "model:"), column 3.
   const std::vector<Case> cases = {
-      {"{actuator: motor", "{actuator: moter", {"experiment.yaml", "actuator that the MJCF lacks", "did you mean 'motor'?"}},
+      {"{actuator: motor",
+       "{actuator: moter",
+       {"experiment.yaml", "actuator that the MJCF lacks", "did you mean 'motor'?"}},
       {"joint: hinge,", "joint: hing,", {"experiment.yaml", "joint that the MJCF lacks", "did you mean 'hinge'?"}},
       {"joint: hinge,", "joint: ball,", {"neither hinge nor slide"}},
-      {"joint: hinge, unit: rad", "actuator: moter, kind: torque", {"actuator that the MJCF lacks", "did you mean 'motor'?"}},
+      {"joint: hinge, unit: rad",
+       "actuator: moter, kind: torque",
+       {"actuator that the MJCF lacks", "did you mean 'motor'?"}},
       {"unit: rad", "unit: rad, offset: hinge.ofset", {"no such parameter", "'hinge.ofset'"}},
       {"joint/hinge/damping:", "joint/hinge/dampin:", {"experiment.yaml:9:3:", "did you mean 'damping'?"}},
       {"joint/hinge/damping:", "joint/hnge/damping:", {"experiment.yaml:9:3:", "did you mean 'hinge'?"}},
@@ -51,13 +55,16 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
       {"damping: hinge.damping", "damping: hinge.dampng", {"experiment.yaml:9:3:", "did you mean 'hinge.damping'?"}},
       {"damping: hinge.damping", "damping: 2 * (hinge.damping", {"experiment.yaml:9:3:", "bad expression"}},
       {"damping: hinge.damping", "damping: nan", {"experiment.yaml:9:3:", "bad expression"}},
-      {"damping: hinge.damping", "damping: [hinge.damping, \"0\"]", {"experiment.yaml:9:3:", "has 1 numbers", "2 expressions"}},
+      {"damping: hinge.damping",
+       "damping: [hinge.damping, \"0\"]",
+       {"experiment.yaml:9:3:", "has 1 numbers", "2 expressions"}},
       {"joint/hinge/damping:", "body/bar/inertia:", {"experiment.yaml:9:3:", "has 3 numbers", "1 expressions"}},
   };
   for (const Case& test : cases) {
     const std::string message = MessageOf(kRobot, Replaced(kYaml, test.from, test.to));
     ASSERT_NE(message, "") << "accepted: " << test.to;
-    for (const char* part : test.says) EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
+    for (const char* part : test.says)
+      EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
   }
 }
 
@@ -74,9 +81,12 @@ TEST(BuildErrorsTest, TheMjcf) {
       {"joint=\"hinge\"/>", "joint=\"nowhere\"/>", "nowhere"},
       {"axis=\"0 1 0\"", "axis=\"0 0 0\"", "axis"},
       {"<option>", "<option timestep=\"0\">", "timestep"},
-      {"<motor name=\"motor\" joint=\"hinge\"/>", "<plugin name=\"motor\" joint=\"hinge\" plugin=\"no.such\"/>", "plugin"},
+      {"<motor name=\"motor\" joint=\"hinge\"/>", "<plugin name=\"motor\" joint=\"hinge\" plugin=\"no.such\"/>",
+       "plugin"},
       {"<actuator><motor name=\"motor\" joint=\"hinge\"/></actuator>",
-       "<extension><plugin plugin=\"gapscope.motor\"/></extension><actuator><plugin name=\"motor\" joint=\"hinge\" plugin=\"gapscope.motor\"><config key=\"law\" value=\"magic\"/></plugin></actuator>", "law"},
+       "<extension><plugin plugin=\"gapscope.motor\"/></extension><actuator><plugin name=\"motor\" joint=\"hinge\" "
+       "plugin=\"gapscope.motor\"><config key=\"law\" value=\"magic\"/></plugin></actuator>",
+       "law"},
   };
   for (const Case& test : cases) {
     const std::string message = MessageOf(Replaced(kRobot, test.from, test.to), kYaml);
@@ -107,18 +117,22 @@ TEST(BuildErrorsTest, EffectUses) {
   EXPECT_EQ(uses.value()[1].Text(), "torque_limit@motor");
   EXPECT_NE(message({"coulomb_fricton"}).find("did you mean 'coulomb_friction'?"), std::string::npos);
   EXPECT_NE(message({"coulomb_friction@hing"}).find("cannot act there"), std::string::npos);
-  EXPECT_NE(message({"coulomb_friction@motor"}).find("allowed: hinge"), std::string::npos) << message({"coulomb_friction@motor"});
+  EXPECT_NE(message({"coulomb_friction@motor"}).find("allowed: hinge"), std::string::npos)
+      << message({"coulomb_friction@motor"});
   EXPECT_NE(message({"spring_hardening"}).find("makes no sense"), std::string::npos);
   EXPECT_NE(message({"torque_delay"}).find("makes no sense"), std::string::npos);  // not a servo
   EXPECT_NE(message({"backlash", "backlash@hinge"}).find("stands twice"), std::string::npos);
-  for (const char* text : {"", "@", "@hinge", "coulomb_friction@", "coulomb_friction@@hinge", "coulomb_friction hinge", "\xff"}) {
+  for (const char* text :
+       {"", "@", "@hinge", "coulomb_friction@", "coulomb_friction@@hinge", "coulomb_friction hinge", "\xff"}) {
     EXPECT_NE(message({text}).find("--with"), std::string::npos) << text << ": " << message({text});
   }
 }
 
 TEST(ParameterWriterTest, RefusesWhatIsNotFiniteOrNotPhysical) {
   const Scratch scratch;
-  const std::string yaml = std::string(kYaml) + "  body/bar/mass: 1 - hinge.damping\n  body/bar/ipos: [\"1 / (hinge.damping - 0.5)\", \"0\", \"0\"]\n  body/bar/inertia: [\"0.01\", \"0.9 - hinge.damping\", \"0.01\"]\n";
+  const std::string yaml = std::string(kYaml) +
+                           "  body/bar/mass: 1 - hinge.damping\n  body/bar/ipos: [\"1 / (hinge.damping - 0.5)\", "
+                           "\"0\", \"0\"]\n  body/bar/inertia: [\"0.01\", \"0.9 - hinge.damping\", \"0.01\"]\n";
   const auto model = MakeModel(MakeExperiment(scratch, kRobot, yaml));
   ASSERT_NE(model, nullptr);
   const ModelPtr copy(mj_copyModel(nullptr, &model->compiled()));

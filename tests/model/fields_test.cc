@@ -82,7 +82,10 @@ TEST(FieldsTest, AWrittenFieldMovesAsTheMjcfsOwn) {
       {"actuator/servo/kp", {8}, "kp=\"4\"", "kp=\"8\""},
       {"actuator/servo/kv", {0.9}, "kv=\"0.3\"", "kv=\"0.9\""},
       {"actuator/servo/forcerange", {-1, 0.5}, "-3 3", "-1 0.5"},
-      {"actuator/pusher/gain", {3}, "<motor name=\"pusher\" joint=\"slide\"", "<general name=\"pusher\" joint=\"slide\" gainprm=\"3\""},
+      {"actuator/pusher/gain",
+       {3},
+       "<motor name=\"pusher\" joint=\"slide\"",
+       "<general name=\"pusher\" joint=\"slide\" gainprm=\"3\""},
       {"actuator/pusher/gear", {5}, "gear=\"2\"", "gear=\"5\""},
       {"actuator/pusher/ctrlrange", {-0.5, 1}, "-1.5 1.5", "-0.5 1"},
       {"actuator/general/gain", {1.5}, "gainprm=\"0.5\"", "gainprm=\"1.5\""},
@@ -104,7 +107,8 @@ TEST(FieldsTest, AWrittenFieldMovesAsTheMjcfsOwn) {
     ASSERT_TRUE(field.ok()) << field.error().Text();
     ASSERT_EQ(field.value().components.size(), test.values.size());
     const ModelPtr written(mj_copyModel(nullptr, base.get()));
-    for (std::size_t i = 0; i < test.values.size(); ++i) WriteComponent(*written, field.value().components[i], test.values[i]);
+    for (std::size_t i = 0; i < test.values.size(); ++i)
+      WriteComponent(*written, field.value().components[i], test.values[i]);
     const DataPtr scratch(mj_makeData(written.get()));
     if (field.value().derived) mj_setConst(written.get(), scratch.get());
     const ModelPtr expected = Compile(Replaced(kRobot, test.from, test.to));
@@ -133,14 +137,27 @@ TEST(FieldsTest, NumericsAreWrittenWhole) {
 
 TEST(FieldsTest, WrongFieldsNameTheNearest) {
   const ModelPtr model = Compile(kRobot);
-  const std::vector<std::array<const char*, 2>> cases = {
-      {"joint/hinge/dampng", "did you mean 'damping'?"},     {"joint/hing/damping", "did you mean 'hinge'?"},       {"joints/hinge/damping", "did you mean 'joint'?"},
-      {"body/amr/mass", "did you mean 'arm'?"},              {"body/arm/mas", "did you mean 'mass'?"},              {"actuator/serve/kp", "did you mean 'servo'?"},
-      {"actuator/servo/ki", "did you mean 'kp'?"},           {"tendon/bolt/stiffness", "did you mean 'belt'?"},     {"tendon/belt/length", "stiffness"},
-      {"numeric/nay", "no such numeric"},                    {"numeric/any/1", "no such numeric"},                  {"option/timestep", "option"},
-      {"joint/free/damping", "neither hinge nor slide"},     {"", "not a field"},                                   {"/", "not a field"},
-      {"joint", "not a field"},                              {"joint/", "not a field"},                             {"joint/hinge", "unknown field of a joint"},
-      {"//", "not a field"},                                {"joint//damping", "no such joint"},                   {"body/world/mass/x", "no such body"}};
+  const std::vector<std::array<const char*, 2>> cases = {{"joint/hinge/dampng", "did you mean 'damping'?"},
+                                                         {"joint/hing/damping", "did you mean 'hinge'?"},
+                                                         {"joints/hinge/damping", "did you mean 'joint'?"},
+                                                         {"body/amr/mass", "did you mean 'arm'?"},
+                                                         {"body/arm/mas", "did you mean 'mass'?"},
+                                                         {"actuator/serve/kp", "did you mean 'servo'?"},
+                                                         {"actuator/servo/ki", "did you mean 'kp'?"},
+                                                         {"tendon/bolt/stiffness", "did you mean 'belt'?"},
+                                                         {"tendon/belt/length", "stiffness"},
+                                                         {"numeric/nay", "no such numeric"},
+                                                         {"numeric/any/1", "no such numeric"},
+                                                         {"option/timestep", "option"},
+                                                         {"joint/free/damping", "neither hinge nor slide"},
+                                                         {"", "not a field"},
+                                                         {"/", "not a field"},
+                                                         {"joint", "not a field"},
+                                                         {"joint/", "not a field"},
+                                                         {"joint/hinge", "unknown field of a joint"},
+                                                         {"//", "not a field"},
+                                                         {"joint//damping", "no such joint"},
+                                                         {"body/world/mass/x", "no such body"}};
   for (const auto& [text, says] : cases) {
     const auto field = ResolveField(*model, text, "e.yaml:3:1");
     ASSERT_FALSE(field.ok()) << text;

@@ -27,7 +27,8 @@ TEST_P(ShippedTest, BuildsAndReproducesItsMjcf) {
   const DataPtr data(mj_makeData(written.get()));
   ParameterWriter writer(*model, written.get(), data.get());
   ASSERT_TRUE(writer.Write(model->Nominal(), ShippedLogValues(rig)));
-  // Deliberate: this rig gives another one's MJCF its own numbers; the servos' gravity is tilted by the published offset.
+  // Deliberate: this rig gives another one's MJCF its own numbers; the servos' gravity is tilted by the published
+  // offset.
   if (rig == "qube_simurlacra") return;
   // The MJCFs hold nine digits of what expressions compute; the servos' hold four.
   const double relative = rig == "xl330" || rig == "sts3032" ? 1e-4 : 1e-9;
@@ -38,29 +39,35 @@ TEST_P(ShippedTest, BuildsAndReproducesItsMjcf) {
     for (std::size_t i = 0; i < field.value().components.size(); ++i) {
       for (const FieldSlot& slot : field.value().components[i]) {
         const double mjcf = At(model->compiled(), slot), now = At(*written, slot);
-        EXPECT_NEAR(now, mjcf, relative * std::abs(mjcf)) << rig << ": " << setting.where << " " << setting.field << "[" << i << "]";
+        EXPECT_NEAR(now, mjcf, relative * std::abs(mjcf))
+            << rig << ": " << setting.where << " " << setting.field << "[" << i << "]";
       }
     }
   }
   // MuJoCo's derived constants follow.
-  for (int i = 0; i < written->nv; ++i) EXPECT_NEAR(written->dof_M0[i], model->compiled().dof_M0[i], 1e-4 * model->compiled().dof_M0[i]) << rig;
+  for (int i = 0; i < written->nv; ++i)
+    EXPECT_NEAR(written->dof_M0[i], model->compiled().dof_M0[i], 1e-4 * model->compiled().dof_M0[i]) << rig;
 }
 
 TEST_P(ShippedTest, MovesAsItsMjcfWhenDrivenByMuJoCoAlone) {
   const std::string rig = GetParam();
-  if (rig == "qube_simurlacra" || rig == "xl330" || rig == "sts3032" || rig == "ak80") return;  // see above; and gains that logs bring
+  if (rig == "qube_simurlacra" || rig == "xl330" || rig == "sts3032" || rig == "ak80")
+    return;  // see above; and gains that logs bring
   const Experiment experiment = ShippedExperiment(rig);
   const auto model = MakeModel(experiment);
   const mjModel& m = model->compiled();
-  const Recording recording = MakeRecording(experiment, 200, m.opt.timestep, [](int c, double t) { return c == 0 ? Exciting(t, 0.5) : 0; });
+  const Recording recording =
+      MakeRecording(experiment, 200, m.opt.timestep, [](int c, double t) { return c == 0 ? Exciting(t, 0.5) : 0; });
   const auto predicted = Predict(*model, recording);
   const DataPtr d(mj_makeData(&m));
   double difference = 0;
   for (std::size_t k = 0; k + 1 < recording.rows(); ++k) {
-    for (std::size_t c = 0; c < recording.commands.size(); ++c) d->ctrl[model->command_actuators()[c]] = recording.commands[c].values[k];
+    for (std::size_t c = 0; c < recording.commands.size(); ++c)
+      d->ctrl[model->command_actuators()[c]] = recording.commands[c].values[k];
     mj_step(&m, d.get());
     for (std::size_t s = 0; s < predicted.size(); ++s) {
-      if (experiment.measured[s].kind == SignalKind::kPosition) difference = std::max(difference, std::abs(predicted[s][k + 1] - d->qpos[model->source(s).qpos]));
+      if (experiment.measured[s].kind == SignalKind::kPosition)
+        difference = std::max(difference, std::abs(predicted[s][k + 1] - d->qpos[model->source(s).qpos]));
     }
   }
   // Numbers of the MJCF against expressions of the parameters: rounding only.
@@ -68,7 +75,8 @@ TEST_P(ShippedTest, MovesAsItsMjcfWhenDrivenByMuJoCoAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Rigs, ShippedTest,
-                         ::testing::Values("joint", "qube", "flexjoint", "flexlink", "xl330", "sts3032", "ak80", "qube_simurlacra", "qube_koopman", "flexlink_2dsfl"),
+                         ::testing::Values("joint", "qube", "flexjoint", "flexlink", "xl330", "sts3032", "ak80",
+                                           "qube_simurlacra", "qube_koopman", "flexlink_2dsfl"),
                          [](const auto& test) { return std::string(test.param); });
 
 }  // namespace

@@ -35,7 +35,8 @@ set:
 TEST(DrivenInertiaTest, HandNumbers) {
   const Scratch scratch;
   const auto model = MakeModel(MakeExperiment(scratch, kRobot, kYaml));
-  // A quarter turn about y carries the frame's x to -z: about z stands the first diagonal, 0.03. Arm (0.3, 0.4) from the hinge: 2 * 0.25.
+  // A quarter turn about y carries the frame's x to -z: about z stands the first diagonal, 0.03. Arm (0.3, 0.4) from
+  // the hinge: 2 * 0.25.
   EXPECT_NEAR(DrivenInertia(model->compiled(), 0), 0.004 + 0.03 + 2 * 0.25, 1e-12);
   const auto joint = MakeModel(ShippedExperiment("joint"));
   EXPECT_NEAR(DrivenInertia(joint->compiled(), 0), 0.159221308, 1e-12);
@@ -81,8 +82,13 @@ TEST_P(SplitTest, ConservesTheInertiaWhateverTheShareAndTheMass) {
 
 TEST_P(SplitTest, KeepsTheMomentumOfAPush) {
   const Scratch scratch;
-  const Experiment experiment = MakeExperiment(scratch, Replaced(Replaced(kRobot, "damping=\"0.02\"", ""), "<body name=\"tip\"", "<body name=\"tip\" childclass=\"main\""), kYaml);
-  const auto model = MakeModel(experiment, {{GetParam(), "hinge"}}, {{"hinge", {.torque_n_m = 1, .angle_rad = 0.05, .speed_rad_per_s = 1, .inertia_kg_m2 = 0.534}}});
+  const Experiment experiment = MakeExperiment(scratch,
+                                               Replaced(Replaced(kRobot, "damping=\"0.02\"", ""), "<body name=\"tip\"",
+                                                        "<body name=\"tip\" childclass=\"main\""),
+                                               kYaml);
+  const auto model =
+      MakeModel(experiment, {{GetParam(), "hinge"}},
+                {{"hinge", {.torque_n_m = 1, .angle_rad = 0.05, .speed_rad_per_s = 1, .inertia_kg_m2 = 0.534}}});
   ASSERT_NE(model, nullptr);
   const mjModel& m = model->compiled();
   const Recording recording = MakeRecording(experiment, 251, 0.002, [](int, double t) { return t < 0.1 ? 1.0 : 0.0; });
@@ -95,11 +101,13 @@ TEST_P(SplitTest, KeepsTheMomentumOfAPush) {
   const mjData& d = simulator.data();
   std::vector<mjtNum> product(static_cast<std::size_t>(m.nv));
   mj_mulM(&simulator.mujoco_model(), &d, product.data(), d.qvel);
-  momentum = product[static_cast<std::size_t>(m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, "hinge")])] + product[static_cast<std::size_t>(m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, "hinge.motor")])];
+  momentum = product[static_cast<std::size_t>(m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, "hinge")])] +
+             product[static_cast<std::size_t>(m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, "hinge.motor")])];
   EXPECT_NEAR(momentum, 0.1, 0.002);
 }
 
-INSTANTIATE_TEST_SUITE_P(Effects, SplitTest, ::testing::Values("backlash", "joint_compliance"), [](const auto& test) { return std::string(test.param); });
+INSTANTIATE_TEST_SUITE_P(Effects, SplitTest, ::testing::Values("backlash", "joint_compliance"),
+                         [](const auto& test) { return std::string(test.param); });
 
 }  // namespace
 }  // namespace gapscope::testing

@@ -28,7 +28,9 @@ std::map<std::string, double> ShippedLogValues(const std::string& rig) {
   return {};
 }
 
-Recording MakeRecording(const Experiment& experiment, int rows, double step_s, const std::function<double(int, double)>& command, const std::map<std::string, double>& values) {
+Recording MakeRecording(const Experiment& experiment, int rows, double step_s,
+                        const std::function<double(int, double)>& command,
+                        const std::map<std::string, double>& values) {
   Recording recording;
   recording.log_path = "synthetic";
   recording.values = values;
@@ -39,14 +41,18 @@ Recording MakeRecording(const Experiment& experiment, int rows, double step_s, c
     recording.commands.push_back(std::move(column));
   }
   for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
-    recording.measured.push_back({.spec = experiment.measured[i], .index = i, .column = "synthetic", .values = std::vector<double>(recording.rows(), 0.0)});
+    recording.measured.push_back({.spec = experiment.measured[i],
+                                  .index = i,
+                                  .column = "synthetic",
+                                  .values = std::vector<double>(recording.rows(), 0.0)});
   }
   recording.timeline.time_s = recording.time_s;
   recording.timeline.median_step_s = recording.timeline.shortest_step_s = recording.timeline.longest_step_s = step_s;
   return recording;
 }
 
-std::shared_ptr<const Model> MakeModel(const Experiment& experiment, const std::vector<EffectUse>& effects, const ScaleTable& scales) {
+std::shared_ptr<const Model> MakeModel(const Experiment& experiment, const std::vector<EffectUse>& effects,
+                                       const ScaleTable& scales) {
   const auto built = Model::Build(experiment, effects, scales);
   EXPECT_TRUE(built.ok()) << built.error().Text();
   return built.ok() ? built.value() : nullptr;
@@ -64,10 +70,13 @@ std::vector<double> ValuesWith(const Model& model, const std::map<std::string, d
 
 InitialState AtRest(const Model& model) {
   const mjModel& m = model.compiled();
-  return {.qpos = std::vector<double>(m.qpos0, m.qpos0 + m.nq), .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
+  return {.qpos = std::vector<double>(m.qpos0, m.qpos0 + m.nq),
+          .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
 }
 
-std::vector<std::vector<double>> Predict(const Model& model, const Recording& recording, const std::map<std::string, double>& set, const InitialState* start, double max_step_s) {
+std::vector<std::vector<double>> Predict(const Model& model, const Recording& recording,
+                                         const std::map<std::string, double>& set, const InitialState* start,
+                                         double max_step_s) {
   Simulator simulator(model, max_step_s);
   EXPECT_TRUE(simulator.SetParameters(ValuesWith(model, set), recording));
   const std::size_t signals = recording.measured.size();

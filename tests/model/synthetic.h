@@ -24,15 +24,19 @@ Experiment ShippedExperiment(const std::string& rig);
 std::map<std::string, double> ShippedLogValues(const std::string& rig);
 
 // Rows every `step_s`; command c of the experiment is command(c, t); every measured signal is there and zero.
-Recording MakeRecording(const Experiment& experiment, int rows, double step_s, const std::function<double(int command, double t_s)>& command,
+Recording MakeRecording(const Experiment& experiment, int rows, double step_s,
+                        const std::function<double(int command, double t_s)>& command,
                         const std::map<std::string, double>& values = {});
 
 // Fails the test on an error; null then.
-std::shared_ptr<const Model> MakeModel(const Experiment& experiment, const std::vector<EffectUse>& effects = {}, const ScaleTable& scales = {});
+std::shared_ptr<const Model> MakeModel(const Experiment& experiment, const std::vector<EffectUse>& effects = {},
+                                       const ScaleTable& scales = {});
 
-// Predicted signals [signal][row] of a run from rest at qpos0 (or from `start`), at nominal values with `set` written over them.
-std::vector<std::vector<double>> Predict(const Model& model, const Recording& recording, const std::map<std::string, double>& set = {}, const InitialState* start = nullptr,
-                                         double max_step_s = 0);
+// Predicted signals [signal][row] of a run from rest at qpos0 (or from `start`), at nominal values with `set` written
+// over them.
+std::vector<std::vector<double>> Predict(const Model& model, const Recording& recording,
+                                         const std::map<std::string, double>& set = {},
+                                         const InitialState* start = nullptr, double max_step_s = 0);
 // Nominal values with `set` written over them; fails the test on an unknown name.
 std::vector<double> ValuesWith(const Model& model, const std::map<std::string, double>& set);
 InitialState AtRest(const Model& model);

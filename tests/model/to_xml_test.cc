@@ -20,7 +20,8 @@ ModelPtr Load(const std::string& xml) {
 // Plain MuJoCo: the command of each row is held to the next.
 std::vector<double> Roll(const mjModel* m, const Model& model, const Recording& recording, int steps) {
   const DataPtr d(mj_makeData(m));
-  const int qpos = m->jnt_qposadr[mj_name2id(m, mjOBJ_JOINT, mj_id2name(&model.compiled(), mjOBJ_JOINT, model.source(0).joint))];
+  const int qpos =
+      m->jnt_qposadr[mj_name2id(m, mjOBJ_JOINT, mj_id2name(&model.compiled(), mjOBJ_JOINT, model.source(0).joint))];
   std::vector<double> q;
   for (std::size_t k = 0; k < recording.rows(); ++k) {
     q.push_back(d->qpos[qpos]);
@@ -66,23 +67,30 @@ TEST_P(ToXmlTest, ReplaysLikeTheModelItWasMadeFrom) {
   ASSERT_TRUE(xml.ok()) << xml.error().Text();
   const ModelPtr loaded = Load(xml.value());
   ASSERT_TRUE(loaded);
-  const std::vector<double> ours = Predict(*model, recording, set)[0], theirs = Roll(loaded.get(), *model, recording, 1);
+  const std::vector<double> ours = Predict(*model, recording, set)[0],
+                            theirs = Roll(loaded.get(), *model, recording, 1);
   // The XML holds what MuJoCo's writer prints; a delay is the log's shift here and the motor's own there.
   constexpr double kPrinted = 1e-5;
   EXPECT_LT(LargestDifference(ours, theirs), kPrinted * Largest(ours));
 }
 
-INSTANTIATE_TEST_SUITE_P(Exports, ToXmlTest,
-                         ::testing::Values(Export{"joint", {}}, Export{"qube", {}}, Export{"flexjoint", {}}, Export{"flexlink", {}}, Export{"xl330", {}}, Export{"joint", {"coulomb_friction"}},
-                                           Export{"joint", {"stribeck_friction", "torque_limit"}}, Export{"joint", {"command_delay"}}, Export{"joint", {"actuator_lag", "cogging"}},
-                                           Export{"joint", {"backlash"}}, Export{"flexjoint", {"joint_compliance"}}, Export{"joint", {"torque_delay", "load_friction"}}, Export{"qube", {"cable_spring@arm", "coulomb_friction@arm"}},
-                                           Export{"qube", {"dead_zone", "gravity_offset@arm"}}, Export{"flexjoint", {"spring_hardening", "quadratic_drag@link"}}, Export{"xl330", {"load_friction", "torque_delay"}}),
-                         [](const auto& test) {
-                           std::string name = test.param.rig;
-                           for (const char* effect : test.param.effects) name += std::string("_") + effect;
-                           std::replace(name.begin(), name.end(), '@', '_');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Exports, ToXmlTest,
+    ::testing::Values(Export{"joint", {}}, Export{"qube", {}}, Export{"flexjoint", {}}, Export{"flexlink", {}},
+                      Export{"xl330", {}}, Export{"joint", {"coulomb_friction"}},
+                      Export{"joint", {"stribeck_friction", "torque_limit"}}, Export{"joint", {"command_delay"}},
+                      Export{"joint", {"actuator_lag", "cogging"}}, Export{"joint", {"backlash"}},
+                      Export{"flexjoint", {"joint_compliance"}}, Export{"joint", {"torque_delay", "load_friction"}},
+                      Export{"qube", {"cable_spring@arm", "coulomb_friction@arm"}},
+                      Export{"qube", {"dead_zone", "gravity_offset@arm"}},
+                      Export{"flexjoint", {"spring_hardening", "quadratic_drag@link"}},
+                      Export{"xl330", {"load_friction", "torque_delay"}}),
+    [](const auto& test) {
+      std::string name = test.param.rig;
+      for (const char* effect : test.param.effects) name += std::string("_") + effect;
+      std::replace(name.begin(), name.end(), '@', '_');
+      return name;
+    });
 
 }  // namespace
 }  // namespace gapscope::testing

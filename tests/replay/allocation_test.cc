@@ -14,12 +14,14 @@ TEST(AllocationTest, RunAllocatesNothing) {
   for (const char* rig : {"joint", "qube", "xl330"}) {
     const Experiment experiment = ShippedExperiment(rig);
     const auto base = MakeModel(experiment);
-    std::vector<std::string> texts = {"command_delay", "coulomb_friction", "stribeck_friction", "actuator_lag", "sensor_delay"};
+    std::vector<std::string> texts = {"command_delay", "coulomb_friction", "stribeck_friction", "actuator_lag",
+                                      "sensor_delay"};
     if (std::string(rig) == "xl330") texts = {"load_friction", "torque_delay", "sensor_delay"};
     const auto uses = base->ParseEffects(texts);
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     const auto model = MakeModel(experiment, uses.value());
-    const Recording recording = MakeRecording(experiment, 200, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.3) : 1.0; }, ShippedLogValues(rig));
+    const Recording recording = MakeRecording(
+        experiment, 200, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.3) : 1.0; }, ShippedLogValues(rig));
     std::vector<double> values = model->Nominal();
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (model->parameters()[i].name.find("delay_s") != std::string::npos) values[i] = 0.0031;
@@ -38,7 +40,8 @@ TEST(AllocationTest, RunAllocatesNothing) {
     mj_resetData(plain.get(), data.get());
     const long of_a_reset = NewsSoFar() - before_reset;
     const long before = NewsSoFar();
-    for (int i = 0; i < 5; ++i) (void)simulator.Run(recording, {static_cast<std::size_t>(10 * i), recording.rows()}, start, predicted);
+    for (int i = 0; i < 5; ++i)
+      (void)simulator.Run(recording, {static_cast<std::size_t>(10 * i), recording.rows()}, start, predicted);
     mju_user_malloc = nullptr;
     EXPECT_EQ(NewsSoFar() - before, 5 * of_a_reset) << rig;
     EXPECT_LE(of_a_reset, 2) << rig;

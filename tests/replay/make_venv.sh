@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# make_venv.sh VENV CACHE: a virtual environment with the stock `mujoco` package of the pinned version, for the equality test. Wheels come from CACHE,
-# which scripts/setup fills; what is missing there is fetched once and kept there. Exit status 77 (skip): no network and no wheel.
+# make_venv.sh VENV CACHE: a virtual environment with the stock `mujoco` package of the pinned version, for the equality
+# test. Wheels come from CACHE, which scripts/setup fills; what is missing there is fetched once and kept there.
+# Exit status 77 (skip): no network and no wheel.
 set -euo pipefail
 venv=$1 cache=$2
 packages=(mujoco-core==4.0.1 numpy)

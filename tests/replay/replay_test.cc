@@ -14,7 +14,8 @@ namespace {
 
 // Begins at rest, as a log should: for 30 ms nothing is commanded.
 Recording Log(const Model& model, double amplitude, int rows = 600, double step_s = 0.002) {
-  return MakeRecording(model.experiment(), rows, step_s, [=](int c, double t) { return c == 0 && t >= 0.03 ? Exciting(t, amplitude) : 0; });
+  return MakeRecording(model.experiment(), rows, step_s,
+                       [=](int c, double t) { return c == 0 && t >= 0.03 ? Exciting(t, amplitude) : 0; });
 }
 
 // The log that the model itself would have made.
@@ -25,7 +26,9 @@ Recording OwnLog(const Model& model, double amplitude, double step_s, int rows =
   return recording;
 }
 
-bool SameBytes(const std::vector<double>& a, const std::vector<double>& b) { return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0; }
+bool SameBytes(const std::vector<double>& a, const std::vector<double>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
 
 TEST(MakeWindowsTest, CoverEveryRowOnce) {
   Recording r;
@@ -70,18 +73,22 @@ TEST_P(OwnLogTest, ReplaysWithoutError) {
   EXPECT_EQ(replay.logs[0].outcome, Outcome::kCompleted);
   // From rest at the initial pose the log's own first row is the initial state, to the bit.
   EXPECT_EQ(ReplayError(replay.logs), 0);
-  for (const SignalTrace& signal : replay.logs[0].signals) EXPECT_TRUE(SameBytes(signal.measured, signal.predicted)) << signal.signal;
+  for (const SignalTrace& signal : replay.logs[0].signals)
+    EXPECT_TRUE(SameBytes(signal.measured, signal.predicted)) << signal.signal;
   EXPECT_EQ(replay.steps, static_cast<std::size_t>(std::lround(599 * 0.002 / step_s)));
   EXPECT_NEAR(replay.simulated_s, 599 * 0.002, 1e-12);
   // Windows start from a local fit of the log: small errors, no more.
-  const ReplayResult windows = Replay(*model, {log}, {.mode = ReplayMode::kWindows, .window_s = 0.2, .time_step_s = step_s}, pool);
+  const ReplayResult windows =
+      Replay(*model, {log}, {.mode = ReplayMode::kWindows, .window_s = 0.2, .time_step_s = step_s}, pool);
   EXPECT_EQ(windows.logs[0].windows, 6u);
   constexpr double kWindowStart = 0.1;  // a window may begin amid a step of the command, which the fit smooths
   EXPECT_LT(ReplayError(windows.logs), kWindowStart);
-  EXPECT_TRUE(std::isnan(windows.logs[0].signals[0].predicted[0])) << "a window's first row says nothing about the model";
+  EXPECT_TRUE(std::isnan(windows.logs[0].signals[0].predicted[0]))
+      << "a window's first row says nothing about the model";
 }
 
-INSTANTIATE_TEST_SUITE_P(Rigs, OwnLogTest, ::testing::Values("joint", "qube", "flexjoint", "flexlink"), [](const auto& test) { return std::string(test.param); });
+INSTANTIATE_TEST_SUITE_P(Rigs, OwnLogTest, ::testing::Values("joint", "qube", "flexjoint", "flexlink"),
+                         [](const auto& test) { return std::string(test.param); });
 
 TEST(ReplayTest, SameBytesForAnyNumberOfWorkers) {
   const auto model = MakeModel(ShippedExperiment("qube"));
@@ -104,7 +111,8 @@ TEST(ReplayTest, SameBytesForAnyNumberOfWorkers) {
       EXPECT_EQ(results[i].time_step_error, results[0].time_step_error);
       EXPECT_EQ(results[i].steps, results[0].steps);
       for (std::size_t l = 0; l < logs.size(); ++l) {
-        for (std::size_t s = 0; s < 2; ++s) EXPECT_TRUE(SameBytes(results[i].logs[l].signals[s].predicted, results[0].logs[l].signals[s].predicted));
+        for (std::size_t s = 0; s < 2; ++s)
+          EXPECT_TRUE(SameBytes(results[i].logs[l].signals[s].predicted, results[0].logs[l].signals[s].predicted));
       }
     }
   }
@@ -136,8 +144,8 @@ TEST(ReplayTest, ParametersThatMakeNoModelAreADivergence) {
 
 TEST(ReplayErrorTest, HandNumbers) {
   LogReplay log;
-  log.signals.push_back({.signal = "a", .measured = {0, 2, 0, 2}, .predicted = {1, 3, 1, 3}});             // RMSE 1, deviation 1
-  log.signals.push_back({.signal = "b", .measured = {0, 4, 0, 4}, .predicted = {0, 4, 0, 4}});             // 0
+  log.signals.push_back({.signal = "a", .measured = {0, 2, 0, 2}, .predicted = {1, 3, 1, 3}});  // RMSE 1, deviation 1
+  log.signals.push_back({.signal = "b", .measured = {0, 4, 0, 4}, .predicted = {0, 4, 0, 4}});  // 0
   log.signals.push_back({.signal = "c", .scored = false, .measured = {0, 1, 0, 1}, .predicted = {9, 9, 9, 9}});
   EXPECT_DOUBLE_EQ(ReplayError({log}), std::sqrt(0.5));
   log.signals[1].predicted = {NAN, 6, 2, NAN};  // two rows of error 2, deviation 2
@@ -151,11 +159,16 @@ TEST(ReplayErrorTest, HandNumbers) {
 }
 
 Experiment SpringRig(const Scratch& scratch, const char* integrator, double stiffness, double step_s) {
-  return MakeExperiment(scratch,
-                        "<mujoco><option timestep=\"" + std::to_string(step_s) + "\" gravity=\"0 0 0\" integrator=\"" + integrator +
-                            "\"><flag contact=\"disable\"/></option><worldbody><body><joint name=\"hinge\" axis=\"0 0 1\" damping=\"0.02\" stiffness=\"" + std::to_string(stiffness) +
-                            "\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.02 0.02 0.02\"/></body></worldbody><actuator><motor name=\"motor\" joint=\"hinge\"/></actuator></mujoco>",
-                        "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, unit: rad}\n");
+  return MakeExperiment(
+      scratch,
+      "<mujoco><option timestep=\"" + std::to_string(step_s) + "\" gravity=\"0 0 0\" integrator=\"" + integrator +
+          "\"><flag contact=\"disable\"/></option><worldbody><body><joint name=\"hinge\" axis=\"0 0 1\" "
+          "damping=\"0.02\" stiffness=\"" +
+          std::to_string(stiffness) +
+          "\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.02 0.02 0.02\"/></body></worldbody><actuator><motor "
+          "name=\"motor\" joint=\"hinge\"/></actuator></mujoco>",
+      "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, "
+      "unit: rad}\n");
 }
 
 class ChooseTimeStepTest : public ::testing::Test {

@@ -16,9 +16,13 @@ constexpr double kInertia = 0.02, kDamping = 0.05;
 // RK4 at 1 ms: (h b / J)^5 / 120 a step.
 constexpr double kIntegration = 1e-10;
 
-std::string Mjcf(const std::string& joint = "damping=\"0.05\"", const std::string& actuators = "<motor name=\"motor\" joint=\"hinge\"/>") {
-  return "<mujoco><compiler angle=\"radian\"/><option timestep=\"0.001\" integrator=\"RK4\" gravity=\"0 0 0\"><flag contact=\"disable\"/></option><worldbody><body name=\"disc\"><joint name=\"hinge\" axis=\"0 0 1\" " +
-         joint + "/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.015 0.015 0.02\"/></body></worldbody><actuator>" + actuators + "</actuator></mujoco>";
+std::string Mjcf(const std::string& joint = "damping=\"0.05\"",
+                 const std::string& actuators = "<motor name=\"motor\" joint=\"hinge\"/>") {
+  return "<mujoco><compiler angle=\"radian\"/><option timestep=\"0.001\" integrator=\"RK4\" gravity=\"0 0 0\"><flag "
+         "contact=\"disable\"/></option><worldbody><body name=\"disc\"><joint name=\"hinge\" axis=\"0 0 1\" " +
+         joint +
+         "/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.015 0.015 0.02\"/></body></worldbody><actuator>" +
+         actuators + "</actuator></mujoco>";
 }
 constexpr const char* kYaml = R"(commands:
   - {actuator: motor, column: u, unit: N m}
@@ -62,7 +66,8 @@ std::vector<State> Exact(const Recording& r, double delay_s = 0) {
       // What acts at t: the last command sent at or before t - delay; until when.
       std::size_t held = 0;
       while (held + 1 < r.rows() && r.time_s[held + 1] + delay_s <= t + 1e-13) ++held;
-      const double until = held + 1 < r.rows() ? std::min(r.time_s[held + 1] + delay_s, r.time_s[k + 1]) : r.time_s[k + 1];
+      const double until =
+          held + 1 < r.rows() ? std::min(r.time_s[held + 1] + delay_s, r.time_s[k + 1]) : r.time_s[k + 1];
       s = Held(s, u[held], until - t);
       t = until;
     }
@@ -155,7 +160,9 @@ TEST_F(SimulatorTest, AnOffsetIsAddedToThePrediction) {
 TEST_F(SimulatorTest, DivergenceIsAnOutcomeWithItsTime) {
   // A negative spring: q grows by exp(sqrt(k / J) t) and passes 10^6 rad at t = ln(2e6 / q0) / sqrt(k / J).
   const Scratch scratch;
-  const Experiment experiment = MakeExperiment(scratch, Mjcf("", "<general name=\"motor\" joint=\"hinge\" gainprm=\"1\" biastype=\"affine\" biasprm=\"0 8 0\"/>"), kYaml);
+  const Experiment experiment = MakeExperiment(
+      scratch,
+      Mjcf("", "<general name=\"motor\" joint=\"hinge\" gainprm=\"1\" biastype=\"affine\" biasprm=\"0 8 0\"/>"), kYaml);
   const auto model = MakeModel(experiment);
   const Recording recording = MakeRecording(experiment, 1001, 0.002, [](int, double) { return 0.0; });
   Simulator simulator(*model, 0);
@@ -176,7 +183,10 @@ TEST_F(SimulatorTest, DivergenceIsAnOutcomeWithItsTime) {
 TEST_F(SimulatorTest, AStepTooLongForTheModelDivergesToo) {
   // Explicit integration of a stiff damper: w' = -5000 w at 2 ms.
   const Scratch scratch;
-  const Experiment experiment = MakeExperiment(scratch, Mjcf("", "<general name=\"motor\" joint=\"hinge\" gainprm=\"1\" biastype=\"affine\" biasprm=\"0 0 -100\"/>"), kYaml);
+  const Experiment experiment = MakeExperiment(
+      scratch,
+      Mjcf("", "<general name=\"motor\" joint=\"hinge\" gainprm=\"1\" biastype=\"affine\" biasprm=\"0 0 -100\"/>"),
+      kYaml);
   const auto model = MakeModel(experiment);
   const Recording recording = MakeRecording(experiment, 200, 0.002, [](int, double) { return 1.0; });
   Simulator simulator(*model, 0.002);
@@ -188,7 +198,8 @@ TEST_F(SimulatorTest, AStepTooLongForTheModelDivergesToo) {
 
 class DelayTest : public SimulatorTest {
  protected:
-  std::vector<std::vector<double>> Delayed(const Recording& recording, const char* effect, double delay_s, double step_s = 0) {
+  std::vector<std::vector<double>> Delayed(const Recording& recording, const char* effect, double delay_s,
+                                           double step_s = 0) {
     const auto uses = model_->ParseEffects({effect});
     EXPECT_TRUE(uses.ok());
     const auto model = MakeModel(experiment_, uses.value());
@@ -197,7 +208,8 @@ class DelayTest : public SimulatorTest {
 };
 
 TEST_F(DelayTest, WholeSamplesAreAnExactShift) {
-  Recording recording = MakeRecording(experiment_, 300, 0.002, [](int, double t) { return std::sin(20 * t) + (t > 0.3 ? 0.5 : 0); });
+  Recording recording =
+      MakeRecording(experiment_, 300, 0.002, [](int, double t) { return std::sin(20 * t) + (t > 0.3 ? 0.5 : 0); });
   const auto late = Delayed(recording, "command_delay", 7 * 0.002);
   Recording shifted = recording;
   auto& u = shifted.commands[0].values;
@@ -211,11 +223,14 @@ TEST_F(DelayTest, AFractionalDelayOfHeldCommandsIsTheLinearSystemsOwn) {
   const Recording recording = Irregular(experiment_, 200);
   for (const double delay_s : {0.0004, 0.00137, 0.0101, 0.05}) {
     const auto late = Delayed(recording, "command_delay", delay_s);
-    // A step gets the mean of what acts during it: the impulse is exact, its place within the step is not; u h^2 / (8 J) per switch, of either sign.
+    // A step gets the mean of what acts during it: the impulse is exact, its place within the step is not; u h^2 / (8
+    // J) per switch, of either sign.
     constexpr double kWithinStep = 3e-5;
     EXPECT_LT(WorstAngle(late[0], Exact(recording, delay_s)), kWithinStep) << delay_s;
     // Four times finer: sixteen times better, within what random signs leave.
-    EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s, 0.00025)[0], Exact(recording, delay_s)), kWithinStep / 4) << delay_s;
+    EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s, 0.00025)[0], Exact(recording, delay_s)),
+              kWithinStep / 4)
+        << delay_s;
   }
 }
 
@@ -246,13 +261,20 @@ measured:
   - {signal: w, column: w, kind: velocity, joint: hinge}
   - {signal: tau, column: tau, kind: torque, actuator: motor}
 )";
-  const Experiment experiment = MakeExperiment(scratch, Mjcf("damping=\"0.05\"", "<position name=\"motor\" joint=\"hinge\" kp=\"3\" kv=\"0.2\"/><motor name=\"feedforward\" joint=\"hinge\"/>"), yaml);
+  const Experiment experiment = MakeExperiment(scratch,
+                                               Mjcf("damping=\"0.05\"",
+                                                    "<position name=\"motor\" joint=\"hinge\" kp=\"3\" "
+                                                    "kv=\"0.2\"/><motor name=\"feedforward\" joint=\"hinge\"/>"),
+                                               yaml);
   const auto model = MakeModel(experiment);
-  const Recording recording = MakeRecording(experiment, 200, 0.002, [](int c, double t) { return c == 0 ? (std::fmod(t, 0.05) < 0.025 ? 0.4 : -0.4) : 0.1 * std::sin(40 * t); });
+  const Recording recording = MakeRecording(experiment, 200, 0.002, [](int c, double t) {
+    return c == 0 ? (std::fmod(t, 0.05) < 0.025 ? 0.4 : -0.4) : 0.1 * std::sin(40 * t);
+  });
   const auto predicted = Predict(*model, recording);
   for (std::size_t k = 0; k < 200; ++k) {
     const std::size_t before = k > 0 ? k - 1 : 0;
-    const double expected = 3 * (recording.commands[0].values[before] - predicted[0][k]) - 0.2 * predicted[1][k] + recording.commands[1].values[before];
+    const double expected = 3 * (recording.commands[0].values[before] - predicted[0][k]) - 0.2 * predicted[1][k] +
+                            recording.commands[1].values[before];
     ASSERT_NEAR(predicted[2][k], expected, 1e-12) << k;
   }
   // Reading a torque changes no motion.
@@ -267,15 +289,20 @@ measured:
 TEST_F(SimulatorTest, TheDrivesOwnEstimateIsReadWhereThereIsOne) {
   const Experiment joint = ShippedExperiment("joint");
   const auto base = MakeModel(joint);
-  const Recording recording = MakeRecording(joint, 300, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.5) : 0; });
+  const Recording recording =
+      MakeRecording(joint, 300, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.5) : 0; });
   const ScaleTable scales = EstimateScales(*base, {recording});
   const auto uses = base->ParseEffects({"torque_constant_droop"});
   const auto model = MakeModel(joint, uses.value(), scales);
   const auto plain = Predict(*base, recording), neutral = Predict(*model, recording);
   EXPECT_LT(LargestDifference(plain[2], neutral[2]), 1e-9 * Largest(plain[2]));
-  // With droop the estimate still is nominal torque constant times current: kp and kd of the motion, not the lesser torque.
+  // With droop the estimate still is nominal torque constant times current: kp and kd of the motion, not the lesser
+  // torque.
   const auto droop = Predict(*model, recording, {{uses.value()[0].Text() + ".loss_at_peak", 0.4}});
-  for (std::size_t k = 1; k < 300; ++k) ASSERT_NEAR(droop[2][k], 157.1451 * (recording.commands[0].values[k - 1] - droop[0][k]) - 7.0729 * droop[1][k], 1e-9) << k;
+  for (std::size_t k = 1; k < 300; ++k)
+    ASSERT_NEAR(droop[2][k], 157.1451 * (recording.commands[0].values[k - 1] - droop[0][k]) - 7.0729 * droop[1][k],
+                1e-9)
+        << k;
   EXPECT_GT(LargestDifference(droop[0], plain[0]), 1e-3);
 }
 

@@ -128,6 +128,7 @@ std::string DoTask(const ordered_json& plan, const std::string& log, const std::
   if (!tuned.ok()) return failed(tuned.error());
   ordered_json result = ordered_json::parse(TuneJson(tuned.value(), *session.model, options.solve.seed));
   result.erase("wall_s");
+  result.erase("solve_s");
   return ordered_json{{"log", log}, {"task", task}, {"result", result}}.dump(2);
 }
 

@@ -60,7 +60,7 @@ std::string TuneTable(const TuneSummary& summary, const Model& model) {
 
 std::string TuneJson(const TuneSummary& summary, const Model& model, std::uint64_t seed) {
   ordered_json json = {{"schema", "gapscope.tune/1"}, {"optimizer", summary.optimizer}, {"termination", TerminationText(summary.termination)}, {"starts_agree", summary.starts_agree},
-                       {"starts", summary.start_costs.size()}, {"evaluations", summary.evaluations}, {"replays", summary.replays}, {"wall_s", summary.wall_s}};
+                       {"starts", summary.start_costs.size()}, {"evaluations", summary.evaluations}, {"replays", summary.replays}, {"wall_s", summary.wall_s}, {"solve_s", summary.solve_s}};
   json["parameters"] = ordered_json::array();
   for (const auto& t : summary.tuned) {
     const Parameter& p = model.parameters()[t.index];

@@ -122,6 +122,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   if (!options.journal.empty()) {
     GS_ASSIGN(journal, Journal::Open(options.journal, JobKey(model, data, start, options), options.resume));
   }
+  const auto solve_begin = std::chrono::steady_clock::now();
   // Windows first: they converge from far; the free run then sees what is slow, when it can be simulated at all.
   const auto solve_from = [&](const FitPoint* random, std::vector<double>* values, FitProblem** last, std::vector<std::unique_ptr<FitProblem>>* problems) -> SolveResult {
     TuneOptions stage = options;
@@ -185,6 +186,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   if (best.termination == Termination::kNotSimulated) {
     return Error{.what = "the model cannot be simulated at the start of the fit", .where = model.experiment().path, .cure = "check the parameters' nominal values, or use shorter windows (--window)"};
   }
+  summary.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - solve_begin).count();
   summary.termination = best.termination;
   for (const double cost : summary.start_costs) summary.starts_agree = summary.starts_agree && cost <= best.cost * (1 + kAgree);
   summary.shift_s = best_problem->Shift(best.point);

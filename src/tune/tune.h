@@ -52,7 +52,7 @@ struct TuneSummary {
   bool starts_agree = true;
   std::vector<double> start_costs;
   std::size_t evaluations = 0, replays = 0;
-  double wall_s = 0;
+  double wall_s = 0, solve_s = 0;          // all; the optimiser alone, without intervals and scores
   double time_step_s = 0, shift_s = 0;
   std::vector<double> values;              // all parameters of the model
   std::vector<TunedParameter> tuned;

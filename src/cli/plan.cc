@@ -223,6 +223,7 @@ void AddPlan(CLI::App& program, Run& run) {
   AddCommonFlags(*plan, plan_flags->common, true);
   plan->add_option("--shards", plan_flags->shards, "Parts that the work is meant to be done in")->check(CLI::Range(1, 1000000))->capture_default_str();
   plan->add_option("--starts", plan_flags->starts, "Starting points of each fit")->check(CLI::Range(1, 1000))->capture_default_str();
+  plan->footer("Example: gapscope plan models/qube/experiment.yaml logs/*.csv --shards 8 --out work");
   plan->callback([plan_flags, &run] { run = [plan_flags] { return RunPlan(*plan_flags); }; });
 
   auto shard_flags = std::make_shared<ShardFlags>();
@@ -230,12 +231,14 @@ void AddPlan(CLI::App& program, Run& run) {
   shard->add_option("folder", shard_flags->folder, "The plan's folder")->required();
   shard->add_option("--shard", shard_flags->shard, "i/N: every N-th log from the i-th on")->required();
   AddCommonFlags(*shard, shard_flags->common, false);
+  shard->footer("Example: gapscope run --shard 0/8 work");
   shard->callback([shard_flags, &run] { run = [shard_flags] { return RunShard(*shard_flags); }; });
 
   auto merge_flags = std::make_shared<ShardFlags>();
   CLI::App* merge = program.add_subcommand("merge", "Put a plan's results together; exit status 1 while any is missing or failed");
   merge->add_option("folder", merge_flags->folder, "The plan's folder")->required();
   AddCommonFlags(*merge, merge_flags->common, false);
+  merge->footer("Example: gapscope merge work --json");
   merge->callback([merge_flags, &run] { run = [merge_flags] { return RunMerge(*merge_flags); }; });
 }
 

@@ -18,10 +18,11 @@ namespace gapscope::plugins {
 
 inline bool IsCompiling(const mjModel* m) { return m->signature == 0; }
 
-// Says `fault`. True: `init` must return -1; false: carry on doing nothing.
+// Says `fault`. True: `init` must return -1; false: carry on without effect.
 inline bool Refuse(const mjModel* m, const std::string& fault) {
-  mju_warning("%s", fault.c_str());
-  return IsCompiling(m);
+  const bool compiling = IsCompiling(m);
+  mju_warning("%s%s", fault.c_str(), compiling ? "" : "; the instance is left without effect");
+  return compiling;
 }
 
 // "plugin instance 'NAME': attribute 'KEY' is 'ACTUAL', allowed ALLOWED; CURE"

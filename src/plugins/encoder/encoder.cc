@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/plugins/common/compile_guard.h"
+#include "src/plugins/common/refusal.h"
 
 namespace gapscope::plugins {
 namespace {
@@ -142,7 +142,6 @@ void Encoder::Advance(mjData* d) const {
 }
 
 void Encoder::Register() {
-  static thread_local CompileGuard guard;
   mjpPlugin plugin;
   mjp_defaultPlugin(&plugin);
   plugin.name = "gapscope.encoder";
@@ -151,7 +150,6 @@ void Encoder::Register() {
   plugin.nattribute = static_cast<int>(std::size(kAttributes));
   plugin.attributes = kAttributes;
   plugin.nstate = +[](const mjModel* m, int instance) {
-    guard.NoteState(m);
     return StateSize(m, instance);
   };
   plugin.nsensordata = +[](const mjModel* m, int instance, int) {
@@ -162,7 +160,7 @@ void Encoder::Register() {
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     std::string problem;
     std::unique_ptr<Encoder> encoder = Encoder::Create(m, instance, &problem);
-    if (guard.Judge(m, problem) < 0) return -1;
+    if (!problem.empty() && Refuse(m, problem)) return -1;
     d->plugin_data[instance] = reinterpret_cast<uintptr_t>(encoder.release());
     return 0;
   };

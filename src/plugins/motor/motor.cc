@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "src/plugins/common/compile_guard.h"
+#include "src/plugins/common/refusal.h"
 
 namespace gapscope::plugins {
 namespace {
@@ -229,7 +229,6 @@ void Motor::Advance(const mjModel*, mjData* d) const {
 }
 
 void Motor::Register() {
-  static thread_local CompileGuard guard;
   mjpPlugin plugin;
   mjp_defaultPlugin(&plugin);
   plugin.name = "gapscope.motor";
@@ -237,13 +236,12 @@ void Motor::Register() {
   plugin.nattribute = kMotorAttributeCount;
   plugin.attributes = kMotorAttributes;
   plugin.nstate = +[](const mjModel* m, int instance) {
-    guard.NoteState(m);
     return MotorStateSize(m, instance);
   };
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     std::string problem;
     std::unique_ptr<Motor> motor = Motor::Create(m, instance, &problem);
-    if (guard.Judge(m, problem) < 0) return -1;
+    if (!problem.empty() && Refuse(m, problem)) return -1;
     d->plugin_data[instance] = reinterpret_cast<uintptr_t>(motor.release());
     return 0;
   };

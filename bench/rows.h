@@ -31,6 +31,10 @@ Result<std::vector<Row>> ScalingRows(const BenchOptions& options);
 // share of the rate of one pass of std::from_chars over the same bytes in memory.
 Result<std::vector<Row>> ReadRows(const BenchOptions& options);
 
+// plugin_cost.PLUGIN.{neutral,active}: processor time of a step of one servo joint with the plugin, neutral or with all stages at work, over the same model
+// with native elements only (friction: over a native frictionloss).
+Result<std::vector<Row>> PluginRows(const BenchOptions& options);
+
 }  // namespace gapscope::bench
 
 #endif  // GAPSCOPE_BENCH_ROWS_H_

@@ -1,12 +1,17 @@
 #include "replay/simulator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <string_view>
+
+#include "src/plugins/motor/history.h"
 
 namespace gapscope {
 namespace {
 
+constexpr int kMaxInputs = 8;     // of a drive: there are eight roles
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
 ModelPtr CopyForReplay(const mjModel& model) {
@@ -123,6 +128,9 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   std::fill(held_.begin(), held_.end(), window.begin);
   Prime(recording, window);
 
+  // Torques cost a pass over the actuators at each stamp: only when this log has one.
+  reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(), [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
+
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];
@@ -194,9 +202,43 @@ void Simulator::DelaySignals(const Recording& recording, Window window, std::spa
   }
 }
 
+// A servo's own delay looks back in time: at a window's start it sees what the log holds before it, not nothing.
 void Simulator::Prime(const Recording& recording, Window window) {
-  (void)recording;
-  (void)window;
+  const mjModel* m = mujoco_.get();
+  for (int instance = 0; instance < m->nplugin; ++instance) {
+    const mjpPlugin* plugin = mjp_getPluginAtSlot(m->plugin[instance]);
+    if (!plugin || std::string_view(plugin->name) != "gapscope.motor") continue;
+    const plugins::MotorState state = plugins::FindMotorState(m, data_.get(), instance);
+    const int drive = static_cast<int>(std::find(m->actuator_plugin, m->actuator_plugin + m->nactuator, instance) - m->actuator_plugin);
+    if (state.capacity == 0 || drive == m->nactuator || m->actuator_trntype[drive] != mjTRN_JOINT) continue;
+    const int joint = m->actuator_trnid[2 * drive];
+    const auto measured = std::find_if(recording.measured.begin(), recording.measured.end(), [&](const auto& q) {
+      const SignalSource& source = model_.source(q.index);
+      return source.kind == SignalKind::kPosition && (source.joint == joint || IsMirror(joint, source.joint));
+    });
+    if (measured == recording.measured.end()) continue;
+    const SignalSource& source = model_.source(measured->index);
+    const double offset = source.offset >= 0 ? values_[source.offset] : 0;
+    std::array<double, kMaxInputs> ctrl{};
+    plugins::History history = state.history();
+    const std::size_t count = std::min<std::size_t>(window.begin, static_cast<std::size_t>(state.capacity));
+    for (std::size_t row = window.begin - count; row < window.begin; ++row) {
+      int input = 0;
+      for (int a = 0; a < m->nactuator && input < kMaxInputs; ++a) {
+        if (m->actuator_plugin[a] != instance) continue;
+        const auto& addresses = model_.command_actuators();
+        const auto command = std::find(addresses.begin(), addresses.end(), m->actuator_ctrladr[a]);
+        ctrl[static_cast<std::size_t>(input++)] = command == addresses.end() ? 0 : recording.commands[static_cast<std::size_t>(command - addresses.begin())].values[row];
+      }
+      const LocalFit fit = FitLocally(recording, *measured, row, kInitialFitHalfWidth_s);
+      history.Push(recording.time_s[row], fit.value - offset, fit.slope, ctrl.data());
+    }
+  }
+}
+
+bool Simulator::IsMirror(int joint, int of) const {
+  const auto& mirrored = model_.mirrored_joints();
+  return std::find(mirrored.begin(), mirrored.end(), std::pair{joint, of}) != mirrored.end();
 }
 
 }  // namespace gapscope

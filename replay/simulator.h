@@ -56,6 +56,7 @@ class Simulator {
 
  private:
   void Prime(const Recording& recording, Window window);
+  bool IsMirror(int joint, int of) const;
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;
   void DelaySignals(const Recording& recording, Window window, std::span<double> predicted);

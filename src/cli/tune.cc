@@ -18,7 +18,7 @@ struct TuneFlags {
   CommonFlags common;
   ModelFlags model;
   std::vector<std::string> hold_out, free, freeze, fixed_nuisances;
-  std::string optimizer = "lm", objective = "both";
+  std::string optimizer = "lm", objective = "both", normalization = "deviation";
   double window_s = 0, budget_s = 0, time_step_s = 0, huber = 4;
   int starts = 2;
   bool resume = false, actuator = false;
@@ -45,6 +45,7 @@ Result<int> RunTune(TuneFlags flags) {
   PrintFindings(session.recordings, flags.common.quiet);
   TuneOptions options{.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s, .huber = flags.huber, .time_step_s = flags.time_step_s, .starts = flags.starts,
                       .resume = flags.resume};
+  if (flags.normalization == "rms") options.normalization = Normalization::kRootMeanSquare;
   const auto& names = OptimizerNames();
   options.solve.optimizer = static_cast<Optimizer>(std::find(names.begin(), names.end(), flags.optimizer) - names.begin());
   options.solve.seed = flags.common.seed;
@@ -113,6 +114,9 @@ void AddTune(CLI::App& program, Run& run) {
       ->allow_extra_args(false);
   command->add_option("--optimizer", flags->optimizer, "lm, or NLopt's slsqp, mma, bobyqa, crs2, isres, direct")->check(CLI::IsMember(OptimizerNames()))->capture_default_str();
   command->add_option("--objective", flags->objective, "windows, free_run or both")->check(CLI::IsMember({"windows", "free_run", "both"}))->capture_default_str();
+  command->add_option("--normalize", flags->normalization, "Residuals are divided by each signal's standard deviation, or by its root mean square (rms)")
+      ->check(CLI::IsMember({"deviation", "rms"}))
+      ->capture_default_str();
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
   command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")->check(FinitePositive());
   command->add_option("--huber", flags->huber, "Weigh residuals beyond this many standard deviations down; 0: plain squares")->check(CLI::NonNegativeNumber)->capture_default_str();

@@ -6,6 +6,13 @@
 
 namespace gapscope {
 
+namespace {
+
+// Base parameters are known to about +-20 % and their bounds lie at nominal / 1.6 and nominal * 1.6.
+constexpr double kPriorShare = 0.15;
+
+}  // namespace
+
 std::string Candidate::Name() const {
   std::string name;
   for (const auto& use : effects) name += (name.empty() ? "" : " + ") + use.Text();
@@ -13,7 +20,8 @@ std::string Candidate::Name() const {
 }
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
-  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .weights = weights, .huber = 0};
+  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .weights = weights, .prior_share = kPriorShare, .huber = 0};
+  if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
   if (train) {

@@ -36,6 +36,7 @@ struct Workbench {
   double time_step_s = 0;
   std::size_t max_windows = 0;
   Deadline deadline;
+  bool by_windows = false;       // train and held-out logs are the same: every third window is held out
 
   FitOptions Options(const Model& model, bool train) const;
 };

@@ -168,6 +168,12 @@ Result<Diagnosis> Search::Run(std::vector<double> noise) {
     rows_ = static_cast<double>(std::max<std::size_t>(1, problem.residuals()));
   }
 
+  // Residual over noise, root mean square, on both sides of the split.
+  const double train_floors = std::sqrt(2 * base.train_cost / static_cast<double>(std::max<std::size_t>(1, base.problem->residuals())));
+  constexpr double kUneven = 1.5;
+  result.uneven = !bench_.by_windows && std::max(train_floors / Floors(base), Floors(base) / train_floors) > kUneven;
+  if (result.uneven && !bench_.data.asked) return result;
+
   // First effect.
   Say("screening");
   std::vector<std::unique_ptr<Candidate>> singles;
@@ -409,6 +415,24 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& data, 
   bench.time_step_s = ChooseTimeStep(*model, data.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool).step_s;
   if (options.budget_s > 0) bench.deadline = begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
   GS_ASSIGN(Diagnosis result, Search(bench, options).Run(noise));
+  // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
+  DataSplit blocks;
+  if (!data.asked && result.uneven) {
+    for (const auto* part : {&data.train, &data.held_out}) blocks.train.insert(blocks.train.end(), part->begin(), part->end());
+    std::sort(blocks.train.begin(), blocks.train.end(), [](const Recording& a, const Recording& b) { return a.log_path < b.log_path; });
+    blocks.held_out = blocks.train;
+    blocks.how = "every third window of each log: only some logs show the gap";
+    Workbench again{.experiment = experiment, .data = blocks, .scales = scales, .pool = pool, .weights = bench.weights, .window_s = options.window_s, .time_step_s = bench.time_step_s,
+                    .max_windows = options.max_windows, .deadline = bench.deadline, .by_windows = true};
+    GS_ASSIGN(result, Search(again, options).Run(noise));
+  }
+  if (!blocks.how.empty()) {
+    for (const auto& recording : blocks.train) result.train_logs.push_back(recording.log_path);
+    result.held_out_logs = result.train_logs;
+    result.split = blocks.how;
+    result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return result;
+  }
   for (const auto& recording : data.train) result.train_logs.push_back(recording.log_path);
   for (const auto& recording : data.held_out) result.held_out_logs.push_back(recording.log_path);
   result.split = data.how;

@@ -54,6 +54,7 @@ struct Diagnosis {
   std::string split, explanation;
   double wall_s = 0;
   bool budget_spent = false;
+  bool uneven = false;          // train and held-out logs show the gap very differently
   std::shared_ptr<const Model> model;   // with the effects found
   std::vector<double> values;
 };

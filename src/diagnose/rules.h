@@ -9,7 +9,7 @@
 
 namespace gapscope {
 
-// Thresholds. Set on twin cases of seeds 1000..1999 (scripts/blind_check), judged on others; `relative` gains are shares of the held-out cost.
+// Thresholds: first guesses after diagnosis.md's prototype, not yet set on a bank of twin cases. `relative` gains are shares of the held-out cost.
 inline constexpr double kFirstGain = 0.01, kFirstZ = 2.5;         // first effect over the refitted baseline
 inline constexpr double kRemains = 1.05;                          // residual over noise below which nothing more is sought
 inline constexpr double kSecondGain = 0.06, kSecondZ = 3.0;       // second effect over the first

@@ -31,9 +31,6 @@ std::string DiagnosisTable(const Diagnosis& d) {
     if (!c.refitted && ++shown > 4) continue;
     text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", c.name, c.probability, c.refitted ? fmt::format("{:.4g}", c.held_out_error) : "-", c.reason);
   }
-  if (!d.next_command.empty()) {
-    text += fmt::format("\nnext experiment, to tell {} from {}:\n  {}\n", d.next_separates.front(), d.next_separates.back(), d.next_command);
-  }
   text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.budget_spent ? ", the whole budget" : "");
   return text;
 }

@@ -22,6 +22,11 @@ ordered_json Logs(const std::vector<LogReplay>& logs) {
 }  // namespace
 
 std::string FlatText(const FlatDirection& flat, const Model& model) {
+  // Two that grow alike, both on logarithmic scales: their ratio stays, and is what is known.
+  if (flat.parts.size() == 2 && std::abs(std::abs(flat.parts[1].second) - 1) < 0.1) {
+    const Parameter &a = model.parameters()[flat.parts[0].first], &b = model.parameters()[flat.parts[1].first];
+    if (a.low > 0 && b.low > 0) return fmt::format("only {} {} {} is known from these logs, neither alone", a.name, flat.parts[1].second > 0 ? "/" : "*", b.name);
+  }
   std::string names;
   for (const auto& [index, weight] : flat.parts) names += fmt::format("{}{}{}", names.empty() ? "" : weight > 0 ? " + " : " - ", std::abs(std::abs(weight) - 1) < 0.05 ? "" : fmt::format("{:.2f} ", std::abs(weight)), model.parameters()[index].name);
   return flat.parts.size() == 1 ? names + " is not known from these logs" : "only together: these logs leave the direction " + names + " (logarithms where the bounds are positive) open";
@@ -55,7 +60,7 @@ std::string TuneTable(const TuneSummary& summary, const Model& model) {
 
 std::string TuneJson(const TuneSummary& summary, const Model& model, std::uint64_t seed) {
   ordered_json json = {{"schema", "gapscope.tune/1"}, {"optimizer", summary.optimizer}, {"termination", TerminationText(summary.termination)}, {"starts_agree", summary.starts_agree},
-                       {"starts", summary.start_costs.size()}, {"evaluations", summary.evaluations}, {"replays", summary.replays}, {"wall_s", summary.wall_s}};
+                       {"starts", summary.start_costs.size()}, {"evaluations", summary.evaluations}, {"replays", summary.replays}, {"wall_s", summary.wall_s}, {"solve_s", summary.solve_s}};
   json["parameters"] = ordered_json::array();
   for (const auto& t : summary.tuned) {
     const Parameter& p = model.parameters()[t.index];

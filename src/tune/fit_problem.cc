@@ -86,7 +86,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       const double deviation = std::max(std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count))), measured.spec.resolution);
       if (!(deviation > 0)) continue;
       scalings[s].deviation = deviation;
-      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / deviation : options_.weights[measured.index];
+      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / (options_.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, mean)) : options_.weights[measured.index];
       if (measured.spec.kind != SignalKind::kPosition) continue;
       const SignalSource& source = model.source(measured.index);
       if (options_.fit_offsets) {
@@ -107,7 +107,9 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     prototype.prior = Eigen::Map<Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
     const auto add = [&](ReplayMode mode) {
       const auto rows = MakeWindows(recording, mode, options_.window_s);
-      for (const Window& window : rows) {
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (options_.fold != Fold::kAll && (i % 3 == 1) != (options_.fold == Fold::kHeldOut)) continue;
+        const Window& window = rows[i];
         FitWindow w = prototype;
         w.rows = window;
         w.start = InitialStateAt(model, recording, window.begin, values_);
@@ -146,6 +148,15 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     scale *= scale;
   }
   anchor_weight_ = kAnchor * scale * static_cast<double>(residuals()) * (high_ - low_).cwiseAbs2().cwiseMax(1e-12).cwiseInverse();
+  if (options_.prior_share > 0) {
+    // In units of the noise: only meaningful with weights of 1 / noise. An effect's parameters are what is asked for.
+    for (std::size_t i = 0; i < coordinates_.size(); ++i) {
+      if (model.parameters()[coordinates_[i].parameter].name.find('@') != std::string::npos) continue;
+      const auto k = static_cast<Eigen::Index>(i);
+      const double deviation = options_.prior_share * (high_[k] - low_[k]);
+      anchor_weight_[k] += 1 / (deviation * deviation);
+    }
+  }
 }
 
 double FitProblem::AnchorCost(const FitPoint& point) const { return 0.5 * anchor_weight_.cwiseProduct((point.y - anchor_).cwiseAbs2()).sum(); }

@@ -19,6 +19,12 @@
 
 namespace gapscope {
 
+// Which windows of each log a problem takes: with kTrain and kHeldOut every third one, from the second on, is held out.
+enum class Fold { kAll, kTrain, kHeldOut };
+
+// What makes signals of different size comparable: 1 / standard deviation over the log, or 1 / root mean square (mujoco.sysid's choice).
+enum class Normalization { kDeviation, kRootMeanSquare };
+
 enum class Objective { kWindows, kFreeRun, kBoth };
 
 struct FitOptions {
@@ -26,6 +32,7 @@ struct FitOptions {
   Objective objective = Objective::kWindows;
   double window_s = 1.0;
   double lead_in_s = 0.05;          // start of a window that is not scored
+  Fold fold = Fold::kAll;
   std::size_t max_windows = 0;      // 0: all; else evenly chosen ones
   double time_step_s = 0;           // 0: the model's
   bool fit_offsets = true;          // zero offsets of measured positions, per log
@@ -33,6 +40,8 @@ struct FitOptions {
   bool fit_states = true;           // initial state of each window
   double shift_s = 0;               // where no shift is fitted: this one
   std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
+  Normalization normalization = Normalization::kDeviation;
+  double prior_share = 0;           // standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 

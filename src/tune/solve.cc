@@ -13,6 +13,7 @@ bool Late(const Deadline& deadline) { return deadline && std::chrono::steady_clo
 // The damped step inside the bounds: a coordinate that the step would push through its bound is put on it and the rest is solved again.
 Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, const Eigen::VectorXd& low, const Eigen::VectorXd& high, double damping) {
   const Eigen::Index n = point.y.size();
+  if (n == 0) return Eigen::VectorXd();
   Eigen::MatrixXd hessian = at.hessian;
   hessian.diagonal() += damping * at.hessian.diagonal().cwiseMax(1e-12 * std::max(at.hessian.diagonal().maxCoeff(), 1e-300));
   Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
@@ -47,10 +48,15 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
 }
 
 SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
-  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8, kSmallDamping = 1e-3;
+  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8, kSmallDamping = 1e-3, kWorthwhile = 0.1;
   SolveResult result{.point = start, .cost = problem.Cost(start), .termination = Termination::kIterations};
   if (!std::isfinite(result.cost)) {
     result.termination = Termination::kNotSimulated;
+    return result;
+  }
+  const bool any_state = std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
+  if (start.y.size() == 0 && !any_state) {
+    result.termination = Termination::kConverged;
     return result;
   }
   double damping = 1e-2, difference = options.coarse_step;
@@ -66,8 +72,12 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
       return result;
     }
     bool accepted = false, small = false, undamped = false;
-    while (damping <= kMostDamping && !Late(options.deadline)) {
-      const FitPoint trial = problem.Move(result.point, at, BoundedStep(at, result.point, problem.low(), problem.high(), damping));
+    for (int rejected = 0; damping <= kMostDamping && !Late(options.deadline); ++rejected) {
+      const Eigen::VectorXd step = BoundedStep(at, result.point, problem.low(), problem.high(), damping);
+      // More damping only makes the step smaller: what it promises must be worth the replay.
+      const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
+      if (rejected >= 2 && promised < kWorthwhile * options.tolerance * result.cost) break;
+      const FitPoint trial = problem.Move(result.point, at, step);
       const double cost = problem.Cost(trial);
       if (cost < result.cost) {
         small = result.cost - cost < options.tolerance * result.cost;

@@ -15,7 +15,7 @@ constexpr double kAgree = 0.01;  // starts agree when their costs differ by less
 
 FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& free, double time_step_s) {
   return {.free = free, .objective = options.objective, .window_s = options.window_s, .time_step_s = time_step_s, .fit_offsets = options.fit_offsets,
-          .fit_shift = options.fit_shift, .fit_states = options.fit_states, .huber = options.huber};
+          .fit_shift = options.fit_shift, .fit_states = options.fit_states, .normalization = options.normalization, .huber = options.huber};
 }
 
 // A random start inside the middle of the bounds.
@@ -42,7 +42,7 @@ std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vecto
   }
   const double numbers[] = {static_cast<double>(options.objective), options.window_s, static_cast<double>(options.fit_offsets), static_cast<double>(options.fit_shift),
                             static_cast<double>(options.fit_states), options.huber, options.time_step_s, static_cast<double>(options.starts), static_cast<double>(options.solve.optimizer),
-                            options.solve.tolerance, static_cast<double>(options.solve.max_iterations), static_cast<double>(options.solve.seed)};
+                            options.solve.tolerance, static_cast<double>(options.normalization), static_cast<double>(options.solve.max_iterations), static_cast<double>(options.solve.seed)};
   key = Hash(numbers, sizeof numbers, key);
   return Hash(options.free.data(), sizeof(int) * options.free.size(), key);
 }
@@ -79,6 +79,7 @@ DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::si
   if (held_out.empty()) {
     for (std::size_t i = 1; i < recordings.size(); i += 3) keep[i] = 1;
   }
+  split.asked = !held_out.empty();
   std::size_t count = 0;
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     count += keep[i];
@@ -121,6 +122,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   if (!options.journal.empty()) {
     GS_ASSIGN(journal, Journal::Open(options.journal, JobKey(model, data, start, options), options.resume));
   }
+  const auto solve_begin = std::chrono::steady_clock::now();
   // Windows first: they converge from far; the free run then sees what is slow, when it can be simulated at all.
   const auto solve_from = [&](const FitPoint* random, std::vector<double>* values, FitProblem** last, std::vector<std::unique_ptr<FitProblem>>* problems) -> SolveResult {
     TuneOptions stage = options;
@@ -184,6 +186,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   if (best.termination == Termination::kNotSimulated) {
     return Error{.what = "the model cannot be simulated at the start of the fit", .where = model.experiment().path, .cure = "check the parameters' nominal values, or use shorter windows (--window)"};
   }
+  summary.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - solve_begin).count();
   summary.termination = best.termination;
   for (const double cost : summary.start_costs) summary.starts_agree = summary.starts_agree && cost <= best.cost * (1 + kAgree);
   summary.shift_s = best_problem->Shift(best.point);

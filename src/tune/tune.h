@@ -13,6 +13,7 @@ namespace gapscope {
 struct DataSplit {
   std::vector<Recording> train, held_out;
   std::string how;  // one line for the user
+  bool asked = false;  // the user said which
 };
 // `held_out` indices are kept; with none, every third log from the second on; with two logs the second; with one its last 30 % of time.
 DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::size_t>& held_out);
@@ -24,6 +25,7 @@ struct TuneOptions {
   Objective objective = Objective::kBoth;
   double window_s = 1.0;
   bool fit_offsets = true, fit_shift = true, fit_states = true;
+  Normalization normalization = Normalization::kDeviation;
   double huber = 4;                 // see FitOptions
   double time_step_s = 0;           // 0: chosen
   int starts = 2;                   // the given values, then random ones inside the bounds
@@ -50,7 +52,7 @@ struct TuneSummary {
   bool starts_agree = true;
   std::vector<double> start_costs;
   std::size_t evaluations = 0, replays = 0;
-  double wall_s = 0;
+  double wall_s = 0, solve_s = 0;          // all; the optimiser alone, without intervals and scores
   double time_step_s = 0, shift_s = 0;
   std::vector<double> values;              // all parameters of the model
   std::vector<TunedParameter> tuned;

@@ -82,9 +82,11 @@ Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, cons
     FlatDirection flat{.deviation = deviation};
     Eigen::VectorXd parts(n);
     for (Eigen::Index i = 0; i < n; ++i) parts[i] = directions.eigenvectors()(i, k) * range[i];
-    const double scale = parts.cwiseAbs().maxCoeff();
+    Eigen::Index leading = 0;
+    parts.cwiseAbs().maxCoeff(&leading);
+    const double scale = parts[leading];
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (std::abs(parts[i]) > 0.2 * scale) flat.parts.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter, parts[i] / scale);
+      if (std::abs(parts[i]) > 0.2 * std::abs(scale)) flat.parts.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter, parts[i] / scale);
     }
     std::stable_sort(flat.parts.begin(), flat.parts.end(), [](const auto& a, const auto& b) { return std::abs(a.second) > std::abs(b.second); });
     result.flat.push_back(std::move(flat));

@@ -96,6 +96,19 @@ TEST(SolveTest, SpentBudgetGivesTheBestSoFar) {
   }
 }
 
+TEST(SolveTest, NothingToFitIsSolved) {
+  const Rig rig = LoadCart();
+  const OneGain one = MakeOneGain(rig);
+  ThreadPool pool(1);
+  FitOptions options = OnlyGain(rig);
+  options.free.clear();
+  FitProblem none(*rig.model, one.logs, options, rig.model->Nominal(), pool);
+  EXPECT_EQ(Solve(none, none.Start(), {}).cost, none.Cost(none.Start()));
+  options.fit_states = true;
+  FitProblem states(*rig.model, one.logs, options, rig.model->Nominal(), pool);
+  EXPECT_LT(Solve(states, states.Start(), {}).cost, states.Cost(states.Start()));
+}
+
 TEST(SolveTest, StartThatCannotBeSimulatedIsSaid) {
   const Rig rig = LoadCart(-1e30, 1e30);
   OneGain one = MakeOneGain(rig);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "src/report/tune_report.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -102,6 +103,8 @@ TEST(TuneTest, TorqueConstantAndResistanceAreNamedAsFlat) {
   }
   // Along the flat direction both grow alike: kt / R stays.
   EXPECT_NEAR(weight_kt, weight_resistance, 0.05);
+  const std::string text = FlatText(found.value().flat[0], *rig.model);
+  EXPECT_TRUE(text.starts_with("only motor.kt / motor.resistance is known") || text.starts_with("only motor.resistance / motor.kt is known")) << text;
   EXPECT_FALSE(Of(found.value(), kt).identifiable);
   EXPECT_FALSE(Of(found.value(), resistance).identifiable);
 }

@@ -54,6 +54,22 @@ bool NestsTooDeep(const std::string& bytes) {
   return deepest > kMaxNesting || indent_levels > 4 * kMaxNesting || dashes > kMaxNesting;
 }
 
+// The line (1-based) of a "---" that follows content; 0: none. At a line's start it ends a document wherever it stands.
+std::size_t SecondDocument(const std::string& bytes) {
+  bool content = false;
+  std::size_t line = 1;
+  for (std::size_t begin = 0; begin < bytes.size(); ++line) {
+    const std::size_t end = std::min(bytes.find('\n', begin), bytes.size());
+    const std::string_view text = std::string_view(bytes).substr(begin, end - begin);
+    const bool marker = text.starts_with("---") && (text.size() == 3 || text[3] == ' ' || text[3] == '\t' || text[3] == '\r');
+    if (marker && content) return line;
+    const std::size_t first = text.find_first_not_of(" \t\r");
+    content = content || marker || (first != std::string_view::npos && text[first] != '#' && text[0] != '%');
+    begin = end + 1;
+  }
+  return 0;
+}
+
 }  // namespace
 
 std::string YamlPlace(const std::string& file, const YAML::Node& node) {
@@ -76,14 +92,13 @@ Result<YAML::Node> ReadYaml(const std::string& path) {
                  .allowed = std::to_string(kMaxNesting) + " levels"};
   }
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(bytes);
-    if (documents.size() > 1) {
-      return Error{.what = "more than one document in the file", .where = YamlPlace(path, documents[1]), .cure = "delete what follows '---'"};
+    // Not YAML::LoadAll: some broken files make it yield documents for ever.
+    YAML::Node node = YAML::Load(bytes);
+    if (!node.IsDefined() || node.IsNull()) return Error{.what = "the file holds no keys", .where = path + ":1", .allowed = "key: value pairs"};
+    if (const std::size_t line = SecondDocument(bytes); line > 0) {
+      return Error{.what = "more than one document in the file", .where = path + ":" + std::to_string(line) + ":1", .cure = "delete what follows '---'"};
     }
-    if (documents.empty() || !documents[0].IsDefined() || documents[0].IsNull()) {
-      return Error{.what = "the file is empty", .where = path + ":1"};
-    }
-    return documents[0];
+    return node;
   } catch (const YAML::Exception& e) {
     const std::string place = e.mark.is_null() ? ":1:1" : ":" + std::to_string(e.mark.line + 1) + ":" + std::to_string(e.mark.column + 1);
     return Error{.what = "not valid YAML: " + OneLine(e.msg), .where = path + place};

@@ -29,7 +29,12 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   if (flags.window_s > 0) options.window_s = flags.window_s;
   const ReplayResult result = Replay(*session.model, session.recordings, options, *session.pool);
   const Comparison comparison = Compare(result, session.recordings, *session.pool);
-  const ReplayReport report{.result = result, .comparison = comparison, .model = *session.model, .values = session.values, .seed = flags.common.seed};
+  // The other way of looking at the same logs: local error in windows against accumulated error in a free run.
+  ReplayOptions other = options;
+  other.mode = options.mode == ReplayMode::kWindows ? ReplayMode::kFreeRun : ReplayMode::kWindows;
+  other.time_step_s = result.time_step_s;
+  const double other_error = ReplayError(Replay(*session.model, session.recordings, other, *session.pool).logs);
+  const ReplayReport report{.result = result, .comparison = comparison, .model = *session.model, .values = session.values, .seed = flags.common.seed, .other_error = other_error};
   if (!flags.common.out.empty()) {
     const std::filesystem::path out = flags.common.out;
     GS_RETURN_IF_ERROR(WriteFile(out / "result.json", ReplayJson(report) + "\n"));

@@ -41,13 +41,13 @@ void AppendNumber(std::string& text, double value) {
 }  // namespace
 
 std::string ReplayTable(const ReplayReport& report) {
-  const auto& [result, comparison, model, values, seed] = report;
-  std::string text = fmt::format("{:<39} {:<18} {:>8} {:>8} {:>7} {:>8} {:>6}\n", "log", "signal", "RMSE", "MAE", "nRMSE", "lag ms", "corr");
+  const auto& [result, comparison, model, values, seed, other_error] = report;
+  std::string text = fmt::format("{:<37} {:<18} {:>9} {:>9} {:>7} {:>8} {:>6}\n", "log", "signal", "RMSE", "MAE", "nRMSE", "lag ms", "corr");
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
     const LogComparison& log = comparison.logs[l];
     bool first = true;
     for (const SignalScore& s : log.signals) {
-      text += fmt::format("{:<39} {:<18} {:>8.4g} {:>8.4g} {:>7.4g} {:>8.2f} {:>6.3f}\n", first ? Shorten(log.log_path, 39) : "", s.signal, s.rmse, s.mae, s.nrmse, 1e3 * s.lag_s,
+      text += fmt::format("{:<37} {:<18} {:>9.4g} {:>9.4g} {:>7.4g} {:>8.2f} {:>6.3f}\n", first ? Shorten(log.log_path, 37) : "", s.signal, s.rmse, s.mae, s.nrmse, 1e3 * s.lag_s,
                           s.correlation);
       first = false;
     }
@@ -57,6 +57,8 @@ std::string ReplayTable(const ReplayReport& report) {
     }
   }
   text += fmt::format("\nerror {:.4g} (RMSE over standard deviation, {}, {} log{})\n", comparison.error, ModeName(result.mode), comparison.logs.size(), comparison.logs.size() == 1 ? "" : "s");
+  const char* other = result.mode == ReplayMode::kWindows ? "a free run" : "windows, each started from the log";
+  text += std::isfinite(other_error) ? fmt::format("in {}: error {:.4g}\n", other, other_error) : fmt::format("in {}: diverges\n", other);
   text += std::isfinite(result.time_step_error)
               ? fmt::format("time step {:.4g} ms; halving it changes the error by {:.2g}\n", 1e3 * result.time_step_s, result.time_step_error)
               : fmt::format("time step {:.4g} ms, as asked\n", 1e3 * result.time_step_s);
@@ -72,8 +74,9 @@ std::string ReplayTable(const ReplayReport& report) {
 }
 
 std::string ReplayJson(const ReplayReport& report) {
-  const auto& [result, comparison, model, values, seed] = report;
-  ordered_json json = {{"schema", "gapscope.replay/1"}, {"mode", ModeName(result.mode)}, {"error", JsonNumber(comparison.error)}, {"time_step_s", result.time_step_s},
+  const auto& [result, comparison, model, values, seed, other_error] = report;
+  ordered_json json = {{"schema", "gapscope.replay/1"}, {"mode", ModeName(result.mode)}, {"error", JsonNumber(comparison.error)},
+                       {result.mode == ReplayMode::kWindows ? "error_free_run" : "error_windows", JsonNumber(other_error)}, {"time_step_s", result.time_step_s},
                        {"time_step_error", JsonNumber(result.time_step_error)}, {"logs", ordered_json::array()}};
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
     const LogComparison& log = comparison.logs[l];

@@ -16,6 +16,7 @@ struct ReplayReport {
   const Model& model;
   std::span<const double> values;  // of the model's parameters
   std::uint64_t seed = 0;
+  double other_error = 0;          // of a free run where the replay was in windows, in windows where it was a free run
 };
 
 // At most 100 columns.

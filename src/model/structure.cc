@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kTinyFriction = 1e-9;   // keeps the solver's friction row alive at zero friction
 constexpr double kTinyInertia = 1e-9;    // of the motor side's body before its armature is written
+constexpr const char* kMaxDelay_s = "0.13";
 constexpr double kGapTimeConstant_s = 0.004;  // how stiff the flanks of a gap are
 
 std::string NameOf(mjsElement* element) { return mjs_getString(mjs_getName(element)); }
@@ -36,6 +37,12 @@ void Combine(Structure::Terms& terms, const std::string& key, const std::string&
   entry->second = key == "torque_limit_n_m" || key == "power_w" ? "min(" + entry->second + "," + expression + ")" : entry->second + "+(" + expression + ")";
 }
 
+void AddText(mjSpec* spec, const std::string& name, const std::string& value) {
+  mjsText* text = mjs_addText(spec);
+  mjs_setName(text->element, name.c_str());
+  mjs_setString(text->data, value.c_str());
+}
+
 // A plugin instance of that name. Its attributes stand in custom texts: mjSpec's attribute map is a C++ object that crosses no library boundary.
 void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& instance, const std::map<std::string, std::string>& attributes) {
   mjs_activatePlugin(spec, plugin.c_str());
@@ -44,11 +51,7 @@ void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& ins
   mjs_setString(element->name, instance.c_str());
   mjs_setString(element->plugin_name, plugin.c_str());
   element->active = 1;
-  for (const auto& [key, value] : attributes) {
-    mjsText* text = mjs_addText(spec);
-    mjs_setName(text->element, (instance + "." + key).c_str());
-    mjs_setString(text->data, value.c_str());
-  }
+  for (const auto& [key, value] : attributes) AddText(spec, instance + "." + key, value);
 }
 
 void Attach(mjsPlugin* use, const std::string& plugin, const std::string& instance) {
@@ -342,6 +345,8 @@ Status Structure::FinishMotors() {
         std::fill_n(input->biasprm, mjNBIAS, 0.0);
       }
     }
+    // Room for the longest delays that the catalogue allows, both together; a <config> of the model's own goes first.
+    if (terms.contains("command_delay_s") || terms.contains("torque_delay_s")) AddText(spec.get(), instance + ".max_delay_s", kMaxDelay_s);
     // Lags and the sag keep their state in activations of the first actuator.
     drive->actdim = std::max(0, drive->actdim);  // MuJoCo's default, -1, counts as none
     for (const char* stage : {"time_constant_s", "second_time_constant_s", "sag_fraction"}) drive->actdim += terms.contains(stage) ? 1 : 0;

@@ -18,6 +18,31 @@ struct Job {
   Window window;
 };
 
+// Error of one log: see ReplayError.
+double LogError(const LogReplay& log) {
+  if (log.outcome == Outcome::kDiverged) return std::numeric_limits<double>::infinity();
+  double sum = 0;
+  int signals = 0;
+  for (const auto& signal : log.signals) {
+    if (!signal.scored) continue;
+    double error = 0;
+    std::size_t rows = 0;
+    for (std::size_t k = 0; k < signal.measured.size(); ++k) {
+      const double y = signal.measured[k];
+      if (!std::isfinite(y) || !std::isfinite(signal.predicted[k])) continue;
+      ++rows;
+      error += (signal.predicted[k] - y) * (signal.predicted[k] - y);
+    }
+    const double deviation = MomentsOf(signal.measured).deviation;
+    if (rows == 0 || !(deviation > 0)) continue;
+    sum += error / static_cast<double>(rows) / (deviation * deviation);
+    ++signals;
+  }
+  return signals == 0 ? kNan : std::sqrt(sum / signals);
+}
+
+}  // namespace
+
 LogReplay EmptyTraces(const Recording& recording) {
   LogReplay log;
   log.log_path = recording.log_path;
@@ -28,37 +53,6 @@ LogReplay EmptyTraces(const Recording& recording) {
   }
   return log;
 }
-
-// Error of one log: see ReplayError.
-double LogError(const LogReplay& log) {
-  if (log.outcome == Outcome::kDiverged) return std::numeric_limits<double>::infinity();
-  double sum = 0;
-  int signals = 0;
-  for (const auto& signal : log.signals) {
-    if (!signal.scored) continue;
-    double error = 0, mean = 0;
-    std::size_t rows = 0, all = 0;
-    for (std::size_t k = 0; k < signal.measured.size(); ++k) {
-      const double y = signal.measured[k];
-      if (!std::isfinite(y)) continue;
-      ++all;
-      mean += (y - mean) / static_cast<double>(all);
-      if (!std::isfinite(signal.predicted[k])) continue;
-      ++rows;
-      error += (signal.predicted[k] - y) * (signal.predicted[k] - y);
-    }
-    double variance = 0;
-    for (const double y : signal.measured) {
-      if (std::isfinite(y)) variance += (y - mean) * (y - mean);
-    }
-    if (rows == 0 || all == 0 || variance == 0) continue;
-    sum += error / static_cast<double>(rows) / (variance / static_cast<double>(all));
-    ++signals;
-  }
-  return signals == 0 ? kNan : std::sqrt(sum / signals);
-}
-
-}  // namespace
 
 std::vector<Window> MakeWindows(const Recording& recording, ReplayMode mode, double window_s) {
   if (mode != ReplayMode::kWindows) return {{0, recording.rows()}};

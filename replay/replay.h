@@ -35,6 +35,9 @@ struct LogReplay {
   std::vector<SignalTrace> signals;
 };
 
+// The recording's measurements with nothing predicted yet.
+LogReplay EmptyTraces(const Recording& recording);
+
 struct ReplayResult {
   ReplayMode mode = ReplayMode::kFreeRun;
   double time_step_s = 0;

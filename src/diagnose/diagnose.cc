@@ -24,15 +24,7 @@ std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& d
     for (const auto& recording : *part) {
       for (const auto& measured : recording.measured) {
         const NoiseFloor floor = EstimateNoise(recording.time_s, measured.values, {.resolution = measured.spec.resolution});
-        double square = 0, mean = 0, n = 0;
-        for (const double y : measured.values) {
-          if (std::isfinite(y)) n += 1, mean += y;
-        }
-        mean /= std::max(1.0, n);
-        for (const double y : measured.values) {
-          if (std::isfinite(y)) square += (y - mean) * (y - mean);
-        }
-        const double least = 1e-3 * std::sqrt(square / std::max(1.0, n));
+        const double least = 1e-3 * MomentsOf(measured.values).deviation;
         const double total = std::isfinite(floor.total_std) ? floor.total_std : measured.spec.resolution;
         found[measured.index].push_back(std::max(total, least));
       }
@@ -60,8 +52,6 @@ class Search {
   }
   // Screens and refits what may explain more than `parent`; every refitted child goes to `pool`.
   void Explore(Candidate& parent, std::vector<std::unique_ptr<Candidate>>* children, std::vector<Screened>* screen, std::size_t refits);
-  std::vector<double> WindowErrors(const Candidate& candidate, bool nominal) const;
-  double RowsPerBlockCost() const { return rows_; }
   // Root mean square of residual over noise on the held-out logs.
   double Floors(const Candidate& candidate) const { return std::sqrt(2 * candidate.held_out_cost / rows_); }
   double NormalisedError(const Candidate& candidate);
@@ -222,15 +212,8 @@ Result<Diagnosis> Search::Run(std::vector<double> noise) {
   for (const auto& recording : bench_.data.held_out) {
     for (const auto& measured : recording.measured) {
       if (!measured.spec.scored) continue;
-      double mean = 0, square = 0, n = 0;
-      for (const double y : measured.values) {
-        if (std::isfinite(y)) mean += y, n += 1;
-      }
-      mean /= std::max(1.0, n);
-      for (const double y : measured.values) {
-        if (std::isfinite(y)) square += (y - mean) * (y - mean);
-      }
-      if (square > 0) floor += noise[measured.index] * noise[measured.index] * n / square, signals += 1;
+      const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
+      if (std::isfinite(share)) floor += share * share, signals += 1;
     }
   }
   result.floor = std::min(std::sqrt(floor / std::max(1.0, signals)), result.final);
@@ -322,9 +305,7 @@ Result<Diagnosis> Search::Run(std::vector<double> noise) {
   if (result.verdict == Verdict::kAmbiguous) {
     std::vector<std::string> group = {chosen->effects.back().Text()};
     for (const Candidate* rival : rivals) group.push_back(rival->effects.back().Text());
-    std::vector<std::string> names;
-    for (const auto& member : group) names.push_back(member);
-    result.ambiguous.push_back(names);
+    result.ambiguous.push_back(std::move(group));
   }
 
   // Every effect that was tried, and why not.

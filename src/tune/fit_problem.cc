@@ -74,19 +74,11 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     std::vector<double> prior;
     for (std::size_t s = 0; s < recording.measured.size(); ++s) {
       const auto& measured = recording.measured[s];
-      double mean = 0, square = 0;
-      std::size_t count = 0;
-      for (const double y : measured.values) {
-        if (std::isfinite(y)) mean += y, ++count;
-      }
-      mean /= static_cast<double>(std::max<std::size_t>(1, count));
-      for (const double y : measured.values) {
-        if (std::isfinite(y)) square += (y - mean) * (y - mean);
-      }
-      const double deviation = std::max(std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, count))), measured.spec.resolution);
+      const Moments moments = MomentsOf(measured.values);
+      const double deviation = std::max(moments.deviation, measured.spec.resolution);
       if (!(deviation > 0)) continue;
       scalings[s].deviation = deviation;
-      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / (options_.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, mean)) : options_.weights[measured.index];
+      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / (options_.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean)) : options_.weights[measured.index];
       if (measured.spec.kind != SignalKind::kPosition) continue;
       const SignalSource& source = model.source(measured.index);
       if (options_.fit_offsets) {
@@ -621,15 +613,8 @@ std::vector<double> FitProblem::BlockCosts(const FitPoint& point) {
 }
 
 std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
-  std::vector<LogReplay> logs(recordings_.size());
-  for (std::size_t l = 0; l < recordings_.size(); ++l) {
-    logs[l].log_path = recordings_[l].log_path;
-    logs[l].time_s = recordings_[l].time_s;
-    for (const auto& measured : recordings_[l].measured) {
-      logs[l].signals.push_back({.signal = measured.spec.signal, .kind = measured.spec.kind, .scored = measured.spec.scored, .resolution = measured.spec.resolution,
-                                 .measured = measured.values, .predicted = std::vector<double>(recordings_[l].rows(), std::numeric_limits<double>::quiet_NaN())});
-    }
-  }
+  std::vector<LogReplay> logs;
+  for (const auto& recording : recordings_) logs.push_back(EmptyTraces(recording));
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<char> failed(windows_.size(), 0);

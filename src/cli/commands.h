@@ -13,6 +13,7 @@ using Run = std::function<Result<int>()>;
 
 void AddInit(CLI::App& program, Run& run);
 void AddInspect(CLI::App& program, Run& run);
+void AddDesign(CLI::App& program, Run& run);
 void AddDiagnose(CLI::App& program, Run& run);
 void AddReplay(CLI::App& program, Run& run);
 void AddTune(CLI::App& program, Run& run);

@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   cli::AddReplay(program, run);
   cli::AddTune(program, run);
   cli::AddDiagnose(program, run);
+  cli::AddDesign(program, run);
   cli::AddPlan(program, run);
   try {
     program.parse(argc, argv);

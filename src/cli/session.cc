@@ -50,6 +50,34 @@ Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, cons
   return recordings;
 }
 
+Result<std::pair<std::string, double>> ParseAssignment(const std::string& text, const std::string& flag) {
+  const std::size_t equal = text.find('=');
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto parsed = equal == std::string::npos ? std::from_chars_result{text.data(), std::errc::invalid_argument}
+                                                 : std::from_chars(text.data() + equal + 1, end, value);
+  if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) {
+    return Error{.what = "not NAME=VALUE", .where = flag, .actual = "'" + text + "'", .allowed = "a parameter's name, '=', a finite number"};
+  }
+  return std::pair{text.substr(0, equal), value};
+}
+
+Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set, std::vector<double>* values) {
+  for (const auto& file : params) {
+    GS_ASSIGN(const auto numbers, LoadParameterValues(file));
+    for (const auto& [name, value] : numbers) {
+      GS_ASSIGN(const int index, model.Find(name, file));
+      (*values)[index] = value;
+    }
+  }
+  for (const auto& text : set) {
+    GS_ASSIGN(const auto assignment, ParseAssignment(text, "--set"));
+    GS_ASSIGN(const int index, model.Find(assignment.first, "--set " + text));
+    (*values)[index] = assignment.second;
+  }
+  return Ok();
+}
+
 Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) {
   Session session;
   session.pool = std::make_unique<ThreadPool>(common.jobs > 0 ? common.jobs : DefaultWorkers());
@@ -63,25 +91,7 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
     GS_ASSIGN(session.model, Model::Build(session.experiment, uses, session.scales));
   }
   session.values = session.model->Nominal();
-  for (const auto& file : flags.params) {
-    GS_ASSIGN(const auto numbers, LoadParameterValues(file));
-    for (const auto& [name, value] : numbers) {
-      GS_ASSIGN(const int index, session.model->Find(name, file));
-      session.values[index] = value;
-    }
-  }
-  for (const auto& text : flags.set) {
-    const std::size_t equal = text.find('=');
-    double value = 0;
-    const char* end = text.data() + text.size();
-    const auto parsed = equal == std::string::npos ? std::from_chars_result{text.data(), std::errc::invalid_argument}
-                                                   : std::from_chars(text.data() + equal + 1, end, value);
-    if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) {
-      return Error{.what = "not NAME=VALUE", .where = "--set", .actual = "'" + text + "'", .allowed = "a parameter's name, '=', a finite number"};
-    }
-    GS_ASSIGN(const int index, session.model->Find(text.substr(0, equal), "--set " + text));
-    session.values[index] = value;
-  }
+  GS_RETURN_IF_ERROR(OverrideValues(*session.model, flags.params, flags.set, &session.values));
   return session;
 }
 

@@ -193,6 +193,25 @@ Status ReadSettings(const YAML::Node& node, const std::string& path, Experiment*
   return fields.Finish();
 }
 
+Status ReadLimits(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment) {
+  for (const YAML::Node& item : items) {
+    YamlMap map(item, path, "a limit");
+    Limit limit{.joint = map.Text("joint", ""), .actuator = map.Text("actuator", ""), .position = map.Number("angle_rad", 0), .speed = map.Number("speed_rad_per_s", 0),
+                .command = map.Number("command", 0), .torque = map.Number("torque_n_m", 0)};
+    const bool of_joint = !limit.joint.empty();
+    if (of_joint != limit.actuator.empty()) map.Fail(item, {.what = "a limit needs exactly one of 'joint' or 'actuator'"});
+    if (of_joint ? limit.command != 0 || limit.torque != 0 : limit.position != 0 || limit.speed != 0) {
+      map.Fail(item, {.what = "a joint is limited by 'angle_rad' and 'speed_rad_per_s', an actuator by 'command' and 'torque_n_m'"});
+    }
+    for (const double value : {limit.position, limit.speed, limit.command, limit.torque}) {
+      if (!(value >= 0)) map.Fail(item, {.what = "a limit is a magnitude about zero", .allowed = "> 0"});
+    }
+    GS_RETURN_IF_ERROR(map.Finish());
+    experiment->limits.push_back(std::move(limit));
+  }
+  return Ok();
+}
+
 Status ReadReplay(const YAML::Node& node, const std::string& path, Experiment* experiment) {
   if (!node.IsDefined()) return Ok();
   YamlMap map(node, path, "'replay'");
@@ -221,7 +240,7 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   map.Text("doc", "");
   const std::string model = map.Text("model");
   if (model.empty()) map.Fail(root, {.what = "'model' is empty", .allowed = "the path of an MJCF file"});
-  const std::vector<YAML::Node> commands = map.List("commands");
+  const std::vector<YAML::Node> commands = map.List("commands"), limits = map.List("limits");
   const YAML::Node log = map.Child("log"), values = map.Child("values"), measured = map.Child("measured"),
                    parameters = map.Child("parameters"), set = map.Child("set"), replay = map.Child("replay");
   GS_RETURN_IF_ERROR(map.Finish());
@@ -234,6 +253,7 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   GS_RETURN_IF_ERROR(ReadMeasured(measured, path, &experiment));
   GS_RETURN_IF_ERROR(ReadParameters(parameters, path, &experiment));
   GS_RETURN_IF_ERROR(ReadSettings(set, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadLimits(limits, path, &experiment));
   GS_RETURN_IF_ERROR(ReadReplay(replay, path, &experiment));
   return experiment;
 }

@@ -63,6 +63,13 @@ struct FieldSetting {
   std::string where;  // file:line:column, for errors
 };
 
+// How far an experiment on the rig may go, as magnitudes about zero; 0: no limit is stated. Exactly one of joint and actuator is named.
+struct Limit {
+  std::string joint, actuator;
+  double position = 0, speed = 0;  // of the joint: rad and rad/s (m and m/s)
+  double command = 0, torque = 0;  // of the actuator: the command in its SI unit; N m (N) at its joint
+};
+
 enum class ReplayMode { kFreeRun, kWindows, kClosedLoop };
 
 struct ReplayDefaults {
@@ -82,6 +89,7 @@ struct Experiment {
   std::vector<MeasuredSpec> measured;
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
+  std::vector<Limit> limits;
   ReplayDefaults replay;
 };
 

@@ -1,0 +1,221 @@
+#include "src/design/rehearsal.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "src/core/units.h"
+
+namespace gapscope {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kPrefix = "limit ";
+
+MeasuredSpec LimitSignal(const std::string& name, SignalKind kind, const std::string& on, const char* unit) {
+  MeasuredSpec spec;
+  spec.signal = kPrefix + name;
+  spec.columns = {spec.signal};
+  spec.kind = kind;
+  spec.on = on;
+  spec.unit = unit;
+  spec.optional = true;
+  spec.scored = false;
+  return spec;
+}
+
+bool IsLimitSignal(const MeasuredSpec& spec) { return spec.signal.starts_with(kPrefix); }
+
+double LargestMagnitude(const std::vector<double>& values) {
+  double largest = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
+}  // namespace
+
+Experiment WithLimitSignals(Experiment experiment) {
+  std::vector<MeasuredSpec> added;
+  for (const auto& limit : experiment.limits) {
+    if (limit.position > 0) added.push_back(LimitSignal(limit.joint + " angle", SignalKind::kPosition, limit.joint, "rad"));
+    if (limit.speed > 0) added.push_back(LimitSignal(limit.joint + " speed", SignalKind::kVelocity, limit.joint, "rad/s"));
+    if (limit.torque > 0) added.push_back(LimitSignal(limit.actuator + " torque", SignalKind::kTorque, limit.actuator, "N m"));
+  }
+  experiment.measured.insert(experiment.measured.end(), added.begin(), added.end());
+  return experiment;
+}
+
+double CommandLimit(const Experiment& experiment, const std::string& actuator) {
+  for (const auto& limit : experiment.limits) {
+    if (limit.actuator == actuator && limit.command > 0) return limit.command;
+  }
+  return 0;
+}
+
+Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalOptions& options) {
+  if (experiment.commands.empty()) return Error{.what = "the experiment has no command to drive", .where = experiment.path};
+  std::vector<std::string> names;
+  for (const auto& command : experiment.commands) names.push_back(command.actuator);
+  for (const auto& [name, value] : options.hold) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) return Error{.what = "no command drives that actuator", .where = "--hold", .actual = "'" + name + "'", .cure = "did you mean '" + Nearest(name, names) + "'?"};
+  }
+  for (const auto& limit : experiment.limits) {
+    if (!limit.actuator.empty() && std::find(names.begin(), names.end(), limit.actuator) == names.end()) {
+      return Error{.what = "a limit on an actuator that no command drives", .where = experiment.path, .actual = "'" + limit.actuator + "'"};
+    }
+  }
+  if (options.actuator.empty()) return std::size_t{0};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i] == options.actuator) return i;
+  }
+  return Error{.what = "no command drives that actuator", .where = "--actuator", .actual = "'" + options.actuator + "'", .cure = "did you mean '" + Nearest(options.actuator, names) + "'?"};
+}
+
+Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions& options, const std::vector<double>& values) {
+  GS_ASSIGN(const std::size_t driven, DrivenCommand(experiment, options));
+  Recording input;
+  input.log_path = "designed";
+  for (std::size_t k = 0; k < values.size(); ++k) input.time_s.push_back(static_cast<double>(k) / options.rate_hz);
+  input.timeline.time_s = input.time_s;
+  input.timeline.median_step_s = 1 / options.rate_hz;
+  input.rows_in_log = values.size();
+  for (const auto& spec : experiment.values) {
+    if (const auto given = options.log_values.find(spec.name); given != options.log_values.end()) {
+      input.values[spec.name] = given->second;
+    } else if (spec.fallback) {
+      input.values[spec.name] = *spec.fallback;
+    } else {
+      return Error{.what = "a log would bring '" + spec.name + "', and there is no log", .where = experiment.path, .cure = "add --value " + spec.name + "=NUMBER"};
+    }
+  }
+  for (std::size_t c = 0; c < experiment.commands.size(); ++c) {
+    const CommandSpec& spec = experiment.commands[c];
+    Recording::Command command{.actuator = spec.actuator, .column = spec.columns.empty() ? "constant" : spec.columns.front()};
+    if (c == driven) {
+      command.values = values;
+    } else {
+      double constant = 0;
+      if (const auto held = options.hold.find(spec.actuator); held != options.hold.end()) {
+        constant = held->second;
+      } else {
+        GS_ASSIGN(constant, EvaluateOnce(spec.fallback, input.values, experiment.path + ": default of command '" + spec.actuator + "'"));
+      }
+      command.values.assign(values.size(), constant);
+    }
+    input.commands.push_back(std::move(command));
+  }
+  for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
+    input.measured.push_back({.spec = experiment.measured[i], .index = i, .column = experiment.measured[i].columns.front(), .values = std::vector<double>(values.size(), kNan)});
+  }
+  return input;
+}
+
+Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, const std::vector<double>& values) {
+  Rehearsal rehearsal{.recording = std::move(input)};
+  Recording& recording = rehearsal.recording;
+  const mjModel& m = model.compiled();
+  InitialState rest;
+  rest.qpos.assign(m.qpos0, m.qpos0 + m.nq);
+  rest.qvel.assign(m.nv, 0.0);
+  const std::size_t signals = recording.measured.size();
+  std::vector<double> predicted(recording.rows() * signals, kNan);
+  const bool simulated = simulator.SetParameters(values, recording) && simulator.Run(recording, {0, recording.rows()}, rest, predicted).outcome == Outcome::kCompleted;
+  for (std::size_t s = 0; s < signals; ++s) {
+    for (std::size_t r = 0; r < recording.rows(); ++r) recording.measured[s].values[r] = predicted[r * signals + s];
+  }
+  const Experiment& experiment = model.experiment();
+  const auto add = [&](const std::string& name, const std::string& unit, double reached, double limit) {
+    rehearsal.extremes.push_back({.name = name, .unit = unit, .reached = reached, .limit = limit});
+    rehearsal.worst = std::max(rehearsal.worst, reached / limit);
+  };
+  const auto reached = [&](const std::string& name) {
+    for (const auto& measured : recording.measured) {
+      if (measured.spec.signal == kPrefix + name) return LargestMagnitude(measured.values);
+    }
+    return kNan;
+  };
+  for (const auto& limit : experiment.limits) {
+    if (limit.command > 0) {
+      for (std::size_t c = 0; c < experiment.commands.size(); ++c) {
+        if (experiment.commands[c].actuator == limit.actuator) add(limit.actuator + " command", experiment.commands[c].unit, LargestMagnitude(recording.commands[c].values), limit.command);
+      }
+    }
+    if (limit.torque > 0) add(limit.actuator + " torque", "N m", reached(limit.actuator + " torque"), limit.torque);
+    if (limit.position > 0) add(limit.joint + " angle", "rad", reached(limit.joint + " angle"), limit.position);
+    if (limit.speed > 0) add(limit.joint + " speed", "rad/s", reached(limit.joint + " speed"), limit.speed);
+  }
+  if (!simulated) rehearsal.worst = std::numeric_limits<double>::infinity();
+  return rehearsal;
+}
+
+Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const RehearsalOptions& options, const std::vector<double>& unit_wave, double highest, double margin) {
+  const auto worst_at = [&](double amplitude) -> Result<double> {
+    std::vector<double> values(unit_wave);
+    for (double& value : values) value *= amplitude;
+    double worst = 0;
+    for (const auto& one : models) {
+      GS_ASSIGN(Recording input, MakeInput(one.model->experiment(), options, values));
+      worst = std::max(worst, Rehearse(*one.model, *one.simulator, std::move(input), one.values).worst);
+      if (worst > 4 * margin) break;
+    }
+    return worst;
+  };
+  // From above by the worst ratio itself (exact where the rig is linear), then halving what is left.
+  double amplitude = highest, safe = 0, unsafe = 0;
+  for (int i = 0; i < 10; ++i) {
+    GS_ASSIGN(const double worst, worst_at(amplitude));
+    if (worst <= margin * (1 + 1e-9)) {
+      safe = amplitude;
+      if (amplitude >= highest || worst > 0.95 * margin) break;
+    } else {
+      unsafe = amplitude;
+    }
+    const double by_ratio = amplitude * std::clamp(0.98 * margin / worst, 0.1, 10.0);
+    amplitude = std::min(highest, safe > 0 && unsafe > 0 ? 0.5 * (safe + unsafe) : by_ratio);
+    if (safe > 0 && unsafe > 0 && unsafe - safe < 0.03 * safe) break;
+  }
+  if (!(safe > 0)) return Error{.what = "the limits are passed at every amplitude that was tried", .where = "limits", .actual = fmt::format("down to {:.3g}", amplitude)};
+  return safe;
+}
+
+std::string InputCsv(const Experiment& experiment, const Rehearsal& rehearsal) {
+  const Recording& recording = rehearsal.recording;
+  std::string text = experiment.timeline.time_column.empty() ? "time_s" : experiment.timeline.time_column;
+  const std::map<std::string, double> kPerSecond = {{"", 1}, {"s", 1}, {"ms", 1e3}, {"us", 1e6}, {"ns", 1e9}};
+  const double per_second = kPerSecond.at(experiment.timeline.time_unit);
+  std::vector<std::size_t> commands;
+  for (std::size_t c = 0; c < recording.commands.size(); ++c) {
+    if (recording.commands[c].column == "constant") continue;
+    commands.push_back(c);
+    text += "," + recording.commands[c].column;
+  }
+  for (const auto& measured : recording.measured) {
+    if (!IsLimitSignal(measured.spec)) text += ",predicted." + measured.spec.signal;
+  }
+  for (const auto& extreme : rehearsal.extremes) {
+    std::string name = extreme.name;
+    std::replace(name.begin(), name.end(), ' ', '_');
+    text += ",limit." + name;
+  }
+  text += "\n";
+  for (std::size_t r = 0; r < recording.rows(); ++r) {
+    fmt::format_to(std::back_inserter(text), "{:.10g}", recording.time_s[r] * per_second);
+    for (const std::size_t c : commands) {
+      const CommandSpec& spec = experiment.commands[c];
+      fmt::format_to(std::back_inserter(text), ",{:.10g}", (recording.commands[c].values[r] - spec.offset) / spec.factor);
+    }
+    for (const auto& measured : recording.measured) {
+      if (!IsLimitSignal(measured.spec)) fmt::format_to(std::back_inserter(text), ",{:.8g}", measured.values[r]);
+    }
+    for (const auto& extreme : rehearsal.extremes) fmt::format_to(std::back_inserter(text), ",{:.6g}", extreme.limit);
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,102 @@
+// `gapscope design` as a user runs it.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/experiment/scratch.h"
+
+namespace gapscope::testing {
+namespace {
+
+class DesignCliTest : public ::testing::Test {
+ protected:
+  struct Answer {
+    int status = -1;
+    std::string out, err;
+  };
+  Answer Run(const std::string& arguments) {
+    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
+    const int raw = std::system(("'" GAPSCOPE_PROGRAM "' design " + arguments + " > '" + out + "' 2> '" + err + "' < /dev/null").c_str());
+    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
+  }
+  std::string Rig(const std::string& name) { return "'" + std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + name + "/experiment.yaml'"; }
+  Scratch scratch_;
+};
+
+TEST_F(DesignCliTest, ChirpJsonIsUnrounded) {
+  const Answer answer = Run("chirp --inertia-kg-m2 0.159221308 --natural-frequency-hz 5 --damping-ratio 0.707,1.2,2 --speed-limit-rpm 116 --amplitude-factor 0.8 --end-over-bandwidth 2,3,5 --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_EQ(json["schema"], "gapscope.design.chirp/1");
+  ASSERT_EQ(json["rows"].size(), 3u);
+  const auto& row = json["rows"][1];
+  EXPECT_EQ(row["damping_ratio"], 1.2);
+  // J w^2 with w = 10 pi, and what follows, in closed form.
+  const double pi = 3.14159265358979323846, kp = 0.159221308 * 100 * pi * pi, z2 = 1.44;
+  EXPECT_NEAR(row["kp_n_m_per_rad"].get<double>(), kp, 1e-12 * kp);
+  const double bandwidth = 5 * std::sqrt(1 - 2 * z2 + std::sqrt(4 * z2 * z2 - 4 * z2 + 2));
+  EXPECT_NEAR(row["bandwidth_hz"].get<double>(), bandwidth, 1e-12);
+  ASSERT_EQ(row["chirps"].size(), 3u);
+  EXPECT_NEAR(row["chirps"][2]["end_frequency_hz"].get<double>(), 5 * bandwidth, 1e-11);
+  EXPECT_NEAR(row["chirps"][2]["amplitude_deg"].get<double>(), 0.8 * 116 * 6 / (2 * pi * 5 * bandwidth), 1e-11);
+}
+
+TEST_F(DesignCliTest, SquareOfTheFlexibleJointIsWritten) {
+  const std::string file = scratch_.Path("square.csv");
+  const Answer answer = Run("square " + Rig("flexjoint") + " --out '" + file + "' --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_NEAR(1 / json["low_hz"].get<double>(), 0.63, 1e-12);
+  for (const auto& limit : json["limits"]) EXPECT_LE(limit["reached"].get<double>(), 0.9001 * limit["limit"].get<double>()) << limit;
+  std::ifstream csv(file);
+  std::string header;
+  std::getline(csv, header);
+  EXPECT_EQ(header.substr(0, 17), "time_s,voltage_v,");
+}
+
+TEST_F(DesignCliTest, InputsPastTheLimitsAreRefusedWithTheAmplitudeThatKeepsThem) {
+  const std::string file = scratch_.Path("never.csv");
+  const Answer answer = Run("square " + Rig("flexjoint") + " --amplitude 9 --out '" + file + "'");
+  EXPECT_EQ(answer.status, 2);
+  EXPECT_NE(answer.err.find("link angle"), std::string::npos) << answer.err;
+  const std::size_t at = answer.err.find("--amplitude ");
+  ASSERT_NE(at, std::string::npos) << answer.err;
+  EXPECT_FALSE(std::filesystem::exists(file));
+  const double smaller = std::stod(answer.err.substr(at + 12));
+  EXPECT_EQ(Run("square " + Rig("flexjoint") + " --amplitude " + std::to_string(smaller)).status, 0);
+}
+
+TEST_F(DesignCliTest, OptimalPrintsACommandThatWorks) {
+  const Answer answer = Run("optimal " + Rig("flexlink") + " --separate coulomb_friction@hub --separate torque_bias@hub --duration 3 --json");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_EQ(json["schema"], "gapscope.design.optimal/1");
+  EXPECT_EQ(json["targets"].size(), 2u);
+  EXPECT_GT(json["inputs"][0]["score"].get<double>(), 1);
+  std::string command = json["command"];
+  ASSERT_EQ(command.rfind("gapscope design ", 0), 0u);
+  command = command.substr(std::string("gapscope design ").size());
+  command.replace(command.find("input.csv"), 9, scratch_.Path("input.csv"));
+  EXPECT_EQ(Run(command).status, 0) << command;
+  EXPECT_TRUE(std::filesystem::exists(scratch_.Path("input.csv")));
+}
+
+TEST_F(DesignCliTest, BadArgumentsAreBadInput) {
+  const std::string rig = Rig("flexjoint");
+  for (const std::string& arguments : {std::string("chirp"), std::string("chirp --inertia-kg-m2 nan --natural-frequency-hz 5 --damping-ratio 1 --speed-limit-rpm 100"),
+                                       std::string("square nowhere.yaml"), "square " + rig + " --set link.stifness=1", "square " + rig + " --period 0.001", "optimal " + rig,
+                                       "optimal " + rig + " --separate cable_spring@base", "optimal " + rig + " --separate cable_spring@base --separate cable_spring@base",
+                                       "optimal " + rig + " --separate cable_spring@nowhere --separate none", "optimal " + rig + " --parameter motor.gear_ratio", "square " + Rig("xl330")}) {
+    const Answer answer = Run(arguments);
+    EXPECT_EQ(answer.status, 2) << arguments << "\n" << answer.err;
+    EXPECT_NE(answer.err, "") << arguments;
+    EXPECT_EQ(answer.out, "") << arguments;
+  }
+}
+
+}  // namespace
+}  // namespace gapscope::testing

@@ -1,0 +1,160 @@
+// Limits kept by rehearsal, and inputs chosen by what they show: against closed forms and fits that are simple enough to reason about.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include "src/design/optimal.h"
+#include "tests/experiment/scratch.h"
+
+namespace gapscope {
+namespace {
+
+const std::string kModels = std::string(GAPSCOPE_SOURCE_DIR) + "/models/";
+
+struct Rig {
+  Experiment experiment;
+  std::shared_ptr<const Model> model;
+};
+Rig Load(const std::string& name) {
+  const auto experiment = LoadExperiment(kModels + name + "/experiment.yaml");
+  EXPECT_TRUE(experiment.ok()) << experiment.error().Text();
+  Rig rig{.experiment = WithLimitSignals(experiment.value())};
+  const auto model = Model::Build(rig.experiment);
+  EXPECT_TRUE(model.ok()) << model.error().Text();
+  rig.model = model.value();
+  return rig;
+}
+
+std::vector<double> Wave(WaveShape shape, double low, double high, double rate) {
+  return SampleWaveform({.shape = shape, .duration_s = 5, .low_hz = low, .high_hz = high, .seed = 1}, rate).value();
+}
+
+// The flexible joint is linear: what is reached grows with the amplitude, so the largest safe amplitude puts the worst limit at the margin.
+TEST(RehearsalTest, LargestAmplitudeUsesTheMarginOnALinearRig) {
+  const Rig rig = Load("flexjoint");
+  Simulator simulator(*rig.model, 0);
+  const RehearsalOptions options{.rate_hz = 500};
+  const auto wave = Wave(WaveShape::kSquare, 1 / 0.63, 1, 500);
+  const auto amplitude = LargestAmplitude({{rig.model.get(), &simulator, rig.model->Nominal()}}, options, wave, 10, 0.9);
+  ASSERT_TRUE(amplitude.ok());
+  std::vector<double> values = wave;
+  for (double& v : values) v *= amplitude.value();
+  auto input = MakeInput(rig.experiment, options, values);
+  ASSERT_TRUE(input.ok());
+  const Rehearsal rehearsal = Rehearse(*rig.model, simulator, input.value(), rig.model->Nominal());
+  EXPECT_LE(rehearsal.worst, 0.9 * (1 + 1e-6));
+  EXPECT_GT(rehearsal.worst, 0.85);
+  ASSERT_EQ(rehearsal.extremes.size(), 4u);
+  EXPECT_EQ(rehearsal.extremes[0].name, "motor command");
+  EXPECT_DOUBLE_EQ(rehearsal.extremes[0].reached, amplitude.value());
+}
+
+// At standstill the servo's first torque is kp times the step: 119.6 / 157.1451 rad is all that the torque limit allows.
+TEST(RehearsalTest, TorqueLimitOfAStepIsTheServosStiffness) {
+  const Rig rig = Load("joint");
+  Simulator simulator(*rig.model, 0);
+  std::vector<double> step(500, 0.0);
+  for (std::size_t k = 50; k < step.size(); ++k) step[k] = 1;
+  const auto amplitude = LargestAmplitude({{rig.model.get(), &simulator, rig.model->Nominal()}}, {.rate_hz = 500}, step, 1.6, 1);
+  ASSERT_TRUE(amplitude.ok());
+  // Torque is read at the stamps: one sample (2 ms) after the step it is a few percent lower.
+  EXPECT_GE(amplitude.value(), 119.6 / 157.1451 * 0.95);
+  EXPECT_LE(amplitude.value(), 119.6 / 157.1451 * 1.15);
+}
+
+TEST(RehearsalTest, CsvIsALogOfTheExperiment) {
+  const Rig rig = Load("flexjoint");
+  Simulator simulator(*rig.model, 0);
+  std::vector<double> values = Wave(WaveShape::kTriangle, 0.5, 1, 100);
+  auto input = MakeInput(rig.experiment, {.rate_hz = 100}, values);
+  ASSERT_TRUE(input.ok());
+  const std::string csv = InputCsv(rig.experiment, Rehearse(*rig.model, simulator, input.value(), rig.model->Nominal()));
+  testing::Scratch scratch;
+  const std::string path = scratch.Write("input.csv", csv);
+  const auto log = ReadLog(path, rig.experiment.read);
+  ASSERT_TRUE(log.ok()) << log.error().Text();
+  ASSERT_NE(log.value().Find("voltage_v"), nullptr);
+  ASSERT_NE(log.value().Find("predicted.base_rad"), nullptr);
+  EXPECT_EQ(log.value().Find("voltage_v")->values.size(), values.size());
+  EXPECT_NEAR(log.value().Find("voltage_v")->values[37], values[37], 1e-9);
+  // No measured column: nobody can mistake a prediction for a log.
+  EXPECT_EQ(log.value().Find("base_rad"), nullptr);
+}
+
+TEST(RehearsalTest, RefusesUnknownActuatorsAndMissingNumbers) {
+  const Rig rig = Load("flexjoint"), servo = Load("xl330");
+  EXPECT_FALSE(MakeInput(rig.experiment, {.actuator = "moter", .hold = {}, .log_values = {}, .rate_hz = 100}, {0, 0}).ok());
+  EXPECT_FALSE(MakeInput(rig.experiment, {.actuator = "", .hold = {{"brake", 1}}, .log_values = {}, .rate_hz = 100}, {0, 0}).ok());
+  const auto missing = MakeInput(servo.experiment, {.rate_hz = 100}, {0, 0});
+  ASSERT_FALSE(missing.ok());
+  EXPECT_NE(missing.error().Text().find("--value log.kp"), std::string::npos);
+}
+
+// The flexible joint is linear: a quarter of the amplitude has a sixteenth of the information, so four times the standard deviation, or less where what is known
+// beforehand of the other parameters helps.
+TEST(OptimalTest, DeviationsGrowAsTheAmplitudeShrinks) {
+  const Rig rig = Load("flexjoint");
+  ThreadPool pool(1);
+  const Hypothesis base = MakeHypothesis("none", rig.model, rig.model->Nominal());
+  const auto design = DesignForParameters(base, {rig.model->IndexOf("link.stiffness")}, {.rehearsal = {.rate_hz = 250}, .duration_s = 4}, pool);
+  ASSERT_TRUE(design.ok()) << design.error().Text();
+  const auto& inputs = design.value().inputs;
+  ASSERT_GE(inputs.size(), 5u);
+  std::map<double, double> chirps;  // deviation by amplitude
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    EXPECT_LE(inputs[i].rehearsal.worst, 0.9 * (1 + 1e-6));
+    ASSERT_EQ(inputs[i].per_target.size(), 1u);
+    EXPECT_NEAR(inputs[i].score, -std::log(inputs[i].per_target[0]), 1e-12);
+    if (i > 0) EXPECT_GE(inputs[i].per_target[0], inputs[i - 1].per_target[0]);
+    if (inputs[i].wave.shape == WaveShape::kChirp) chirps[inputs[i].amplitude] = inputs[i].per_target[0];
+  }
+  ASSERT_EQ(chirps.size(), 2u);
+  const auto [small, large] = std::pair{*chirps.begin(), *chirps.rbegin()};
+  EXPECT_NEAR(large.first / small.first, 4, 1e-9);
+  EXPECT_LE(small.second / large.second, 4 * (1 + 1e-6));
+  EXPECT_GT(small.second / large.second, 2.5);
+
+  const auto frozen = DesignForParameters(MakeHypothesis("none", Load("qube").model, Load("qube").model->Nominal()), {0, 3}, {.rehearsal = {.rate_hz = 250}, .duration_s = 3}, pool);
+  EXPECT_FALSE(frozen.ok());
+}
+
+// A bias and a spring about a far rest angle look alike as long as the arm hardly moves: the chosen input moves it.
+TEST(OptimalTest, SeparatingInputMovesWhereTheRivalsDiffer) {
+  const Rig rig = Load("flexjoint");
+  ThreadPool pool(2);
+  const ScaleTable scales;
+  const auto rival = [&](const std::string& effect, const std::map<std::string, double>& set) {
+    const auto uses = rig.model->ParseEffects({effect});
+    const auto model = Model::Build(rig.experiment, uses.value(), scales);
+    EXPECT_TRUE(model.ok());
+    std::vector<double> values = model.value()->Nominal();
+    for (const auto& [name, value] : set) values[model.value()->Find(name, "").value()] = value;
+    return MakeHypothesis(effect, model.value(), values);
+  };
+  const Hypothesis base = MakeHypothesis("none", rig.model, rig.model->Nominal());
+  const std::vector<Hypothesis> rivals = {
+      rival("cable_spring@base", {{"cable_spring@base.stiffness_n_m_per_rad", 0.02}, {"cable_spring@base.rest_rad", 0.3}}),
+      rival("torque_bias@base", {{"torque_bias@base.torque_n_m", 0.006}}),
+  };
+  const OptimalOptions options{.rehearsal = {.rate_hz = 250}, .duration_s = 2.5};
+  const auto design = DesignForRivals(base, rivals, options, pool);
+  ASSERT_TRUE(design.ok()) << design.error().Text();
+  const auto& inputs = design.value().inputs;
+  ASSERT_EQ(design.value().targets.size(), 2u);
+  EXPECT_GT(inputs.front().score, 5);
+  // The same choice with any number of workers.
+  ThreadPool one(1);
+  const auto again = DesignForRivals(base, rivals, options, one);
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(again.value().inputs.front().amplitude, inputs.front().amplitude);
+  EXPECT_EQ(again.value().inputs.front().score, inputs.front().score);
+  // A rival can imitate itself: what is left against a copy is nothing.
+  const auto copy = DesignForRivals(base, {rivals[0], rivals[0]}, options, pool);
+  ASSERT_TRUE(copy.ok());
+  EXPECT_LT(copy.value().inputs.front().score, 1e-6);
+}
+
+}  // namespace
+}  // namespace gapscope

@@ -97,14 +97,16 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
     result.time_step_s = chosen.step_s;
     result.time_step_error = chosen.error_change;
   }
+  const std::size_t nq = static_cast<std::size_t>(model.compiled().nq);
   std::vector<Job> jobs;
   for (std::size_t log = 0; log < recordings.size(); ++log) {
     result.logs.push_back(EmptyTraces(recordings[log]));
+    if (options.keep_poses) result.logs.back().qpos.assign(recordings[log].rows() * nq, kNan);
     for (const Window& window : MakeWindows(recordings[log], options.mode, options.window_s)) jobs.push_back({log, window});
   }
   std::vector<std::unique_ptr<Simulator>> simulators(pool.workers());
   std::vector<std::size_t> last_log(pool.workers(), std::numeric_limits<std::size_t>::max());
-  std::vector<std::vector<double>> buffers(pool.workers());
+  std::vector<std::vector<double>> buffers(pool.workers()), poses(pool.workers());
   std::vector<char> valid(pool.workers(), 1);
   std::vector<RunResult> runs(jobs.size());
   pool.ForEach(jobs.size(), [&](std::size_t index, int worker) {
@@ -119,7 +121,11 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
     auto& buffer = buffers[worker];
     if (buffer.size() < job.window.rows() * signals) buffer.resize(job.window.rows() * signals);
     if (valid[worker]) {
-      runs[index] = simulators[worker]->Run(recording, job.window, InitialStateAt(model, recording, job.window.begin, values), buffer);
+      poses[worker].resize(options.keep_poses ? job.window.rows() * nq : 0);
+      runs[index] = simulators[worker]->Run(recording, job.window, InitialStateAt(model, recording, job.window.begin, values), buffer, poses[worker]);
+      // Windows share a stamp: the later one begins there, and its own pose is the one that counts.
+      const std::size_t last = job.window.end == recording.rows() ? job.window.rows() : job.window.rows() - 1;
+      if (options.keep_poses) std::copy_n(poses[worker].begin(), last * nq, result.logs[job.log].qpos.begin() + static_cast<std::ptrdiff_t>(job.window.begin * nq));
     } else {
       runs[index].outcome = Outcome::kDiverged;
       std::fill(buffer.begin(), buffer.end(), kNan);
@@ -147,6 +153,7 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
 
 TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool) {
   ReplayOptions trial = options;
+  trial.keep_poses = false;
   const auto error_at = [&](double step) {
     trial.time_step_s = step;
     return ReplayError(Replay(model, recordings, trial, pool).logs);

@@ -15,6 +15,7 @@ struct ReplayOptions {
   double window_s = 1.0;         // kWindows: length; windows follow each other without overlap
   double time_step_s = 0;        // 0: chosen (see ChooseTimeStep)
   std::vector<double> values;    // parameters, as model.Nominal(); empty: nominal
+  bool keep_poses = false;       // fill LogReplay::qpos
 };
 
 // Measured and predicted on the recording's stamps.
@@ -33,6 +34,7 @@ struct LogReplay {
   std::size_t windows = 0, diverged_windows = 0;
   std::vector<double> time_s;
   std::vector<SignalTrace> signals;
+  std::vector<double> qpos;  // with keep_poses: rows x model nq, the simulated pose at each stamp; NaN after a divergence
 };
 
 // The recording's measurements with nothing predicted yet.

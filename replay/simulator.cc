@@ -116,11 +116,13 @@ double Simulator::Read(const SignalSource& source) const {
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
-RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted) {
+RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted, std::span<double> qpos) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
   const std::size_t signals = recording.measured.size();
   GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= window.rows() * signals);
+  const std::size_t nq = static_cast<std::size_t>(m->nq);
+  GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
   mj_resetData(m, d);
   std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
   std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
@@ -145,6 +147,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     }
     double* out = predicted.data() + (row - window.begin) * signals;
     for (std::size_t s = 0; s < signals; ++s) out[s] = Read(model_.source(recording.measured[s].index));
+    if (!qpos.empty()) std::copy(d->qpos, d->qpos + nq, qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin) * nq));
     if (row + 1 == window.end) break;
 
     const double interval = recording.time_s[row + 1] - now;
@@ -160,6 +163,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;
       std::fill(out + signals, predicted.data() + window.rows() * signals, std::numeric_limits<double>::quiet_NaN());
+      if (!qpos.empty()) std::fill(qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin + 1) * nq), qpos.end(), std::numeric_limits<double>::quiet_NaN());
       break;
     }
   }

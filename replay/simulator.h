@@ -47,7 +47,8 @@ class Simulator {
 
   // Simulates the window from `start`. `predicted` receives rows() x recording.measured.size() numbers, row by row: at each stamp the value
   // before that stamp's command acts; NaN after a divergence. A signal's delay and offset parameters are applied.
-  RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted);
+  // `qpos`, when it is not empty, receives the pose at each stamp: rows() x model nq numbers; NaN after a divergence.
+  RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted, std::span<double> qpos = {});
 
   // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next SetParameters.
   void set_shift_s(double shift) { shift_s_ = shift; }

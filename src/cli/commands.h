@@ -16,6 +16,7 @@ void AddInspect(CLI::App& program, Run& run);
 void AddDesign(CLI::App& program, Run& run);
 void AddDiagnose(CLI::App& program, Run& run);
 void AddReplay(CLI::App& program, Run& run);
+void AddRender(CLI::App& program, Run& run);
 void AddTune(CLI::App& program, Run& run);
 void AddPlan(CLI::App& program, Run& run);   // plan, run and merge: many logs, shared out
 

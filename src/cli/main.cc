@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   cli::AddTune(program, run);
   cli::AddDiagnose(program, run);
   cli::AddDesign(program, run);
+  cli::AddRender(program, run);
   cli::AddPlan(program, run);
   try {
     program.parse(argc, argv);

@@ -29,11 +29,24 @@ void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
   if (writes_folder) command.add_option("--out", flags.out, "Folder for result.json, traces and model.xml");
 }
 
+namespace {
+void AddWhileFlag(CLI::App& command, ModelFlags& flags) {
+  command.add_option("--while", flags.while_column, "Use a log's rows until this column falls to zero (\"torque_enable\")");
+}
+}  // namespace
+
 void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects) {
   command.add_option("experiment", flags.experiment, "Experiment file (YAML)")->required();
   command.add_option("logs", flags.logs, "Hardware logs")->required();
-  command.add_option("--while", flags.while_column, "Use a log's rows until this column falls to zero (\"torque_enable\")");
-  if (!effects) return;
+  if (effects) {
+    AddEffectFlags(command, flags);
+  } else {
+    AddWhileFlag(command, flags);
+  }
+}
+
+void AddEffectFlags(CLI::App& command, ModelFlags& flags) {
+  AddWhileFlag(command, flags);
   command.add_option("--with", flags.with, "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL]")->allow_extra_args(false);
   command.add_option("--set", flags.set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
   command.add_option("--params", flags.params, "YAML file of parameter values")->allow_extra_args(false);

@@ -41,6 +41,8 @@ struct ModelFlags {
 };
 // Adds EXPERIMENT LOG... and, where the command takes them, --with, --set, --params.
 void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects);
+// --while, --with, --set, --params alone.
+void AddEffectFlags(CLI::App& command, ModelFlags& flags);
 
 struct Session {
   Experiment experiment;

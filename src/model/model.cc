@@ -233,6 +233,29 @@ Result<std::string> Model::ToXml(std::span<const double> values, const std::map<
   return xml;
 }
 
+Result<ModelPtr> Model::CompileForDrawing(std::span<const double> values, const std::map<std::string, double>& log_values) const {
+  const ModelPtr written(mj_copyModel(nullptr, compiled_.get()));
+  const DataPtr data(mj_makeData(written.get()));
+  ParameterWriter(*this, written.get(), data.get()).Write(values, log_values);
+  // Built anew: compiling without what is drawn takes it out of the spec too.
+  GS_ASSIGN(Structure structure, Structure::Load(experiment_));
+  for (const auto& use : effects_) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, {}));
+  GS_RETURN_IF_ERROR(structure.Finish());
+  ModelPtr drawn;
+  try {
+    drawn.reset(mj_compile(structure.spec.get(), nullptr));
+  } catch (const std::exception& e) {
+    return Error{.what = "MuJoCo refuses to draw the model: " + OneLine(e.what()), .where = experiment_.model_path};
+  }
+  if (!drawn) return Error{.what = "the MJCF does not compile with what it draws: " + OneLine(mjs_getError(structure.spec.get())), .where = experiment_.model_path};
+  GS_CHECK(drawn->nbody == written->nbody && drawn->njnt == written->njnt && drawn->nq == written->nq);
+  std::copy_n(written->body_pos, 3 * written->nbody, drawn->body_pos);
+  std::copy_n(written->body_quat, 4 * written->nbody, drawn->body_quat);
+  std::copy_n(written->jnt_pos, 3 * written->njnt, drawn->jnt_pos);
+  std::copy_n(written->jnt_axis, 3 * written->njnt, drawn->jnt_axis);
+  return drawn;
+}
+
 ParameterWriter::ParameterWriter(const Model& model, mjModel* target, mjData* data) : model_(model), target_(target), data_(data) {
   const std::vector<std::string> names = NamesOf(model.parameters_, model.experiment_);
   for (const auto& value : model.experiment_.values) log_names_.push_back(value.name);

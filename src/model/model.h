@@ -66,6 +66,10 @@ class Model {
   // The tuned MJCF with its plugin elements: loads in any MuJoCo with the plugin library. `values` as Nominal(), `log_values` of one log.
   Result<std::string> ToXml(std::span<const double> values, const std::map<std::string, double>& log_values, const ScaleTable& scales) const;
 
+  // The same structure with everything that is only drawn, which compiled() leaves out; bodies stand where `values` put them. qpos means the same in
+  // both. Error: the MJCF does not compile with its pictures (a missing texture, say).
+  Result<ModelPtr> CompileForDrawing(std::span<const double> values, const std::map<std::string, double>& log_values) const;
+
  private:
   friend class ParameterWriter;
   struct Setting {

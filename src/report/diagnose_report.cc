@@ -67,6 +67,7 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
   json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
   json["explanation"] = d.explanation;
   json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
+  if (d.model) json["model"] = JsonModel(*d.model, d.values);
   json["wall_s"] = d.wall_s;
   json["budget_spent"] = d.budget_spent;
   json["seed"] = seed;

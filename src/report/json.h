@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/compare/score.h"
+#include "src/model/model.h"
 #include "src/report/version.h"
 
 namespace gapscope {
@@ -16,6 +17,14 @@ inline nlohmann::ordered_json JsonNumber(double value) { return std::isfinite(va
 inline nlohmann::ordered_json JsonScore(const SignalScore& s) {
   return {{"rmse", JsonNumber(s.rmse)}, {"mae", JsonNumber(s.mae)}, {"nrmse", JsonNumber(s.nrmse)}, {"max", JsonNumber(s.max)}, {"lag_s", JsonNumber(s.lag_s)},
           {"correlation", JsonNumber(s.correlation)}};
+}
+
+// What it takes to build the model again: its effects and the values of all its parameters (src/cli/result_model.h reads it).
+inline nlohmann::ordered_json JsonModel(const Model& model, std::span<const double> values) {
+  nlohmann::ordered_json json = {{"effects", nlohmann::ordered_json::array()}, {"values", nlohmann::ordered_json::object()}};
+  for (const auto& use : model.effects()) json["effects"].push_back({{"name", use.effect}, {"on", use.on}});
+  for (std::size_t i = 0; i < values.size(); ++i) json["values"][model.parameters()[i].name] = JsonNumber(values[i]);
+  return json;
 }
 
 inline nlohmann::ordered_json JsonVersions() { return {{"gapscope", GapscopeVersion()}, {"mujoco", MujocoVersion()}}; }

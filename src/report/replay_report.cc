@@ -100,6 +100,7 @@ std::string ReplayJson(const ReplayReport& report) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!model.parameters()[i].name.starts_with("scale@")) json["parameters"][model.parameters()[i].name] = values[i];
   }
+  json["model"] = JsonModel(model, values);
   json["cost"] = {{"wall_s", result.wall_s}, {"simulated_s", result.simulated_s}, {"steps", result.steps}};
   json["seed"] = seed;
   json["versions"] = JsonVersions();

@@ -81,6 +81,7 @@ std::string TuneJson(const TuneSummary& summary, const Model& model, std::uint64
   json["held_out"] = Logs(summary.held_out);
   json["effects"] = ordered_json::array();
   for (const auto& use : model.effects()) json["effects"].push_back({{"name", use.effect}, {"on", use.on}});
+  json["model"] = JsonModel(model, summary.values);
   json["time_step_s"] = summary.time_step_s;
   json["command_shift_s"] = summary.shift_s;
   json["seed"] = seed;

@@ -1,0 +1,23 @@
+// The model of an earlier result: what `replay`, `tune` or `diagnose` wrote to --out, built again for another command.
+#ifndef GAPSCOPE_CLI_RESULT_MODEL_H_
+#define GAPSCOPE_CLI_RESULT_MODEL_H_
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/model/model.h"
+
+namespace gapscope::cli {
+
+struct ResultModel {
+  std::shared_ptr<const Model> model;
+  std::vector<double> values;
+};
+
+// `path`: the folder or its result.json. Errors: not such a file; an effect or a parameter that this experiment does not have.
+Result<ResultModel> LoadResultModel(const Experiment& experiment, const std::string& path, const ScaleTable& scales);
+
+}  // namespace gapscope::cli
+
+#endif  // GAPSCOPE_CLI_RESULT_MODEL_H_

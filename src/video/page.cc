@@ -1,0 +1,429 @@
+#include "src/video/page.h"
+
+#include <cairo/cairo.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/compare/decimate.h"
+#include "src/core/file.h"
+
+namespace gapscope {
+namespace {
+
+struct Colour {
+  double r, g, b;
+};
+constexpr Colour kInk = {0.11, 0.14, 0.18}, kFaint = {0.42, 0.46, 0.52}, kGrid = {0.89, 0.91, 0.93}, kPaper = {1, 1, 1}, kError = {0.86, 0.20, 0.18};
+// Blue against orange: told apart by every eye.
+constexpr Colour kMeasured = {0.0, 0.50, 0.86};
+constexpr Colour kModels[] = {{0.91, 0.42, 0.04}, {0.18, 0.60, 0.28}, {0.55, 0.27, 0.78}, {0.60, 0.45, 0.10}};
+
+Colour OfModel(std::size_t model) { return kModels[model % std::size(kModels)]; }
+
+// Places in a picture 720 pixels high.
+constexpr double kGutter = 132, kRightMargin = 74, kAxisHeight = 24, kRowGap = 7, kTopGap = 8;
+constexpr double kSignalRow = 62, kCommandRow = 40;
+constexpr std::size_t kMostSignals = 3;
+
+// -0.312, +1.2e-05: four digits and a sign.
+std::string Signed(double value) {
+  if (!std::isfinite(value)) return "-";
+  const std::string text = std::abs(value) < 1e-3 && value != 0 ? fmt::format("{:+.1e}", value) : fmt::format("{:+.3f}", value);
+  return text.starts_with('-') ? "\u2212" + text.substr(1) : text;
+}
+std::string Short(double value) {
+  std::string text = fmt::format("{:.3g}", value);
+  return text.starts_with('-') ? "\u2212" + text.substr(1) : text;
+}
+
+double Interpolate(const std::vector<double>& time, const std::vector<double>& values, double t) {
+  const std::size_t after = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), t) - time.begin());
+  if (after == 0) return values.front();
+  if (after == time.size()) return values.back();
+  const double a = values[after - 1], b = values[after];
+  // A prediction that restarts at a stamp has none there: the neighbour's serves.
+  if (!std::isfinite(a) || !std::isfinite(b)) return std::isfinite(a) ? a : b;
+  return a + (b - a) * (t - time[after - 1]) / (time[after] - time[after - 1]);
+}
+double Held(const std::vector<double>& time, const std::vector<double>& values, double t) {
+  const std::size_t after = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), t) - time.begin());
+  return values[after > 0 ? after - 1 : 0];
+}
+
+// 1, 2 or 5 times a power of ten: about `count` steps in `range`.
+double NiceStep(double range, double count) {
+  const double raw = range / count, power = std::pow(10, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (raw <= factor * power) return factor * power;
+  }
+  return 10 * power;
+}
+
+}  // namespace
+
+// A cairo surface over a picture's pixels.
+struct Page::Canvas {
+  explicit Canvas(Picture& picture)
+      : surface(cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(picture.pixels.data()), CAIRO_FORMAT_RGB24, picture.width, picture.height, 4 * picture.width)),
+        cr(cairo_create(surface)) {
+    cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
+  }
+  ~Canvas() {
+    cairo_destroy(cr);
+    cairo_surface_destroy(surface);
+  }
+  Canvas(const Canvas&) = delete;
+  Canvas& operator=(const Canvas&) = delete;
+
+  void Ink(const Colour& c, double alpha = 1) { cairo_set_source_rgba(cr, c.r, c.g, c.b, alpha); }
+  void Font(double size, bool bold = false) {
+    cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(cr, size);
+  }
+  double Width(const std::string& text) {
+    cairo_text_extents_t extents;
+    cairo_text_extents(cr, text.c_str(), &extents);
+    return extents.x_advance;
+  }
+  // Text whose anchor (0 left, 0.5 middle, 1 right) is at x, on the base line y.
+  void Text(const std::string& text, double x, double y, double anchor = 0) {
+    cairo_move_to(cr, x - anchor * Width(text), y);
+    cairo_show_text(cr, text.c_str());
+  }
+  // As much of the text as fits.
+  std::string Fit(std::string text, double width) {
+    if (Width(text) <= width) return text;
+    while (!text.empty() && Width(text + "\u2026") > width) {
+      do {
+        text.pop_back();
+      } while (!text.empty() && (text.back() & 0xC0) == 0x80);
+    }
+    return text + "\u2026";
+  }
+  void Box(double x, double y, double w, double h, double radius) {
+    cairo_new_sub_path(cr);
+    cairo_arc(cr, x + w - radius, y + radius, radius, -M_PI / 2, 0);
+    cairo_arc(cr, x + w - radius, y + h - radius, radius, 0, M_PI / 2);
+    cairo_arc(cr, x + radius, y + h - radius, radius, M_PI / 2, M_PI);
+    cairo_arc(cr, x + radius, y + radius, radius, M_PI, 3 * M_PI / 2);
+    cairo_close_path(cr);
+  }
+  void Card(double x, double y, double w, double h, double radius) {
+    Box(x, y, w, h, radius);
+    Ink(kPaper, 0.86);
+    cairo_fill(cr);
+  }
+  cairo_surface_t* surface;
+  cairo_t* cr;
+};
+
+std::array<float, 3> MeasuredColour() { return {static_cast<float>(kMeasured.r), static_cast<float>(kMeasured.g), static_cast<float>(kMeasured.b)}; }
+std::array<float, 3> ModelColour(std::size_t model) {
+  const Colour c = OfModel(model);
+  return {static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b)};
+}
+
+Page::Page(PageOptions options, PageTraces traces, std::vector<PageModel> models) : options_(std::move(options)), traces_(std::move(traces)), models_(std::move(models)) {
+  GS_CHECK(!models_.empty() && options_.to_s > options_.from_s && !traces_.signals.empty());
+  unit_ = options_.height / 720.0;
+  if (traces_.signals.size() > kMostSignals) traces_.signals.resize(kMostSignals);
+  panels_ = models_.size() + (options_.side_by_side ? 1 : 0);
+  double height = kTopGap + kAxisHeight + static_cast<double>(traces_.signals.size()) * (kSignalRow + kRowGap) + (traces_.commands.empty() ? 0 : kCommandRow + kRowGap);
+  scene_height_ = options_.height - static_cast<int>(height * unit_);
+  scene_height_ -= scene_height_ % 2;
+  scene_width_ = options_.width / static_cast<int>(panels_);
+
+  // Limits of what is shown, from the rows within it; a model that runs away does not squeeze the measured trace.
+  const auto within = [&](std::size_t r) { return traces_.time_s[r] >= options_.from_s && traces_.time_s[r] <= options_.to_s; };
+  double top = kTopGap * unit_;
+  for (const auto& signal : traces_.signals) {
+    double low = INFINITY, high = -INFINITY;
+    for (std::size_t r = 0; r < traces_.time_s.size(); ++r) {
+      if (within(r) && std::isfinite(signal.measured[r])) low = std::min(low, signal.measured[r]), high = std::max(high, signal.measured[r]);
+    }
+    if (!(low <= high)) low = high = 0;
+    const double room = std::max(1.5 * (high - low), 1e-9), measured_low = low, measured_high = high;
+    for (const auto& predicted : signal.predicted) {
+      for (std::size_t r = 0; r < predicted.size(); ++r) {
+        if (!within(r) || !std::isfinite(predicted[r])) continue;
+        low = std::min(low, std::max(predicted[r], measured_low - room));
+        high = std::max(high, std::min(predicted[r], measured_high + room));
+      }
+    }
+    if (high - low < 1e-12) low -= 0.5, high += 0.5;
+    const double pad = 0.06 * (high - low);
+    rows_.push_back({.top = top, .height = kSignalRow * unit_, .low = low - pad, .high = high + pad});
+    top += (kSignalRow + kRowGap) * unit_;
+  }
+  if (!traces_.commands.empty()) {
+    double low = INFINITY, high = -INFINITY;
+    for (const double value : traces_.commands.front().values) {
+      if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
+    }
+    if (!(high - low > 1e-12)) low -= 0.5, high += 0.5;
+    const double pad = 0.08 * (high - low);
+    rows_.push_back({.top = top, .height = kCommandRow * unit_, .low = low - pad, .high = high + pad});
+  }
+  for (Picture* picture : {&future_, &past_}) {
+    picture->width = options_.width;
+    picture->height = options_.height - scene_height_;
+    picture->pixels.assign(static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height), 0xffffffffu);
+    Canvas canvas(*picture);
+    DrawTraces(canvas, picture == &past_);
+  }
+}
+
+Page::~Page() = default;
+
+double Page::XOf(double time_s) const {
+  const double left = kGutter * unit_, right = options_.width - kRightMargin * unit_;
+  return left + (right - left) * (time_s - options_.from_s) / (options_.to_s - options_.from_s);
+}
+
+void Page::DrawScale(Canvas& c, double top, double height, const std::string& name, const std::string& unit, double low, double high) const {
+  const double left = XOf(options_.from_s), right = XOf(options_.to_s);
+  c.Ink({0.972, 0.976, 0.982});
+  cairo_rectangle(c.cr, left, top, right - left, height);
+  cairo_fill(c.cr);
+  if (low < 0 && high > 0) {
+    c.Ink(kGrid);
+    cairo_set_line_width(c.cr, unit_);
+    const double y = top + height * high / (high - low);
+    cairo_move_to(c.cr, left, y);
+    cairo_line_to(c.cr, right, y);
+    cairo_stroke(c.cr);
+  }
+  c.Ink(kInk);
+  c.Font(13 * unit_, true);
+  c.Text(c.Fit(name, (kGutter - 20) * unit_), 12 * unit_, top + height / 2 - 1 * unit_);
+  c.Ink(kFaint);
+  c.Font(11.5 * unit_);
+  c.Text(unit, 12 * unit_, top + height / 2 + 14 * unit_);
+  c.Text(Short(high), right + 8 * unit_, top + 11 * unit_);
+  c.Text(Short(low), right + 8 * unit_, top + height - 3 * unit_);
+}
+
+void Page::DrawTraces(Canvas& c, bool past) const {
+  c.Ink(kPaper);
+  cairo_paint(c.cr);
+  const auto& time = traces_.time_s;
+  const double strength = past ? 1 : 0.28;
+  const std::size_t first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), options_.from_s) - time.begin());
+  const std::size_t last = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), options_.to_s) - time.begin());
+  const std::size_t begin = first > 0 ? first - 1 : 0, end = std::min(last + 1, time.size());
+  const auto line = [&](const Row& row, const std::vector<double>& values, bool steps) {
+    const std::span<const double> part(values.data() + begin, end - begin);
+    const std::span<const double> parts[] = {part};
+    bool pen_down = false;
+    double y_before = 0;
+    for (const std::size_t r : ExtremeRows(parts, static_cast<std::size_t>(options_.width))) {
+      if (!std::isfinite(part[r])) {
+        pen_down = false;
+        continue;
+      }
+      const double x = XOf(time[begin + r]), y = row.top + row.height * (row.high - part[r]) / (row.high - row.low);
+      if (pen_down && steps) cairo_line_to(c.cr, x, y_before);
+      pen_down ? cairo_line_to(c.cr, x, y) : cairo_move_to(c.cr, x, y);
+      pen_down = true;
+      y_before = y;
+    }
+    cairo_stroke(c.cr);
+  };
+  for (std::size_t s = 0; s < rows_.size(); ++s) {
+    const Row& row = rows_[s];
+    const bool command = s >= traces_.signals.size();
+    const std::string& name = command ? traces_.commands.front().name : traces_.signals[s].name;
+    DrawScale(c, row.top, row.height, name, command ? traces_.commands.front().unit : traces_.signals[s].unit, row.low, row.high);
+    cairo_save(c.cr);
+    cairo_rectangle(c.cr, XOf(options_.from_s), row.top, XOf(options_.to_s) - XOf(options_.from_s), row.height);
+    cairo_clip(c.cr);
+    if (command) {
+      c.Ink(kFaint, past ? 1 : 0.45);
+      cairo_set_line_width(c.cr, 1.3 * unit_);
+      line(row, traces_.commands.front().values, true);
+    } else {
+      c.Ink(kMeasured, strength);
+      cairo_set_line_width(c.cr, 3.4 * unit_);
+      line(row, traces_.signals[s].measured, false);
+      for (std::size_t m = 0; m < models_.size(); ++m) {
+        c.Ink(OfModel(m), strength);
+        cairo_set_line_width(c.cr, 1.6 * unit_);
+        line(row, traces_.signals[s].predicted[m], false);
+      }
+    }
+    cairo_restore(c.cr);
+  }
+  // Time axis.
+  const double bottom = rows_.back().top + rows_.back().height;
+  const double step = NiceStep(options_.to_s - options_.from_s, 10);
+  c.Font(11.5 * unit_);
+  for (double t = std::ceil(options_.from_s / step - 1e-9) * step; t <= options_.to_s + 1e-9 * step; t += step) {
+    c.Ink(kGrid);
+    cairo_set_line_width(c.cr, unit_);
+    cairo_move_to(c.cr, XOf(t), bottom);
+    cairo_line_to(c.cr, XOf(t), bottom + 4 * unit_);
+    cairo_stroke(c.cr);
+    c.Ink(kFaint);
+    c.Text(fmt::format("{:g}", std::round(t / step) * step + 0.0), XOf(t), bottom + 17 * unit_, 0.5);
+  }
+  c.Ink(kFaint);
+  c.Text("time, s", 12 * unit_, bottom + 17 * unit_);
+}
+
+void Page::DrawCursor(Canvas& c, double time_s) const {
+  const double x = XOf(std::clamp(time_s, options_.from_s, options_.to_s));
+  c.Ink(kInk, 0.55);
+  cairo_set_line_width(c.cr, 1.2 * unit_);
+  cairo_move_to(c.cr, x, scene_height_ + rows_.front().top);
+  cairo_line_to(c.cr, x, scene_height_ + rows_.back().top + rows_.back().height);
+  cairo_stroke(c.cr);
+  const auto dot = [&](const Row& row, double value, const Colour& colour) {
+    if (!std::isfinite(value)) return;
+    const double y = row.top + row.height * (row.high - std::clamp(value, row.low, row.high)) / (row.high - row.low);
+    cairo_arc(c.cr, x, scene_height_ + y, 4.2 * unit_, 0, 2 * M_PI);
+    c.Ink(colour);
+    cairo_fill_preserve(c.cr);
+    c.Ink(kPaper);
+    cairo_set_line_width(c.cr, 1.2 * unit_);
+    cairo_stroke(c.cr);
+  };
+  for (std::size_t s = 0; s < traces_.signals.size(); ++s) {
+    for (std::size_t m = 0; m < models_.size(); ++m) dot(rows_[s], Interpolate(traces_.time_s, traces_.signals[s].predicted[m], time_s), OfModel(m));
+    dot(rows_[s], Interpolate(traces_.time_s, traces_.signals[s].measured, time_s), kMeasured);
+  }
+  if (!traces_.commands.empty()) dot(rows_.back(), Held(traces_.time_s, traces_.commands.front().values, time_s), kFaint);
+}
+
+void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
+  const double left = static_cast<double>(panel) * scene_width_ + 14 * unit_, top = 14 * unit_;
+  const bool measured_panel = options_.side_by_side && panel == 0;
+  const std::size_t m = options_.side_by_side ? panel - 1 : panel;
+  const Colour colour = measured_panel ? kMeasured : OfModel(m);
+  const double name_room = std::min(240.0 * unit_, scene_width_ - 200 * unit_);
+  c.Font(15 * unit_, true);
+  const std::string label = c.Fit(measured_panel ? "measured" : models_[m].label, std::max(name_room, 90 * unit_));
+  double width = c.Width(label) + 46 * unit_;
+  std::vector<std::array<std::string, 3>> lines;
+  if (!measured_panel) {
+    c.Font(12.5 * unit_);
+    for (const auto& signal : traces_.signals) {
+      const double error = Interpolate(traces_.time_s, signal.measured, time_s) - Interpolate(traces_.time_s, signal.predicted[m], time_s);
+      lines.push_back({signal.name, Signed(error), signal.unit});
+      width = std::max(width, c.Width(signal.name) + c.Width(signal.unit) + 118 * unit_);
+    }
+  }
+  const bool diverged = !measured_panel && models_[m].diverged_at_s >= 0 && time_s > models_[m].diverged_at_s;
+  const bool ghost = !measured_panel && !options_.side_by_side;
+  const double line_height = 18 * unit_;
+  double height = 34 * unit_ + (ghost ? line_height : 0) + (lines.empty() ? 0 : line_height * (static_cast<double>(lines.size()) + 1) + 6 * unit_) + (diverged ? line_height : 0);
+  c.Card(left, top, width, height, 7 * unit_);
+  c.Ink(colour);
+  c.Box(left + 12 * unit_, top + 11 * unit_, 14 * unit_, 14 * unit_, 3 * unit_);
+  cairo_fill(c.cr);
+  c.Ink(kInk);
+  c.Font(15 * unit_, true);
+  c.Text(label, left + 34 * unit_, top + 23 * unit_);
+  double y = top + 23 * unit_;
+  c.Font(12.5 * unit_);
+  if (ghost) {
+    y += line_height;
+    c.Ink(kMeasured, 0.5);
+    c.Box(left + 12 * unit_, y - 11 * unit_, 14 * unit_, 14 * unit_, 3 * unit_);
+    cairo_fill(c.cr);
+    c.Ink(kInk);
+    c.Text("measured", left + 34 * unit_, y);
+  }
+  if (!lines.empty()) {
+    y += line_height + 4 * unit_;
+    c.Ink(kFaint);
+    c.Text("error now", left + 12 * unit_, y);
+    c.Text(fmt::format("whole log {:.3g}", models_[m].error), left + width - 12 * unit_, y, 1);
+    for (const auto& [name, value, unit] : lines) {
+      y += line_height;
+      c.Ink(kInk);
+      c.Text(name, left + 12 * unit_, y);
+      c.Text(unit, left + width - 12 * unit_ - c.Width(unit), y);
+      c.Text(value, left + width - 18 * unit_ - c.Width(unit), y, 1);
+    }
+  }
+  if (diverged) {
+    c.Ink(kError);
+    c.Text(fmt::format("diverged at {:.3g} s", models_[m].diverged_at_s), left + 12 * unit_, y + line_height);
+  }
+}
+
+void Page::DrawClock(Canvas& c, double time_s) const {
+  const double width = 168 * unit_, left = options_.width - width - 14 * unit_, top = 14 * unit_;
+  const bool command = !traces_.commands.empty();
+  c.Card(left, top, width, (command ? 92 : 50) * unit_, 7 * unit_);
+  c.Ink(kInk);
+  c.Font(22 * unit_, true);
+  c.Text(fmt::format("{:.2f} s", time_s), left + width - 12 * unit_, top + 27 * unit_, 1);
+  c.Ink(kFaint);
+  c.Font(12.5 * unit_);
+  if (options_.speed != 1) c.Text(fmt::format("\u00d7 {:g}", options_.speed), left + 12 * unit_, top + 26 * unit_);
+  c.Text(c.Fit(options_.title, width - 24 * unit_), left + width - 12 * unit_, top + 43 * unit_, 1);
+  if (!command) return;
+  const auto& shown = traces_.commands.front();
+  const Row& row = rows_.back();
+  const double value = Held(traces_.time_s, shown.values, time_s);
+  c.Ink(kInk);
+  c.Text(c.Fit(shown.name, 70 * unit_), left + 12 * unit_, top + 65 * unit_);
+  c.Text(Signed(value) + " " + shown.unit, left + width - 12 * unit_, top + 65 * unit_, 1);
+  const double bar_left = left + 12 * unit_, bar_width = width - 24 * unit_, bar_top = top + 74 * unit_, bar_height = 7 * unit_;
+  const auto x_of = [&](double v) { return bar_left + bar_width * std::clamp((v - row.low) / (row.high - row.low), 0.0, 1.0); };
+  c.Box(bar_left, bar_top, bar_width, bar_height, bar_height / 2);
+  c.Ink(kGrid);
+  cairo_fill(c.cr);
+  const double zero = x_of(std::clamp(0.0, row.low, row.high));
+  c.Ink(kInk, 0.75);
+  cairo_rectangle(c.cr, std::min(zero, x_of(value)), bar_top, std::max(1.5 * unit_, std::abs(x_of(value) - zero)), bar_height);
+  cairo_fill(c.cr);
+}
+
+void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& frame) const {
+  GS_CHECK(scenes.size() == panels_);
+  const std::size_t width = static_cast<std::size_t>(options_.width);
+  frame.width = options_.width;
+  frame.height = options_.height;
+  frame.pixels.resize(width * static_cast<std::size_t>(options_.height), 0xffffffffu);
+  for (std::size_t p = 0; p < panels_; ++p) {
+    GS_CHECK(scenes[p].width == scene_width_ && scenes[p].height == scene_height_);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(scene_height_); ++y) {
+      std::copy_n(scenes[p].pixels.data() + y * static_cast<std::size_t>(scene_width_), scene_width_, frame.pixels.data() + y * width + p * static_cast<std::size_t>(scene_width_));
+    }
+  }
+  const std::size_t cursor = static_cast<std::size_t>(std::clamp(XOf(time_s), 0.0, static_cast<double>(width)));
+  for (std::size_t y = 0; y < static_cast<std::size_t>(past_.height); ++y) {
+    std::uint32_t* to = frame.pixels.data() + (static_cast<std::size_t>(scene_height_) + y) * width;
+    std::copy_n(past_.pixels.data() + y * width, cursor, to);
+    std::copy_n(future_.pixels.data() + y * width + cursor, width - cursor, to + cursor);
+  }
+  Canvas canvas(frame);
+  canvas.Ink(kPaper);
+  for (std::size_t p = 1; p < panels_; ++p) {
+    cairo_rectangle(canvas.cr, static_cast<double>(p) * scene_width_ - unit_, 0, 2 * unit_, scene_height_);
+    cairo_fill(canvas.cr);
+  }
+  for (std::size_t p = 0; p < panels_; ++p) DrawPanel(canvas, p, time_s);
+  DrawClock(canvas, time_s);
+  DrawCursor(canvas, time_s);
+}
+
+Status WritePng(const std::string& path, const Picture& picture) {
+  std::string bytes;
+  cairo_surface_t* surface = cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(const_cast<std::uint32_t*>(picture.pixels.data())), CAIRO_FORMAT_RGB24, picture.width,
+                                                                 picture.height, 4 * picture.width);
+  const auto append = [](void* to, const unsigned char* data, unsigned int size) {
+    static_cast<std::string*>(to)->append(reinterpret_cast<const char*>(data), size);
+    return CAIRO_STATUS_SUCCESS;
+  };
+  const cairo_status_t status = cairo_surface_write_to_png_stream(surface, append, &bytes);
+  cairo_surface_destroy(surface);
+  if (status != CAIRO_STATUS_SUCCESS) return Error{.what = "cannot make the PNG", .where = path, .actual = cairo_status_to_string(status)};
+  return WriteFile(path, bytes);
+}
+
+}  // namespace gapscope

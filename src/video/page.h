@@ -1,0 +1,89 @@
+// A frame of a comparison video: scenes above, each with its label and errors, and the traces below with a cursor at the frame's time. Drawn with cairo.
+#ifndef GAPSCOPE_VIDEO_PAGE_H_
+#define GAPSCOPE_VIDEO_PAGE_H_
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "replay/scene.h"
+
+namespace gapscope {
+
+struct PageTraces {
+  struct Signal {
+    std::string name, unit;
+    std::vector<double> measured;
+    std::vector<std::vector<double>> predicted;  // by model
+  };
+  struct Command {
+    std::string name, unit;
+    std::vector<double> values;  // held from stamp to stamp
+  };
+  std::vector<double> time_s;
+  std::vector<Signal> signals;
+  std::vector<Command> commands;
+};
+
+struct PageModel {
+  std::string label;
+  double error = 0;               // of the log, normalised
+  double diverged_at_s = -1;      // from here on there is nothing to show; negative: never
+};
+
+struct PageOptions {
+  int width = 1280, height = 720;
+  double from_s = 0, to_s = 0;    // what the time axis shows
+  double speed = 1;
+  std::string title;
+  bool side_by_side = false;      // a panel with the measured mechanism first; else it is a ghost in every panel
+};
+
+// The colour that stands for what was measured, and those of the models, as red, green, blue.
+std::array<float, 3> MeasuredColour();
+std::array<float, 3> ModelColour(std::size_t model);
+
+// Thread-safe once made: workers compose frames at once.
+class Page {
+ public:
+  Page(PageOptions options, PageTraces traces, std::vector<PageModel> models);
+  ~Page();
+
+  // Size of one scene, and how many there are: one for each model, and the measured one's first when side by side.
+  int scene_width() const { return scene_width_; }
+  int scene_height() const { return scene_height_; }
+  std::size_t panels() const { return panels_; }
+
+  // The frame at `time_s`; `scenes` has panels() pictures of the scenes' size. `frame` becomes width x height.
+  void Compose(std::span<const Picture> scenes, double time_s, Picture& frame) const;
+
+ private:
+  struct Canvas;
+  void DrawTraces(Canvas& canvas, bool past) const;
+  void DrawScale(Canvas& canvas, double top, double height, const std::string& name, const std::string& unit, double low, double high) const;
+  void DrawCursor(Canvas& canvas, double time_s) const;
+  void DrawPanel(Canvas& canvas, std::size_t panel, double time_s) const;
+  void DrawClock(Canvas& canvas, double time_s) const;
+  double XOf(double time_s) const;
+
+  PageOptions options_;
+  PageTraces traces_;
+  std::vector<PageModel> models_;
+  double unit_ = 1;  // one pixel of a picture 720 high
+  int scene_width_ = 0, scene_height_ = 0;
+  std::size_t panels_ = 1;
+  struct Row {
+    double top, height, low, high;  // in pixels; in the signal's unit
+  };
+  std::vector<Row> rows_;             // signals, then the first command
+  Picture future_, past_;             // the traces' part, pale and full
+};
+
+// Writes a picture as PNG, to a temporary name first. Error: cannot write.
+Status WritePng(const std::string& path, const Picture& picture);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_VIDEO_PAGE_H_

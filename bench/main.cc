@@ -30,7 +30,7 @@ std::string ToJson(const std::vector<Row>& rows) {
 
 Result<std::vector<Row>> RunAll(const BenchOptions& options, const std::string& only) {
   using Group = Result<std::vector<Row>> (*)(const BenchOptions&);
-  const std::pair<const char*, Group> groups[] = {{"replay", ReplayRows}, {"windows", WindowRows}, {"scaling", ScalingRows}, {"plugins", PluginRows}, {"read", ReadRows}};
+  const std::pair<const char*, Group> groups[] = {{"replay", ReplayRows}, {"windows", WindowRows}, {"scaling", ScalingRows}, {"plugins", PluginRows}, {"read", ReadRows}, {"render", RenderRows}};
   fmt::print("{:<34} {:>8} {:>8} {:>8} {:>8}\n", "row", "median", "10 %", "90 %", "target");
   std::vector<Row> rows;
   for (const auto& [name, group] : groups) {
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
   bench::BenchOptions options;
   std::string json, only;
   program.add_option("--json", json, "File for the rows as JSON");
-  program.add_option("--only", only, "One group")->check(CLI::IsMember({"replay", "windows", "scaling", "plugins", "read"}));
+  program.add_option("--only", only, "One group")->check(CLI::IsMember({"replay", "windows", "scaling", "plugins", "read", "render"}));
   program.add_option("--repeats", options.repeats, "Pairs per ratio")->check(CLI::Range(1, 10000))->capture_default_str();
   program.add_option("--csv-mb", options.csv_mb, "Size of the CSV, MB")->check(CLI::Range(1.0, 10000.0))->capture_default_str();
   program.add_option("--folder", options.folder, "Where the CSV is made")->capture_default_str();

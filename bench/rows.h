@@ -35,6 +35,10 @@ Result<std::vector<Row>> ReadRows(const BenchOptions& options);
 // with native elements only (friction: over a native frictionloss).
 Result<std::vector<Row>> PluginRows(const BenchOptions& options);
 
+// render_vs_real_time.RIG: seconds of a video over the wall seconds to make it: 10 s at 30 frames per second, 1280x720, measured over simulated, all
+// workers, replay and encoding included.
+Result<std::vector<Row>> RenderRows(const BenchOptions& options);
+
 }  // namespace gapscope::bench
 
 #endif  // GAPSCOPE_BENCH_ROWS_H_

@@ -16,7 +16,7 @@ constexpr float kClearAt = 0.008f;
 // Ghosts are drawn a little larger: where they touch the solid mechanism their skin is in front of it all over, instead of in stripes.
 constexpr float kGhostGrowth = 1.012f;
 
-constexpr int kSampledPoses = 60;      // of a track, to frame it
+constexpr int kSampledPoses = 200;     // of a track, to frame it
 constexpr double kMargin = 1.22;       // free around the motion
 constexpr double kTrackingZoom = 0.8;  // a camera that follows may come closer
 constexpr int kShadowMap = 1024;       // pixels across the table
@@ -145,7 +145,7 @@ Framing FrameMotion(const mjModel& model, std::span<const PoseTrack* const> trac
     if (model.geom_type[g] == mjGEOM_PLANE || model.geom_type[g] == mjGEOM_HFIELD) continue;
     ForEachCorner(model, d, g, [&](const Vector& p) { reach = std::max(reach, std::hypot(p[0] - framing.centre[0], p[1] - framing.centre[1])); });
   }
-  framing.ground_m = 1.8 * reach;
+  framing.ground_m = 1.7 * reach;
   return framing;
 }
 
@@ -202,6 +202,7 @@ struct Scene::Impl {
       camera.frustum_bottom += pixel * static_cast<float>(part.bottom);
     }
     const mjrRect viewport{0, 0, part.width, part.height};
+    mjr_setBuffer(mjFB_OFFSCREEN, &context);  // another scene may have drawn in between
     mjr_render(viewport, &scene, &context);
     mjr_readPixels(rgb.data(), nullptr, viewport, &context);
     std::copy_n(cameras, 2, scene.camera);
@@ -324,7 +325,7 @@ Result<std::unique_ptr<Scene>> Scene::Make(const mjModel& model, const Framing& 
     if (drawn.geom_type[g] == mjGEOM_PLANE && !(drawn.geom_size[3 * g] > 0)) drawn.geom_size[3 * g] = drawn.geom_size[3 * g + 1] = framing.ground_m;
   }
   drawn.vis.quality.shadowsize = std::min(drawn.vis.quality.shadowsize, kShadowMap);
-  drawn.vis.map.shadowclip = static_cast<float>(1.5 * framing.ground_m / drawn.stat.extent);
+  drawn.vis.map.shadowclip = static_cast<float>(1.3 * framing.ground_m / drawn.stat.extent);
   impl.width = width;
   impl.height = height;
   mjv_makeScene(&drawn, &impl.scene, kMaxGeoms);

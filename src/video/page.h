@@ -15,6 +15,7 @@ namespace gapscope {
 struct PageTraces {
   struct Signal {
     std::string name, unit;
+    bool moves = false;  // a position: seen in the scene
     std::vector<double> measured;
     std::vector<std::vector<double>> predicted;  // by model
   };

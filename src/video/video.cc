@@ -49,7 +49,7 @@ PageTraces TracesOf(const Recording& recording, const Experiment& experiment, co
       for (std::size_t s = 0; s < recording.measured.size(); ++s) {
         const MeasuredSpec& spec = recording.measured[s].spec;
         if (spec.scored != scored || (spec.kind == SignalKind::kPosition) != position) continue;
-        traces.signals.push_back({.name = spec.signal, .unit = spec.unit, .measured = recording.measured[s].values, .predicted = {}});
+        traces.signals.push_back({.name = spec.signal, .unit = spec.unit, .moves = position, .measured = recording.measured[s].values, .predicted = {}});
         for (const Actor& actor : actors) traces.signals.back().predicted.push_back(actor.replay.signals[s].predicted);
       }
     }
@@ -62,10 +62,11 @@ PageTraces TracesOf(const Recording& recording, const Experiment& experiment, co
   return traces;
 }
 
-// The time of the greatest error of the first scored signal, in units of its own spread.
+// When the mechanisms stand furthest apart: the greatest error of a position, in units of its own spread.
 double TimeOfGreatestError(const PageTraces& traces, double from, double to) {
   double greatest = -1, at = from;
   for (const auto& signal : traces.signals) {
+    if (!signal.moves) continue;
     const double spread = std::max(MomentsOf(signal.measured).deviation, 1e-12);
     for (std::size_t r = 0; r < traces.time_s.size(); ++r) {
       const double t = traces.time_s[r], error = std::abs(signal.measured[r] - signal.predicted.front()[r]) / spread;

@@ -30,12 +30,11 @@ constexpr std::size_t kMostSignals = 3;
 // -0.312, +1.2e-05: four digits and a sign.
 std::string Signed(double value) {
   if (!std::isfinite(value)) return "-";
-  const std::string text = std::abs(value) < 1e-3 && value != 0 ? fmt::format("{:+.1e}", value) : fmt::format("{:+.3f}", value);
-  return text.starts_with('-') ? "\u2212" + text.substr(1) : text;
+  const std::string size = std::abs(value) < 1e-3 && value != 0 ? fmt::format("{:.1e}", std::abs(value)) : fmt::format("{:.3f}", std::abs(value));
+  return fmt::format("{}{}", value < 0 ? "\u2212" : "+", size);
 }
 std::string Short(double value) {
-  std::string text = fmt::format("{:.3g}", value);
-  return text.starts_with('-') ? "\u2212" + text.substr(1) : text;
+  return fmt::format("{}{:.3g}", value < 0 ? "\u2212" : "", std::abs(value));
 }
 
 double Interpolate(const std::vector<double>& time, const std::vector<double>& values, double t) {

@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "src/cli/commands.h"
+#include "src/cli/html.h"
 #include "src/cli/session.h"
 #include "src/core/units.h"
 #include "src/report/version.h"
@@ -16,6 +17,7 @@ int main(int argc, char** argv) {
   program.set_version_flag("--version", VersionText());
   program.require_subcommand(1);
   program.footer("Exit status: 0 done, 1 a threshold asked for was not met, 2 bad input, 3 a bug.\nExample: gapscope replay models/qube/experiment.yaml log.csv");
+  cli::SetCommandLine(argc, argv);
   cli::Run run;
   cli::AddInit(program, run);
   cli::AddInspect(program, run);

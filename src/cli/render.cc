@@ -11,6 +11,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
+#include "src/report/html_report.h"
 #include "src/video/video.h"
 
 namespace gapscope::cli {
@@ -98,6 +99,11 @@ Result<int> RunRender(RenderFlags flags) {
   const VideoSummary& summary = rendered.value();
   if (!flags.common.quiet && !summary.note.empty()) fmt::print(stderr, "gapscope: {}\n", summary.note);
   fmt::print("{}\n", flags.out);
+  const std::filesystem::path out = flags.out;
+  if (out.extension() == ".mp4") {
+    GS_ASSIGN(const bool shown, AttachVideo((out.parent_path() / "report.html").string(), out.filename().string()));
+    if (shown) fmt::print("  shown in {}\n", (out.parent_path() / "report.html").string());
+  }
   for (std::size_t m = 0; m < models.size(); ++m) fmt::print("  {:<32} error {:.4g}\n", models[m].label, summary.errors[m]);
   if (summary.length_s > 0) {
     fmt::print("  {} frames of {}x{}, {:.2f} s of video for {:.2f} s of the log; {:.1f} s to make ({})\n", summary.frames, options.width, options.height, summary.length_s,

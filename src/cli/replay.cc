@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "src/cli/commands.h"
+#include "src/cli/html.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
 #include "src/report/replay_report.h"
@@ -41,6 +42,16 @@ Result<int> RunReplay(const ReplayFlags& flags) {
     GS_RETURN_IF_ERROR(WriteTraces(out / "traces", result, session.recordings));
     GS_ASSIGN(const std::string xml, session.model->ToXml(session.values, session.recordings.front().values, session.scales));
     GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
+    std::vector<ReportPrediction> predictions;
+    GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
+    const bool changed = !session.model->effects().empty() || session.values != nominal->Nominal();
+    if (changed) {
+      ReplayOptions before = options;
+      before.values = nominal->Nominal();
+      predictions.push_back({"nominal", Replay(*nominal, session.recordings, before, *session.pool).logs});
+    }
+    predictions.push_back({changed ? "with what was added" : "nominal", result.logs});
+    GS_RETURN_IF_ERROR(WriteReport(out, ReplayJson(report), session.experiment, {session.recordings, {}}, std::move(predictions), *session.model, session.values, session.model->parameters()));
   }
   if (flags.common.json) {
     fmt::print("{}\n", ReplayJson(report));

@@ -26,7 +26,7 @@ void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
   command.add_flag("--quiet", flags.quiet, "No messages on stderr but errors");
   command.add_option("--jobs", flags.jobs, "Workers; 0: one per processor. The result does not depend on it")->check(CLI::Range(0, 1024));
   command.add_option("--seed", flags.seed, "Seed of everything random");
-  if (writes_folder) command.add_option("--out", flags.out, "Folder for result.json, traces and model.xml");
+  if (writes_folder) command.add_option("--out", flags.out, "Folder for result.json, report.html, traces and model.xml");
 }
 
 namespace {

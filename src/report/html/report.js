@@ -1,0 +1,69 @@
+"use strict";
+// Puts the page together.
+
+const data = JSON.parse(document.getElementById("report-data").textContent);
+const result = data.result;
+let current = 0;
+
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  document.getElementById("theme").textContent = theme === "dark" ? "Light" : "Dark";
+  document.getElementById("theme").setAttribute("aria-label", theme === "dark" ? "Switch to light colours" : "Switch to dark colours");
+}
+
+function drawLog() {
+  const log = data.logs[current];
+  if (!log?.traces) return;
+  drawTraces(log);
+  drawResponses(log);
+  const maps = document.getElementById("maps");
+  maps.replaceChildren();
+  const figures = (log.maps ?? []).map(drawMap).filter(Boolean);
+  if (figures.length) {
+    show("where");
+    maps.append(element("div", {class: "maps"}, ...figures), element("p", {class: "note"},
+      "A jump where the speed changes sign is dry friction, a slope across the angle a spring, a slope across the speed damping. Speed and acceleration come from the log by local fits over 20 ms to each side."));
+  }
+}
+
+function choosers() {
+  const select = document.getElementById("log");
+  data.logs.forEach((log, i) => { if (log.traces) select.append(element("option", {value: i}, fileName(log.path) + (log.held_out ? " (held out)" : ""))); });
+  select.addEventListener("change", () => { current = Number(select.value); drawLog(); });
+  document.querySelectorAll("[data-zoom]").forEach((button) => button.addEventListener("click", () => zoom(button.dataset.zoom)));
+  const keys = {"+": "in", "=": "in", "-": "out", ArrowLeft: "left", ArrowRight: "right", 0: "all"};
+  document.getElementById("charts").addEventListener("keydown", (event) => {
+    if (!(event.key in keys) || event.ctrlKey || event.metaKey || event.altKey) return;
+    zoom(keys[event.key]);
+    event.preventDefault();
+  });
+  document.getElementById("theme").addEventListener("click", () => { setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"); drawLog(); });
+}
+
+function contents() {
+  const titles = {verdict: "Result", video: "Video", traces: "Traces", where: "Where", candidates: "Explanations", parameters: "Parameters", response: "Frequency", next: "Next", data: "Data", reproduce: "Reproduce"};
+  for (const [id, title] of Object.entries(titles)) {
+    if (!document.getElementById(id).hidden) document.getElementById("contents").append(element("li", {}, element("a", {href: `#${id}`}, title)));
+  }
+}
+
+setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+const subjects = [...new Set(data.logs.map((log) => fileName(log.path)))];
+const kinds = {"gapscope.replay/1": "Replay", "gapscope.tune/1": "Tuning", "gapscope.diagnosis/1": "Diagnosis"};
+document.getElementById("subject").textContent = `${kinds[result.schema]} of ${listed(subjects.slice(0, 3))}${subjects.length > 3 ? " ..." : ""} with ${fileName(data.model.path)}`;
+writeVerdict(result);
+const video = document.getElementById("video");
+if (video.dataset.video) {
+  document.getElementById("player").src = video.dataset.video;
+  video.hidden = false;
+}
+if (data.logs.some((log) => log.traces)) show("traces");
+if (writeConditions(result)) show("where");
+choosers();
+drawLog();
+writeCandidates(result);
+writeParameters(result, data.parameters);
+writeNext(result);
+writeQuality(data.logs);
+writeProvenance(data);
+contents();

@@ -1,0 +1,15 @@
+// The files of src/report/html/ and dygraphs, as src/report/embed.cmake puts them into the library.
+#ifndef GAPSCOPE_REPORT_HTML_ASSETS_H_
+#define GAPSCOPE_REPORT_HTML_ASSETS_H_
+
+namespace gapscope::assets {
+
+extern const char* const kPage;
+extern const char* const kStyle;
+extern const char* const kScript;
+extern const char* const kDygraphs;       // with its synchronizer; MIT licence
+extern const char* const kDygraphsStyle;
+
+}  // namespace gapscope::assets
+
+#endif  // GAPSCOPE_REPORT_HTML_ASSETS_H_

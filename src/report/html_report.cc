@@ -1,0 +1,211 @@
+#include "src/report/html_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "src/compare/decimate.h"
+#include "src/compare/frequency_response.h"
+#include "src/compare/residual_torque.h"
+#include "src/core/digest.h"
+#include "src/core/file.h"
+#include "src/report/html_assets.h"
+#include "src/report/json.h"
+
+namespace gapscope {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::size_t kMostLogs = 12, kMapAngles = 22, kMapSpeeds = 14;
+constexpr const char* kVideoSlot = "data-video=\"\"";
+
+// Six digits are more than a screen shows; what is not a number is null.
+ordered_json Rounded(double value, int digits = 6) {
+  if (!std::isfinite(value)) return nullptr;
+  if (value == 0) return 0;
+  const double scale = std::pow(10, digits - 1 - static_cast<int>(std::floor(std::log10(std::abs(value)))));
+  return std::round(value * scale) / scale;
+}
+ordered_json Numbers(const std::vector<double>& values) {
+  ordered_json list = ordered_json::array();
+  for (const double v : values) list.push_back(Rounded(v, 5));
+  return list;
+}
+ordered_json Column(std::span<const double> values, const std::vector<std::size_t>& rows, int digits = 6) {
+  ordered_json list = ordered_json::array();
+  for (const std::size_t r : rows) list.push_back(Rounded(values[r], digits));
+  return list;
+}
+
+ordered_json FileStamp(const std::string& path) {
+  const auto digest = Sha256OfFile(path);
+  return {{"path", path}, {"sha256", digest.ok() ? digest.value() : ""}};
+}
+
+ordered_json Quality(const Recording& recording) {
+  const Timeline& t = recording.timeline;
+  ordered_json findings = ordered_json::array();
+  for (const auto& finding : recording.findings) findings.push_back(finding.text);
+  return {{"rows", recording.rows()}, {"rows_in_log", recording.rows_in_log}, {"duration_s", Rounded(recording.duration_s())}, {"step_s", Rounded(t.median_step_s)},
+          {"longest_step_s", Rounded(t.longest_step_s)}, {"jitter_s", Rounded(t.jitter_s)}, {"findings", std::move(findings)}};
+}
+
+ordered_json Maps(const ReportSource& source, const Recording& recording) {
+  ordered_json maps = ordered_json::array();
+  if (!source.model) return maps;
+  for (const auto& residual : EstimateResidualTorque(*source.model, source.values, recording)) {
+    const TorqueMap map = MapTorque(residual, kMapAngles, kMapSpeeds);
+    if (map.mean_n_m.empty()) continue;
+    maps.push_back({{"joint", map.joint}, {"angle", Numbers(map.angle_edges_rad)}, {"speed", Numbers(map.speed_edges_rad_per_s)}, {"torque", Numbers(map.mean_n_m)}, {"rows", map.rows}});
+  }
+  return maps;
+}
+
+ordered_json Responses(const Recording& recording, const LogReplay& replay) {
+  ordered_json responses = ordered_json::array();
+  for (std::size_t c = 0; c < recording.commands.size() && responses.size() < 4; ++c) {
+    if (recording.commands[c].column == "constant") continue;
+    for (const auto& signal : replay.signals) {
+      if (!signal.scored || responses.size() >= 4) continue;
+      const auto points = EstimateResponse(recording.time_s, recording.commands[c].values, signal.measured, signal.predicted);
+      if (points.size() < 4) continue;
+      ordered_json entry = {{"command", recording.commands[c].actuator}, {"signal", signal.signal}, {"points", ordered_json::array()}};
+      for (const auto& p : points) {
+        entry["points"].push_back({Rounded(p.hz), Rounded(p.measured_gain), Rounded(p.predicted_gain), Rounded(p.measured_phase_deg), Rounded(p.predicted_phase_deg), Rounded(p.coherence, 3)});
+      }
+      responses.push_back(std::move(entry));
+    }
+  }
+  return responses;
+}
+
+// Traces of one log, thinned; every series has its extremes, and so have the residuals.
+ordered_json Traces(const ReportSource& source, std::size_t index, std::size_t most_rows) {
+  const Recording& recording = *source.recordings[index];
+  std::vector<const ReportPrediction*> predicted;
+  for (const auto& prediction : source.predictions) {
+    if (index < prediction.logs.size() && !prediction.logs[index].signals.empty()) predicted.push_back(&prediction);
+  }
+  std::vector<std::vector<double>> residuals;
+  std::vector<std::span<const double>> columns;
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    columns.emplace_back(recording.measured[s].values);
+    for (const auto* prediction : predicted) {
+      const auto& values = prediction->logs[index].signals[s].predicted;
+      columns.emplace_back(values);
+      std::vector<double> residual(values.size());
+      for (std::size_t r = 0; r < values.size(); ++r) residual[r] = recording.measured[s].values[r] - values[r];
+      residuals.push_back(std::move(residual));
+    }
+  }
+  for (const auto& residual : residuals) columns.emplace_back(residual);
+  for (const auto& command : recording.commands) columns.emplace_back(command.values);
+  const std::size_t buckets = std::max<std::size_t>(50, most_rows / (2 * columns.size()));
+  const std::vector<std::size_t> rows = recording.rows() <= most_rows ? ExtremeRows(columns, recording.rows()) : ExtremeRows(columns, buckets);
+
+  ordered_json json = {{"time", Column(recording.time_s, rows, 8)}, {"signals", ordered_json::array()}, {"commands", ordered_json::array()}};
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    const MeasuredSpec& spec = recording.measured[s].spec;
+    ordered_json signal = {{"name", spec.signal}, {"unit", spec.unit}, {"scored", spec.scored}, {"measured", Column(recording.measured[s].values, rows)}, {"predicted", ordered_json::array()}};
+    for (const auto* prediction : predicted) {
+      signal["predicted"].push_back({{"label", prediction->label}, {"values", Column(prediction->logs[index].signals[s].predicted, rows)}});
+    }
+    json["signals"].push_back(std::move(signal));
+  }
+  for (std::size_t c = 0; c < recording.commands.size(); ++c) {
+    const auto& command = recording.commands[c];
+    if (command.column != "constant") json["commands"].push_back({{"name", command.actuator}, {"unit", source.experiment->commands[c].unit}, {"values", Column(command.values, rows)}});
+  }
+  return json;
+}
+
+ordered_json Data(const ReportSource& source, std::size_t most_rows) {
+  ordered_json data = {{"result", ordered_json::parse(source.result_json)}, {"command", source.command_line}};
+  data["experiment"] = FileStamp(source.experiment->path);
+  data["model"] = FileStamp(source.experiment->model_path);
+  data["parameters"] = ordered_json::array();
+  for (const Parameter& p : source.parameters) {
+    if (p.name.starts_with("scale@")) continue;
+    data["parameters"].push_back({{"name", p.name}, {"unit", p.unit}, {"doc", p.doc}, {"nominal", JsonNumber(p.nominal)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}, {"frozen", p.frozen}});
+  }
+  // The model whose missing torque is mapped: the nominal one where the result says what it lacks.
+  data["map_of"] = source.predictions.size() > 1 && data["result"]["schema"] != "gapscope.replay/1" ? "nominal model" : "model";
+  data["logs"] = ordered_json::array();
+  const std::size_t shown = std::min(kMostLogs, source.recordings.size());
+  // Held-out logs first: they are what counts.
+  std::vector<std::size_t> order(source.recordings.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto held_out = [&](std::size_t i) { return i < source.held_out.size() && source.held_out[i]; };
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return held_out(a) && !held_out(b); });
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::size_t i = order[k];
+    const Recording& recording = *source.recordings[i];
+    ordered_json log = FileStamp(recording.log_path);
+    log["held_out"] = held_out(i);
+    log["quality"] = Quality(recording);
+    if (k < shown) {
+      log["traces"] = Traces(source, i, most_rows / shown);
+      log["maps"] = Maps(source, recording);
+      log["responses"] = ordered_json::array();
+      if (!source.predictions.empty() && i < source.predictions.back().logs.size() && !source.predictions.back().logs[i].signals.empty()) {
+        log["responses"] = Responses(recording, source.predictions.back().logs[i]);
+        log["response_of"] = source.predictions.back().label;
+      }
+    }
+    data["logs"].push_back(std::move(log));
+  }
+  return data;
+}
+
+// "</script>" must not end the data early, whatever a file is called.
+std::string ForScript(const ordered_json& json) {
+  std::string text = json.dump(-1, ' ', false, ordered_json::error_handler_t::replace), safe;
+  safe.reserve(text.size());
+  for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
+  return safe;
+}
+
+std::string Filled(std::string page, const std::string& slot, const std::string& content) {
+  const std::size_t at = page.find(slot);
+  GS_CHECK(at != std::string::npos);
+  return page.replace(at, slot.size(), content);
+}
+
+bool IsPlainName(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; });
+}
+
+}  // namespace
+
+std::string ReportHtml(const ReportSource& source, std::size_t most_rows) {
+  GS_CHECK(source.experiment != nullptr);
+  std::string page = assets::kPage;
+  page = Filled(page, "/*style*/", std::string(assets::kDygraphsStyle) + assets::kStyle);
+  page = Filled(page, "/*dygraphs*/", assets::kDygraphs);
+  page = Filled(page, "/*script*/", assets::kScript);
+  return Filled(page, "/*data*/", ForScript(Data(source, most_rows)));
+}
+
+Status WriteReportHtml(const std::string& folder, const ReportSource& source) {
+  const std::filesystem::path path = std::filesystem::path(folder) / "report.html";
+  std::string page = ReportHtml(source);
+  std::error_code failure;
+  if (std::filesystem::exists(path.parent_path() / "video.mp4", failure)) page = Filled(page, kVideoSlot, "data-video=\"video.mp4\"");
+  return WriteFile(path.string(), page);
+}
+
+Result<bool> AttachVideo(const std::string& report_path, const std::string& video) {
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(report_path, failure) || !IsPlainName(video)) return false;
+  GS_ASSIGN(std::string page, ReadFile(report_path));
+  const std::size_t at = page.find(kVideoSlot);
+  if (at == std::string::npos) return page.find("data-video=\"" + video + "\"") != std::string::npos;
+  page.replace(at, std::char_traits<char>::length(kVideoSlot), "data-video=\"" + video + "\"");
+  GS_RETURN_IF_ERROR(WriteFile(report_path, page));
+  return true;
+}
+
+}  // namespace gapscope

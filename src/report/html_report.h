@@ -1,0 +1,44 @@
+// A result as one HTML file that opens from disk with no network: src/report/html/ holds page, style and script, embedded at build time with dygraphs.
+#ifndef GAPSCOPE_REPORT_HTML_REPORT_H_
+#define GAPSCOPE_REPORT_HTML_REPORT_H_
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "replay/replay.h"
+
+namespace gapscope {
+
+// What one model predicted.
+struct ReportPrediction {
+  std::string label;            // "nominal", "tuned"
+  std::vector<LogReplay> logs;  // by recording; one without signals was not predicted
+};
+
+struct ReportSource {
+  std::string result_json;   // replay, tune or diagnosis, as --json prints it
+  std::string command_line;  // as it was given
+  const Experiment* experiment = nullptr;
+  std::vector<const Recording*> recordings;
+  std::vector<bool> held_out;  // by recording; empty: none
+  std::vector<ReportPrediction> predictions;
+  // Its missing torque is mapped. Null: no map.
+  const Model* model = nullptr;
+  std::vector<double> values;
+  // Nominal values, bounds and units of these parameters stand beside the values of the result.
+  std::vector<Parameter> parameters;
+};
+
+// Long logs are thinned by ExtremeRows, so that a page holds about `most_rows` rows in all.
+std::string ReportHtml(const ReportSource& source, std::size_t most_rows = 60000);
+
+// Writes `folder`/report.html. A video.mp4 that is already there is shown in it.
+Status WriteReportHtml(const std::string& folder, const ReportSource& source);
+
+// Shows `video`, a file beside the report, in a report that was written before. Does nothing, and says false, where there is no report.
+Result<bool> AttachVideo(const std::string& report_path, const std::string& video);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_REPORT_HTML_REPORT_H_

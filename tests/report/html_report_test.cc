@@ -1,0 +1,91 @@
+#include "src/report/html_report.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <regex>
+
+#include "src/core/digest.h"
+#include "src/core/file.h"
+#include "tests/experiment/scratch.h"
+#include "tests/report/pages.h"
+
+namespace gapscope::testing {
+namespace {
+
+nlohmann::json DataOf(const std::string& page) {
+  const std::string open = "id=\"report-data\">";
+  const std::size_t begin = page.find(open) + open.size();
+  return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
+}
+
+TEST(HtmlReportTest, IsOneFileWithoutTheNetwork) {
+  const std::string page = ReportHtml(DemoPage("diagnosis")->source);
+  // Nothing is fetched: no element names a source, and what the libraries mention in comments is never asked for.
+  for (const char* fetching : {"<link", "<img", "src=\"http", "@import", "url(http", "fetch(", "XMLHttpRequest("}) {
+    const std::string text = fetching;
+    std::size_t count = 0;
+    // dygraphs can load CSV files, which this page never asks for.
+    for (std::size_t at = page.find(text); at != std::string::npos; at = page.find(text, at + 1)) ++count;
+    EXPECT_LE(count, text == "XMLHttpRequest(" ? 1u : 0u) << text;
+  }
+  EXPECT_NE(page.find("default-src 'none'"), std::string::npos);
+  for (const char* slot : {"/*style*/", "/*dygraphs*/", "/*script*/", "/*data*/"}) EXPECT_EQ(page.find(slot), std::string::npos) << slot;
+}
+
+TEST(HtmlReportTest, TextFromOutsideCannotEndTheScript) {
+  const std::string page = ReportHtml(DemoPage("diagnosis")->source);
+  EXPECT_EQ(page.find("</script><b>"), std::string::npos);
+  const auto data = DataOf(page);
+  ASSERT_FALSE(data.is_discarded());
+  EXPECT_EQ(data["result"]["candidates"][0]["reason"], "accepted: </script><b>held out</b>");
+}
+
+TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
+  const auto page = DemoPage("diagnosis");
+  const auto data = DataOf(ReportHtml(page->source));
+  const auto& log = data["logs"][0];
+  EXPECT_EQ(log["sha256"], Sha256OfFile(page->recordings[0].log_path).value());
+  EXPECT_EQ(log["traces"]["time"].size(), page->recordings[0].rows());
+  EXPECT_EQ(log["traces"]["signals"][0]["predicted"].size(), 2u);
+  EXPECT_NEAR(log["traces"]["signals"][0]["measured"][4000].get<double>(), page->recordings[0].measured[0].values[4000], 1e-5);
+  EXPECT_EQ(log["maps"].size(), 2u);
+  EXPECT_GE(log["responses"].size(), 1u);
+  EXPECT_EQ(data["parameters"][0]["name"], "motor.resistance");
+}
+
+TEST(HtmlReportTest, ALongLogKeepsItsSpikeInFewRows) {
+  const auto page = LongPage(1000000, 654321);
+  const std::string text = ReportHtml(page->source);
+  const auto data = DataOf(text);
+  const auto& traces = data["logs"][0]["traces"];
+  EXPECT_LT(traces["time"].size(), 80000u);
+  EXPECT_LT(text.size(), 8000000u);
+  double greatest = 0;
+  for (const auto& v : traces["signals"][0]["measured"]) greatest = std::max(greatest, v.get<double>());
+  EXPECT_EQ(greatest, 9.75);
+}
+
+TEST(HtmlReportTest, ShowsTheVideoBesideIt) {
+  const Scratch scratch;
+  const auto page = DemoPage("replay");
+  ASSERT_TRUE(WriteReportHtml(scratch.Path("a"), page->source).ok());
+  const std::string report = scratch.Path("a/report.html");
+  EXPECT_NE(ReadAll(report).find("data-video=\"\""), std::string::npos);
+  EXPECT_FALSE(AttachVideo(report, "\"><script>").value());
+  EXPECT_TRUE(AttachVideo(report, "video.mp4").value());
+  EXPECT_NE(ReadAll(report).find("data-video=\"video.mp4\""), std::string::npos);
+  EXPECT_TRUE(AttachVideo(report, "video.mp4").value());
+  EXPECT_FALSE(AttachVideo(scratch.Path("b/report.html"), "video.mp4").value());
+  scratch.Write("c/video.mp4", "x");
+  ASSERT_TRUE(WriteReportHtml(scratch.Path("c"), page->source).ok());
+  EXPECT_NE(ReadAll(scratch.Path("c/report.html")).find("data-video=\"video.mp4\""), std::string::npos);
+}
+
+TEST(DigestTest, IsSha256) {
+  // FIPS 180-2, example B.1.
+  EXPECT_EQ(Sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+}  // namespace
+}  // namespace gapscope::testing

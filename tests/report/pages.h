@@ -1,0 +1,28 @@
+// Reports to look at: a replay of the demo log, a long log, and a diagnosis made up to have everything a diagnosis can have.
+#ifndef GAPSCOPE_TESTS_REPORT_PAGES_H_
+#define GAPSCOPE_TESTS_REPORT_PAGES_H_
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/model/model.h"
+#include "src/report/html_report.h"
+
+namespace gapscope::testing {
+
+// A source and what it points to.
+struct Page {
+  std::shared_ptr<const Model> model;
+  std::vector<Recording> recordings;
+  ReportSource source;
+};
+
+// The log demo/qube.csv replayed by the nominal model and by one with a cable spring, under a result of each kind ("replay", "diagnosis").
+std::unique_ptr<Page> DemoPage(const std::string& kind);
+// One signal of `rows` rows with a spike of one row at `spike`.
+std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike);
+
+}  // namespace gapscope::testing
+
+#endif  // GAPSCOPE_TESTS_REPORT_PAGES_H_

@@ -17,22 +17,27 @@ using Complex = std::complex<double>;
 constexpr std::size_t kLeastRows = 256, kSegments = 8;
 constexpr double kLeastPower = 1e-3, kLeastCoherence = 0.5, kBand = 0.2;  // octaves
 
-// The half spectrum of a segment less its mean and slope, under a Hann window.
-std::vector<Complex> Transform(Eigen::FFT<double>& fft, std::span<const double> values) {
-  const std::size_t n = values.size();
-  const double middle = 0.5 * static_cast<double>(n - 1);
+// Without mean and slope. Of the whole record: taken from each segment, a slope would spread a slow sine over the lowest bins.
+std::vector<double> Level(std::vector<double> values) {
+  const double count = static_cast<double>(values.size()), middle = 0.5 * (count - 1);
   double mean = 0, tilt = 0, spread = 0;
-  for (const double v : values) mean += v / static_cast<double>(n);
-  for (std::size_t i = 0; i < n; ++i) {
+  for (const double v : values) mean += v / count;
+  for (std::size_t i = 0; i < values.size(); ++i) {
     const double x = static_cast<double>(i) - middle;
     tilt += x * (values[i] - mean);
     spread += x * x;
   }
-  std::vector<double> windowed(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const double x = static_cast<double>(i) - middle;
-    windowed[i] = (values[i] - mean - tilt / spread * x) * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n)));
-  }
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] -= mean + tilt / spread * (static_cast<double>(i) - middle);
+  return values;
+}
+
+// The half spectrum of a segment less its mean, under a Hann window.
+std::vector<Complex> Transform(Eigen::FFT<double>& fft, std::span<const double> values) {
+  const double count = static_cast<double>(values.size());
+  double mean = 0;
+  for (const double v : values) mean += v / count;
+  std::vector<double> windowed(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) windowed[i] = (values[i] - mean) * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * static_cast<double>(i) / count));
   std::vector<Complex> spectrum;
   fft.fwd(spectrum, windowed);
   return spectrum;
@@ -51,8 +56,9 @@ double Unwrapped(double phase_deg, double previous_deg) { return phase_deg - 360
 std::vector<ResponsePoint> EstimateResponse(std::span<const double> time_s, std::span<const double> command, std::span<const double> measured,
                                             std::span<const double> predicted) {
   const std::size_t rows = time_s.size();
-  const std::vector<double> u = FillGaps(command), y = FillGaps(measured), p = FillGaps(predicted);
+  std::vector<double> u = FillGaps(command), y = FillGaps(measured), p = FillGaps(predicted);
   if (rows < kLeastRows || u.size() != rows || y.size() != rows || p.size() != rows) return {};
+  u = Level(std::move(u)), y = Level(std::move(y)), p = Level(std::move(p));
   const std::size_t segment = std::bit_floor(std::max(kLeastRows / 2, 2 * rows / (kSegments + 1)));
   const double step = MedianStep(time_s);
   Eigen::FFT<double> fft;

@@ -260,7 +260,7 @@ struct Scene::Impl {
           for (int j = 0; j < 3; ++j) p[static_cast<std::size_t>(i)] += geom.mat[3 * i + j] * (box[j] + kGhostGrowth * ((corner >> j & 1) ? box[3 + j] : -box[3 + j]));
         }
         see(p);
-        for (int l = 0; l < scene.nlight; ++l) {
+        for (int l = 0; geom.castshadow && l < scene.nlight; ++l) {
           const mjvLight& light = scene.lights[l];
           if (!light.castshadow || light.headlight || ground > p[2]) continue;
           if (light.type != mjLIGHT_DIRECTIONAL || light.dir[2] > -0.1f) return whole;

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <filesystem>
+#include <limits>
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
@@ -35,7 +36,17 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   other.mode = options.mode == ReplayMode::kWindows ? ReplayMode::kFreeRun : ReplayMode::kWindows;
   other.time_step_s = result.time_step_s;
   const double other_error = ReplayError(Replay(*session.model, session.recordings, other, *session.pool).logs);
-  const ReplayReport report{.result = result, .comparison = comparison, .model = *session.model, .values = session.values, .seed = flags.common.seed, .other_error = other_error};
+  // What the effects and values given here are worth: the nominal model beside them.
+  GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
+  const bool changed = !session.model->effects().empty() || session.values != nominal->Nominal();
+  std::vector<LogReplay> before;
+  if (changed) {
+    ReplayOptions nominal_options = options;
+    nominal_options.values = nominal->Nominal();
+    before = Replay(*nominal, session.recordings, nominal_options, *session.pool).logs;
+  }
+  const ReplayReport report{.result = result, .comparison = comparison, .model = *session.model, .values = session.values, .seed = flags.common.seed, .other_error = other_error,
+                            .nominal_error = changed ? ReplayError(before) : std::numeric_limits<double>::quiet_NaN()};
   if (!flags.common.out.empty()) {
     const std::filesystem::path out = flags.common.out;
     GS_RETURN_IF_ERROR(WriteFile(out / "result.json", ReplayJson(report) + "\n"));
@@ -43,20 +54,14 @@ Result<int> RunReplay(const ReplayFlags& flags) {
     GS_ASSIGN(const std::string xml, session.model->ToXml(session.values, session.recordings.front().values, session.scales));
     GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
     std::vector<ReportPrediction> predictions;
-    GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
-    const bool changed = !session.model->effects().empty() || session.values != nominal->Nominal();
-    if (changed) {
-      ReplayOptions before = options;
-      before.values = nominal->Nominal();
-      predictions.push_back({"nominal", Replay(*nominal, session.recordings, before, *session.pool).logs});
-    }
+    if (changed) predictions.push_back({"nominal", std::move(before)});
     predictions.push_back({changed ? "with what was added" : "nominal", result.logs});
     GS_RETURN_IF_ERROR(WriteReport(out, ReplayJson(report), session.experiment, {session.recordings, {}}, std::move(predictions), *session.model, session.values, session.model->parameters()));
   }
   if (flags.common.json) {
     fmt::print("{}\n", ReplayJson(report));
   } else {
-    fmt::print("{}", ReplayTable(report));
+    fmt::print("{}", ReplayTable(report, ConsoleOf(1)));
   }
   if (flags.fail_above > 0 && !(comparison.error <= flags.fail_above)) {
     if (!flags.common.quiet) fmt::print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", comparison.error, flags.fail_above);

@@ -100,7 +100,7 @@ Result<int> RunTune(TuneFlags flags) {
     predictions[1].logs.insert(predictions[1].logs.end(), summary.held_out.begin(), summary.held_out.end());
     GS_RETURN_IF_ERROR(WriteReport(out, json, session.experiment, {data.train, data.held_out}, std::move(predictions), *session.model, session.values, session.model->parameters()));
   }
-  fmt::print("{}{}", flags.common.json ? json : TuneTable(summary, *session.model), flags.common.json ? "\n" : "");
+  fmt::print("{}{}", flags.common.json ? json : TuneTable(summary, *session.model, ConsoleOf(1)), flags.common.json ? "\n" : "");
   return kDone;
 }
 

@@ -26,6 +26,10 @@ const char* ModeName(ReplayMode mode) {
 
 const char* OutcomeName(Outcome outcome) { return outcome == Outcome::kCompleted ? "completed" : "diverged"; }
 
+// Of an error over the motion's own spread: from where it is marked as good, and as bad.
+constexpr double kClose = 0.05, kFarOff = 0.6;
+constexpr std::size_t kSparks = 12;
+
 // The end of a path that fits `width`.
 std::string Shorten(const std::string& path, std::size_t width) {
   return path.size() <= width ? path : "..." + path.substr(path.size() - width + 3);
@@ -40,23 +44,28 @@ void AppendNumber(std::string& text, double value) {
 
 }  // namespace
 
-std::string ReplayTable(const ReplayReport& report) {
-  const auto& [result, comparison, model, values, seed, other_error] = report;
-  std::string text = fmt::format("{:<37} {:<18} {:>9} {:>9} {:>7} {:>8} {:>6}\n", "log", "signal", "RMSE", "MAE", "nRMSE", "lag ms", "corr");
+std::string ReplayTable(const ReplayReport& report, const Console& console) {
+  const auto& [result, comparison, model, values, seed, other_error, nominal_error] = report;
+  std::string text = console.Bold(fmt::format("{:<24} {:<18} {:>9} {:>9} {:>7} {:>8} {:>6} {}", "log", "signal", "RMSE", "MAE", "nRMSE", "lag ms", "corr", "over time")) + "\n";
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
     const LogComparison& log = comparison.logs[l];
     bool first = true;
-    for (const SignalScore& s : log.signals) {
-      text += fmt::format("{:<37} {:<18} {:>9.4g} {:>9.4g} {:>7.4g} {:>8.2f} {:>6.3f}\n", first ? Shorten(log.log_path, 37) : "", s.signal, s.rmse, s.mae, s.nrmse, 1e3 * s.lag_s,
-                          s.correlation);
+    for (std::size_t k = 0; k < log.signals.size(); ++k) {
+      const SignalScore& s = log.signals[k];
+      const SignalTrace& trace = result.logs[l].signals[k];
+      const std::string nrmse = fmt::format("{:>7.4g}", s.nrmse);
+      text += fmt::format("{:<24} {:<18} {:>9.4g} {:>9.4g} {} {:>8.2f} {:>6.3f} {}\n", first ? Shorten(log.log_path, 24) : "", s.signal, s.rmse, s.mae,
+                          s.nrmse < kClose ? console.Good(nrmse) : s.nrmse > kFarOff ? console.Bad(nrmse) : nrmse, 1e3 * s.lag_s, s.correlation,
+                          Sparkline(ErrorOverTime(result.logs[l].time_s, trace.measured, trace.predicted, kSparks)));
       first = false;
     }
     if (const LogReplay& replay = result.logs[l]; replay.outcome == Outcome::kDiverged) {
-      text += replay.windows > 1 ? fmt::format("{:<40} {} of {} windows diverged, the first at {:.3f} s\n", "", replay.diverged_windows, replay.windows, replay.diverged_at_s)
-                                 : fmt::format("{:<40} diverged at {:.3f} s\n", "", replay.diverged_at_s);
+      text += console.Bad(replay.windows > 1 ? fmt::format("{:<24} {} of {} windows diverged, the first at {:.3f} s", "", replay.diverged_windows, replay.windows, replay.diverged_at_s)
+                                             : fmt::format("{:<24} diverged at {:.3f} s", "", replay.diverged_at_s)) + "\n";
     }
   }
   text += fmt::format("\nerror {:.4g} (RMSE over standard deviation, {}, {} log{})\n", comparison.error, ModeName(result.mode), comparison.logs.size(), comparison.logs.size() == 1 ? "" : "s");
+  if (std::isfinite(nominal_error)) text += fmt::format("the nominal model: error {:.4g}\n", nominal_error);
   const char* other = result.mode == ReplayMode::kWindows ? "a free run" : "windows, each started from the log";
   text += std::isfinite(other_error) ? fmt::format("in {}: error {:.4g}\n", other, other_error) : fmt::format("in {}: diverges\n", other);
   text += std::isfinite(result.time_step_error)
@@ -74,10 +83,11 @@ std::string ReplayTable(const ReplayReport& report) {
 }
 
 std::string ReplayJson(const ReplayReport& report) {
-  const auto& [result, comparison, model, values, seed, other_error] = report;
+  const auto& [result, comparison, model, values, seed, other_error, nominal_error] = report;
   ordered_json json = {{"schema", "gapscope.replay/1"}, {"mode", ModeName(result.mode)}, {"error", JsonNumber(comparison.error)},
                        {result.mode == ReplayMode::kWindows ? "error_free_run" : "error_windows", JsonNumber(other_error)}, {"time_step_s", result.time_step_s},
                        {"time_step_error", JsonNumber(result.time_step_error)}, {"logs", ordered_json::array()}};
+  if (std::isfinite(nominal_error)) json["error_nominal"] = nominal_error;
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
     const LogComparison& log = comparison.logs[l];
     const LogReplay& replay = result.logs[l];

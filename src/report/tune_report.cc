@@ -32,16 +32,16 @@ std::string FlatText(const FlatDirection& flat, const Model& model) {
   return flat.parts.size() == 1 ? names + " is not known from these logs" : "only together: these logs leave the direction " + names + " (logarithms where the bounds are positive) open";
 }
 
-std::string TuneTable(const TuneSummary& summary, const Model& model) {
-  std::string text = fmt::format("{:<44} {:>11} {:>11}   {:<24} {}\n", "parameter", "nominal", "value", "95 % interval", "unit");
+std::string TuneTable(const TuneSummary& summary, const Model& model, const Console& console) {
+  std::string text = console.Bold(fmt::format("{:<44} {:>11} {:>11}   {:<24} {}", "parameter", "nominal", "value", "95 % interval", "unit")) + "\n";
   for (const auto& t : summary.tuned) {
     const Parameter& p = model.parameters()[t.index];
     text += fmt::format("{:<44} {:>11.4g} {:>11.4g}   {:<24} {}{}\n", p.name, p.nominal, t.value, t.identifiable ? fmt::format("{:.4g} .. {:.4g}", t.low, t.high) : "not known", p.unit,
-                        t.at_bound ? "  at its bound" : "");
+                        t.at_bound ? console.Warn("  at its bound") : "");
   }
   for (const auto& flat : summary.flat) text += "flat: " + FlatText(flat, model) + "\n";
   for (const auto& [a, b, r] : summary.correlated) text += fmt::format("{} and {} go together (correlation {:.3f})\n", model.parameters()[a].name, model.parameters()[b].name, r);
-  text += fmt::format("\n{:<44} {:<18} {:>10} {:>10} {:>8}\n", "held-out log", "signal", "RMSE", "MAE", "nRMSE");
+  text.append("\n").append(console.Bold(fmt::format("{:<44} {:<18} {:>10} {:>10} {:>8}", "held-out log", "signal", "RMSE", "MAE", "nRMSE"))).append("\n");
   for (const auto& log : summary.held_out) {
     for (const auto& s : log.signals) {
       const SignalScore score = ScoreSignal(s.signal, log.time_s, s.measured, s.predicted, s.resolution);

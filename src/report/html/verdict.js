@@ -13,9 +13,7 @@ function replayVerdict(result) {
   const windows = result.error_windows, free = result.error_free_run;
   if (known(windows)) more.push(`In windows that each start from the log it is ${number(windows, 3)}.`);
   if (known(free)) more.push(`In one free run over the log it is ${number(free, 3)}.`);
-  const stages = [{name: result.mode === "windows" ? "windows" : "free run", error, kind: ""}];
-  if (known(windows)) stages.push({name: "in windows", error: windows, kind: "other"});
-  if (known(free)) stages.push({name: "free run", error: free, kind: "other"});
+  const stages = known(result.error_nominal) ? [{name: "nominal", error: result.error_nominal, kind: ""}, {name: effects.length ? `with ${listed(effects)}` : "with the values given", error, kind: error < result.error_nominal ? "best" : ""}] : [];
   return {title: `${model} ${how}.`, more: more.join(" "), stages, probability: null};
 }
 
@@ -56,8 +54,8 @@ function chainPicture(stages) {
   const items = shown.map((stage, i) => {
     const part = `${Math.max(1, (100 * stage.error) / most)}%`;
     const before = i > 0 ? shown[i - 1].error : null;
-    const change = before && stage.kind !== "floor" && stage.kind !== "other" ? stage.error / before - 1 : null;
-    const drop = change === null || Math.abs(change) < 0.005 ? null : `${change < 0 ? "−" : "+"}${Math.round(100 * Math.abs(change))} %`;
+    const change = before && stage.kind !== "floor" ? stage.error / before - 1 : null;
+    const drop = change === null || Math.abs(change) < 0.005 ? null : change < -0.9 ? `${number(before / stage.error, 2)} times smaller` : `${change < 0 ? "−" : "+"}${Math.round(100 * Math.abs(change))} %`;
     return element("li", {class: stage.kind, style: {"--part": part}},
       element("div", {class: "column", "aria-hidden": "true"}, element("span", {style: {height: part}})),
       element("div", {class: "what"}, element("b", {class: "number"}, number(stage.error, 3)), element("br"), stage.name,

@@ -1,0 +1,51 @@
+#include "src/report/console.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <string_view>
+
+namespace gapscope {
+
+Console ConsoleOf(int descriptor) {
+  const char* off = std::getenv("NO_COLOR");
+  const char* terminal = std::getenv("TERM");
+  return {.colour = isatty(descriptor) && !(off && *off) && terminal && std::string_view(terminal) != "dumb"};
+}
+
+std::string Sparkline(std::span<const double> values) {
+  static const char* const kBlocks[] = {"\u2581", "\u2582", "\u2583", "\u2584", "\u2585", "\u2586", "\u2587", "\u2588"};
+  double most = 0;
+  for (const double v : values) {
+    if (std::isfinite(v)) most = std::max(most, v);
+  }
+  std::string line;
+  for (const double v : values) {
+    if (!std::isfinite(v)) {
+      line += ' ';
+    } else {
+      line += kBlocks[most > 0 ? std::clamp(static_cast<int>(std::ceil(8 * v / most)) - 1, 0, 7) : 0];
+    }
+  }
+  return line;
+}
+
+std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<const double> measured, std::span<const double> predicted, std::size_t parts) {
+  std::vector<double> sums(parts, 0);
+  std::vector<std::size_t> rows(parts, 0);
+  const double length = time_s.empty() ? 0 : time_s.back() - time_s.front();
+  for (std::size_t r = 0; r < time_s.size(); ++r) {
+    const double error = measured[r] - predicted[r];
+    if (!std::isfinite(error)) continue;
+    const std::size_t part = length > 0 ? std::min(parts - 1, static_cast<std::size_t>(static_cast<double>(parts) * (time_s[r] - time_s.front()) / length)) : 0;
+    sums[part] += error * error;
+    ++rows[part];
+  }
+  for (std::size_t p = 0; p < parts; ++p) sums[p] = rows[p] > 0 ? std::sqrt(sums[p] / static_cast<double>(rows[p])) : std::numeric_limits<double>::quiet_NaN();
+  return sums;
+}
+
+}  // namespace gapscope

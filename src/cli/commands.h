@@ -12,6 +12,7 @@ namespace gapscope::cli {
 using Run = std::function<Result<int>()>;
 
 void AddInit(CLI::App& program, Run& run);
+void AddIdentify(CLI::App& program, Run& run);
 void AddInspect(CLI::App& program, Run& run);
 void AddDesign(CLI::App& program, Run& run);
 void AddDiagnose(CLI::App& program, Run& run);

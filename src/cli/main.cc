@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   cli::AddReplay(program, run);
   cli::AddTune(program, run);
   cli::AddDiagnose(program, run);
+  cli::AddIdentify(program, run);
   cli::AddDesign(program, run);
   cli::AddRender(program, run);
   cli::AddPlan(program, run);

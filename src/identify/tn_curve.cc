@@ -1,0 +1,112 @@
+// The envelope of torque against speed: peak torque, the power that bounds it at speed, the speed without load. Source: "Motor System Identification", "TN curve".
+#include <algorithm>
+#include <cmath>
+
+#include "src/identify/filter.h"
+#include "src/identify/regression.h"
+
+namespace gapscope {
+namespace {
+
+struct Sample {
+  double speed, torque;  // magnitudes; motoring only
+  bool limited;          // the servo asked for more
+};
+
+double Quantile(std::vector<double> values, double share) {
+  const std::size_t k = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
+  return values[k];
+}
+
+}  // namespace
+
+Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const IdentifyOptions& options) {
+  GS_ASSIGN(const int joint, DrivenJoint(input.model, options.joint));
+  const mjModel& m = input.model.compiled();
+  std::vector<Sample> samples;
+  std::size_t limited = 0;
+  for (const Recording& recording : input.recordings) {
+    const auto* torque = FindSignal(input.model, recording, SignalKind::kTorque, joint);
+    const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
+    if (!torque || !angle) return Error{.what = "a torque-speed curve needs torque and angle", .where = recording.log_path, .cure = "a measured signal of 'kind: torque' in " + input.model.experiment().path};
+    const SmoothLog smooth(recording, options);
+    const std::vector<double> t = smooth.Sampled(torque->values, 0), q = smooth.Sampled(angle->values, 0), w = smooth.Sampled(angle->values, 1);
+    // What the drive was asked for, by the nominal model's own law, linear in command, angle and speed.
+    std::vector<double> demand(smooth.size(), 0.0);
+    for (std::size_t c = 0; c < recording.commands.size(); ++c) {
+      const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, recording.commands[c].actuator.c_str());
+      if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint) continue;
+      const std::vector<double> u = smooth.Held(recording.commands[c].values);
+      const mjtNum *gain = m.actuator_gainprm + mjNGAIN * actuator, *bias = m.actuator_biasprm + mjNBIAS * actuator;
+      for (std::size_t i = 0; i < smooth.size(); ++i) demand[i] += gain[0] * u[i] + bias[0] + bias[1] * q[i] + bias[2] * w[i];
+    }
+    for (std::size_t i = 0; i < smooth.size(); ++i) {
+      if (!std::isfinite(t[i]) || !std::isfinite(w[i]) || t[i] * w[i] < 0) continue;
+      samples.push_back({std::abs(w[i]), std::abs(t[i]), std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0});
+      limited += samples.back().limited ? 1 : 0;
+    }
+  }
+  if (samples.size() < 200) return Error{.what = "too few rows in which the drive pushes", .where = input.recordings.front().log_path, .actual = std::to_string(samples.size()), .allowed = "at least 200"};
+  double fastest = 0, strongest = 0, power = 0;
+  for (const auto& s : samples) {
+    fastest = std::max(fastest, s.speed);
+    strongest = std::max(strongest, s.torque);
+    power = std::max(power, s.speed * s.torque);
+  }
+  const bool reaches = limited > samples.size() / 100;
+  // The envelope: near the top of each bin of speed; of the rows where the drive was asked for more, where there are enough.
+  constexpr int kBins = 16;
+  PointTable table{.name = "envelope", .columns = {"speed_rad_per_s", "torque_n_m", "power_w", "rows", "limited_rows"}, .rows = {}};
+  std::vector<std::pair<double, double>> envelope;
+  for (int b = 0; b < kBins; ++b) {
+    std::vector<double> torques, all;
+    double speed = 0;
+    for (const auto& s : samples) {
+      if (s.speed < fastest * b / kBins || s.speed >= fastest * (b + 1) / kBins) continue;
+      all.push_back(s.torque);
+      if (s.limited || !reaches) torques.push_back(s.torque), speed += s.speed;
+    }
+    if (torques.size() < 10) continue;
+    const double w = speed / static_cast<double>(torques.size()), top = Quantile(torques, reaches ? 0.9 : 0.99);
+    envelope.emplace_back(w, top);
+    table.rows.push_back({w, top, w * top, static_cast<double>(all.size()), reaches ? static_cast<double>(torques.size()) : 0.0});
+  }
+  Identification result{.method = "tn-curve", .relation = "|torque| <= min(peak, power / speed), envelope of the rows in which the drive pushes", .r2 = NAN, .rmse = NAN, .unit = "N m", .rows = samples.size()};
+  // Peak and constant power by least absolute deviation of the envelope's logarithm over a grid: the corner is where they meet.
+  double best = INFINITY, peak = strongest, bound = power;
+  if (envelope.size() >= 3) {
+    for (int i = 0; i <= 60; ++i) {
+      for (int j = 0; j <= 60; ++j) {
+        const double p = strongest * (0.4 + 0.6 * i / 60), w = power * (0.4 + 0.6 * j / 60);
+        double misfit = 0;
+        for (const auto& [speed, torque] : envelope) misfit += std::abs(std::log(std::min(p, w / std::max(speed, 1e-9)) / torque));
+        if (misfit < best) best = misfit, peak = p, bound = w;
+      }
+    }
+  }
+  double low_peak = INFINITY, high_peak = 0, low_power = INFINITY, high_power = 0;
+  for (const auto& [speed, torque] : envelope) {
+    if (speed * peak < 0.8 * bound) low_peak = std::min(low_peak, torque), high_peak = std::max(high_peak, torque);
+    if (speed * peak > 1.2 * bound) low_power = std::min(low_power, torque * speed), high_power = std::max(high_power, torque * speed);
+  }
+  const auto spread = [](double low, double high) { return high > 0 ? std::pair{low, high} : std::pair<double, double>{NAN, NAN}; };
+  const auto [pl, ph] = spread(low_peak, high_peak);
+  const auto [wl, wh] = spread(low_power, high_power);
+  result.values.push_back({.name = "peak_torque", .unit = "N m", .value = peak, .low = pl, .high = ph});
+  result.values.push_back({.name = "power", .unit = "W", .value = bound, .low = wl, .high = wh});
+  result.values.push_back({.name = "corner_speed", .unit = "rad/s", .value = bound / peak, .low = NAN, .high = NAN});
+  result.values.push_back({.name = "fastest", .unit = "rad/s", .value = fastest, .low = NAN, .high = NAN});
+  if (options.rated_torque_n_m > 0 && options.rated_speed_rad_per_s > 0) {
+    const double rated = options.rated_torque_n_m * options.rated_speed_rad_per_s;
+    result.values.push_back({.name = "rated_power", .unit = "W", .value = rated, .low = NAN, .high = NAN});
+    if (bound < rated) result.remarks.push_back("these logs never reach the rated power");
+  }
+  if (!reaches) result.remarks.push_back("the drive was hardly ever asked for more than it gave: the envelope is how far the log went, not what the motor can do");
+  if (std::isnan(wl)) result.remarks.push_back("no rows beyond the corner: the power is a lower bound");
+  result.remarks.push_back("intervals are the spread of the envelope's bins");
+  result.tables.push_back(std::move(table));
+  return result;
+}
+
+}  // namespace gapscope

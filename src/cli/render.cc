@@ -12,6 +12,7 @@
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/report/html_report.h"
+#include "src/report/json.h"
 #include "src/video/video.h"
 
 namespace gapscope::cli {
@@ -76,6 +77,14 @@ Result<std::vector<VideoModel>> ModelsOf(const RenderFlags& flags, const Session
   return models;
 }
 
+std::string SummaryJson(const RenderFlags& flags, const std::vector<VideoModel>& models, const VideoOptions& options, const VideoSummary& summary) {
+  nlohmann::ordered_json json = {{"schema", "gapscope.render/1"}, {"out", flags.out}, {"log", flags.log}, {"frames", summary.frames}, {"width", options.width}, {"height", options.height},
+                                 {"frames_per_s", options.frames_per_s}, {"first_s", summary.first_s}, {"last_s", summary.last_s}, {"video_s", summary.length_s},
+                                 {"models", nlohmann::ordered_json::array()}, {"gl", GlBackendName(summary.gl)}, {"wall_s", summary.wall_s}, {"versions", JsonVersions()}};
+  for (std::size_t m = 0; m < models.size(); ++m) json["models"].push_back({{"label", models[m].label}, {"error", JsonNumber(summary.errors[m])}});
+  return json.dump(2);
+}
+
 Result<int> RunRender(RenderFlags flags) {
   VideoOptions options{.out = flags.out, .view = ValueOf<View>(kViews, flags.view), .layout = ValueOf<Layout>(kLayouts, flags.layout), .gl = ValueOf<GlBackend>(kGl, flags.gl),
                        .speed = flags.speed, .from_s = flags.from_s, .to_s = flags.to_s, .at_s = flags.at_s, .frames_per_s = flags.frames_per_s};
@@ -97,13 +106,18 @@ Result<int> RunRender(RenderFlags flags) {
   if (live) fmt::print(stderr, "\r\033[K");
   if (!rendered.ok()) return rendered.error();
   const VideoSummary& summary = rendered.value();
-  if (!flags.common.quiet && !summary.note.empty()) fmt::print(stderr, "gapscope: {}\n", summary.note);
-  fmt::print("{}\n", flags.out);
   const std::filesystem::path out = flags.out;
+  bool shown = false;
   if (out.extension() == ".mp4") {
-    GS_ASSIGN(const bool shown, AttachVideo((out.parent_path() / "report.html").string(), out.filename().string()));
-    if (shown) fmt::print("  shown in {}\n", (out.parent_path() / "report.html").string());
+    GS_ASSIGN(shown, AttachVideo((out.parent_path() / "report.html").string(), out.filename().string()));
   }
+  if (!flags.common.quiet && !summary.note.empty()) fmt::print(stderr, "gapscope: {}\n", summary.note);
+  if (flags.common.json) {
+    fmt::print("{}\n", SummaryJson(flags, models, options, summary));
+    return kDone;
+  }
+  fmt::print("{}\n", flags.out);
+  if (shown) fmt::print("  shown in {}\n", (out.parent_path() / "report.html").string());
   for (std::size_t m = 0; m < models.size(); ++m) fmt::print("  {:<32} error {:.4g}\n", models[m].label, summary.errors[m]);
   if (summary.length_s > 0) {
     fmt::print("  {} frames of {}x{}, {:.2f} s of video for {:.2f} s of the log; {:.1f} s to make ({})\n", summary.frames, options.width, options.height, summary.length_s,
@@ -135,8 +149,7 @@ void AddRender(CLI::App& program, Run& run) {
   command->add_option("--mode", flags->mode, "free_run or windows (default: the experiment's)")->check(CLI::IsMember({"free_run", "windows"}));
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
   command->add_option("--gl", flags->gl, "OpenGL: osmesa (in memory), egl (without a surface), auto (OSMesa, else EGL)")->check(CLI::IsMember(kGl))->capture_default_str();
-  command->add_option("--jobs", flags->common.jobs, "Workers; 0: one per processor. The frames do not depend on it")->check(CLI::Range(0, 1024));
-  command->add_flag("--quiet", flags->common.quiet, "No messages on stderr but errors");
+  AddCommonFlags(*command, flags->common, false);
   command->footer("Example: gapscope render models/qube/experiment.yaml log.csv --compare nominal --compare out/tuned --speed 0.5 --out video.mp4");
   command->callback([flags, &run] { run = [flags] { return RunRender(*flags); }; });
 }

@@ -1,7 +1,6 @@
 #include "replay/simulator.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <string_view>
@@ -11,7 +10,7 @@
 namespace gapscope {
 namespace {
 
-constexpr int kMaxInputs = 8;     // of a drive: there are eight roles
+constexpr double kPreRoll_s = 0.6;
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
 ModelPtr CopyForReplay(const mjModel& model) {
@@ -124,11 +123,11 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   const std::size_t nq = static_cast<std::size_t>(m->nq);
   GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
   mj_resetData(m, d);
+  std::fill(held_.begin(), held_.end(), window.begin);
+  PreRoll(recording, window);
   std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
   std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
   d->time = recording.time_s[window.begin];
-  std::fill(held_.begin(), held_.end(), window.begin);
-  Prime(recording, window);
 
   // Torques cost a pass over the actuators at each stamp: only when this log has one.
   reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(), [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
@@ -206,43 +205,36 @@ void Simulator::DelaySignals(const Recording& recording, Window window, std::spa
   }
 }
 
-// A servo's own delay looks back in time: at a window's start it sees what the log holds before it, not nothing.
-void Simulator::Prime(const Recording& recording, Window window) {
-  const mjModel* m = mujoco_.get();
-  for (int instance = 0; instance < m->nplugin; ++instance) {
-    const mjpPlugin* plugin = mjp_getPluginAtSlot(m->plugin[instance]);
-    if (!plugin || std::string_view(plugin->name) != "gapscope.motor") continue;
-    const plugins::MotorState state = plugins::FindMotorState(m, data_.get(), instance);
-    const int drive = static_cast<int>(std::find(m->actuator_plugin, m->actuator_plugin + m->nactuator, instance) - m->actuator_plugin);
-    if (state.capacity == 0 || drive == m->nactuator || m->actuator_trntype[drive] != mjTRN_JOINT) continue;
-    const int joint = m->actuator_trnid[2 * drive];
-    const auto measured = std::find_if(recording.measured.begin(), recording.measured.end(), [&](const auto& q) {
-      const SignalSource& source = model_.source(q.index);
-      return source.kind == SignalKind::kPosition && (source.joint == joint || IsMirror(joint, source.joint));
-    });
-    if (measured == recording.measured.end()) continue;
-    const SignalSource& source = model_.source(measured->index);
-    const double offset = source.offset >= 0 ? values_[source.offset] : 0;
-    std::array<double, kMaxInputs> ctrl{};
-    plugins::History history = state.history();
-    const std::size_t count = std::min<std::size_t>(window.begin, static_cast<std::size_t>(state.capacity));
-    for (std::size_t row = window.begin - count; row < window.begin; ++row) {
-      int input = 0;
-      for (int a = 0; a < m->nactuator && input < kMaxInputs; ++a) {
-        if (m->actuator_plugin[a] != instance) continue;
-        const auto& addresses = model_.command_actuators();
-        const auto command = std::find(addresses.begin(), addresses.end(), m->actuator_ctrladr[a]);
-        ctrl[static_cast<std::size_t>(input++)] = command == addresses.end() ? 0 : recording.commands[static_cast<std::size_t>(command - addresses.begin())].values[row];
-      }
-      const LocalFit fit = FitLocally(recording, *measured, row, kInitialFitHalfWidth_s);
-      history.Push(recording.time_s[row], fit.value - offset, fit.slope, ctrl.data());
+// Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log for a while, so that they hold what
+// the log says and not nothing.
+void Simulator::PreRoll(const Recording& recording, Window window) {
+  mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  if (!remembers_ || window.begin == 0) return;
+  const double from = recording.time_s[window.begin] - kPreRoll_s;
+  std::size_t first = window.begin;
+  while (first > 0 && recording.time_s[first - 1] >= from) --first;
+  const int integrator = m->opt.integrator;
+  m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
+  for (std::size_t row = first; row < window.begin; ++row) {
+    for (const auto& measured : recording.measured) {
+      const SignalSource& source = model_.source(measured.index);
+      if (source.kind != SignalKind::kPosition) continue;
+      const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+      d->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
+      d->qvel[source.dof] = fit.slope;
     }
+    for (const auto& [joint, of] : model_.mirrored_joints()) {
+      d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
+      d->qvel[m->jnt_dofadr[joint]] = d->qvel[m->jnt_dofadr[of]];
+    }
+    d->time = recording.time_s[row];
+    m->opt.timestep = recording.time_s[row + 1] - recording.time_s[row];
+    SetCommands(recording, row, recording.time_s[row], recording.time_s[row + 1]);
+    mj_step(m, d);
   }
-}
-
-bool Simulator::IsMirror(int joint, int of) const {
-  const auto& mirrored = model_.mirrored_joints();
-  return std::find(mirrored.begin(), mirrored.end(), std::pair{joint, of}) != mirrored.end();
+  m->opt.integrator = integrator;
+  for (auto& warning : d->warning) warning.number = 0;
 }
 
 }  // namespace gapscope

@@ -56,8 +56,7 @@ class Simulator {
   mjData& data() { return *data_; }
 
  private:
-  void Prime(const Recording& recording, Window window);
-  bool IsMirror(int joint, int of) const;
+  void PreRoll(const Recording& recording, Window window);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;
   void DelaySignals(const Recording& recording, Window window, std::span<double> predicted);
@@ -69,6 +68,7 @@ class Simulator {
   double max_step_s_;
   double shift_s_ = 0, command_delay_s_ = 0;
   bool reads_torque_ = false;
+  bool remembers_ = false;            // has states beside position and speed
   std::vector<double> values_;
   std::vector<double> column_;        // scratch of DelaySignals
   std::vector<std::size_t> held_;     // per command: row held at the start of the step

@@ -10,6 +10,8 @@ namespace {
 
 // Base parameters are known to about +-20 % and their bounds lie at nominal / 1.6 and nominal * 1.6.
 constexpr double kPriorShare = 0.15;
+// Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known beforehand.
+constexpr double kCorrelated = 10;
 
 }  // namespace
 
@@ -20,7 +22,7 @@ std::string Candidate::Name() const {
 }
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
-  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .weights = weights, .prior_share = kPriorShare, .huber = 0};
+  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated), .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
@@ -45,12 +47,32 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   return candidate;
 }
 
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance) {
-  const SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .deadline = bench.deadline};
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, double rival_cost) {
+  SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .deadline = bench.deadline};
+  constexpr int kFairTry = 6;
+  constexpr double kFarBehind = 5;
+  if (rival_cost > 0) options.hopeless = [=](double cost, int iteration) { return iteration >= kFairTry && cost > kFarBehind * rival_cost; };
+  const auto t0=std::chrono::steady_clock::now(); const auto r0=candidate->problem->replays();
   const SolveResult solved = Solve(*candidate->problem, start, options);
+  if(getenv("TRACE")) fprintf(stderr,"TRACE fit %s: cost %g it %d term %s replays %zu  %.2f s\n",candidate->Name().c_str(),solved.cost,solved.iterations,TerminationText(solved.termination).c_str(),candidate->problem->replays()-r0,std::chrono::duration<double>(std::chrono::steady_clock::now()-t0).count());
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
   candidate->converged = solved.termination == Termination::kConverged;
+  candidate->values = candidate->problem->Values(solved.point);
+  candidate->shift_s = candidate->problem->Shift(solved.point);
+}
+
+void PolishCandidate(const Workbench& bench, Candidate* candidate) {
+  constexpr double kPriorLevel = 0.1;  // of the cost, in which the prior counts one per squared standard deviation
+  // A model that leaves more than the noise has residuals that lie, and count for less.
+  candidate->problem->ScalePrior(std::max(1.0, candidate->held_out_floors * candidate->held_out_floors));
+  candidate->train_cost = candidate->problem->Cost(candidate->point);
+  const SolveOptions options{.max_iterations = 5, .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0), .coarse_step = 0.01, .fine_step = 0.01, .damping = 1e-8, .secant = false,
+                             .deadline = bench.deadline};
+  const SolveResult solved = Solve(*candidate->problem, candidate->point, options);
+  if (!(solved.cost <= candidate->train_cost)) return;
+  candidate->point = solved.point;
+  candidate->train_cost = solved.cost;
   candidate->values = candidate->problem->Values(solved.point);
   candidate->shift_s = candidate->problem->Shift(solved.point);
 }
@@ -62,30 +84,35 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
   FitProblem problem(*candidate->model, bench.data.held_out, options, candidate->values, bench.pool);
   FitPoint point = problem.Start();
   candidate->held_out_cost = std::numeric_limits<double>::infinity();
+  candidate->held_out_error = std::numeric_limits<double>::infinity();
+  candidate->held_out_floors = candidate->held_out_error;
   candidate->held_out_blocks.clear();
+  candidate->train_blocks = candidate->problem->BlockCosts(candidate->point);
   if (!std::isfinite(problem.Cost(point))) return;
   point = Solve(problem, point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
   candidate->held_out_blocks = problem.BlockCosts(point);
   if (candidate->held_out_blocks.empty()) return;
   candidate->held_out_cost = 0;
   for (const double cost : candidate->held_out_blocks) candidate->held_out_cost += cost;
+  const double rows = static_cast<double>(std::max<std::size_t>(1, problem.residuals()));
+  candidate->block_floor = 0.5 * rows / static_cast<double>(candidate->held_out_blocks.size());
+  candidate->held_out_floors = std::sqrt(2 * candidate->held_out_cost / rows);
+  candidate->held_out = problem.Predict(point);
+  candidate->held_out_error = ReplayError(candidate->held_out);
 }
 
-PairedGain CompareCandidates(const Candidate& a, const Candidate& b) {
-  PairedGain result;
-  if (b.held_out_blocks.empty()) return {.gain = -1, .relative = -1, .z = -10};
-  if (a.held_out_blocks.size() != b.held_out_blocks.size()) return {.gain = 1, .relative = 1, .z = 10};
-  const double n = static_cast<double>(a.held_out_blocks.size());
-  double square = 0;
-  for (std::size_t i = 0; i < a.held_out_blocks.size(); ++i) result.gain += a.held_out_blocks[i] - b.held_out_blocks[i];
-  for (std::size_t i = 0; i < a.held_out_blocks.size(); ++i) {
-    const double d = a.held_out_blocks[i] - b.held_out_blocks[i] - result.gain / n;
-    square += d * d;
-  }
-  const double deviation = std::sqrt(square * n / std::max(1.0, n - 1));
-  result.relative = a.held_out_cost > 0 ? result.gain / a.held_out_cost : 0;
-  result.z = deviation > 0 ? result.gain / deviation : result.gain > 0 ? 10 : result.gain < 0 ? -10 : 0;
-  return result;
+double FreeRunError(const Workbench& bench, const Candidate& candidate) {
+  FitOptions options = bench.Options(*candidate.model, false);
+  options.objective = Objective::kFreeRun;
+  options.fold = Fold::kAll;
+  options.weights.clear();
+  options.fit_shift = false;
+  options.shift_s = candidate.shift_s;
+  FitProblem problem(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
+  FitPoint point = problem.Start();
+  if (!std::isfinite(problem.Cost(point))) return std::numeric_limits<double>::infinity();
+  point = Solve(problem, point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
+  return ReplayError(problem.Predict(point));
 }
 
 }  // namespace gapscope

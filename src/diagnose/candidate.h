@@ -19,8 +19,13 @@ struct Candidate {
   bool converged = false;
   std::vector<double> values;
   double shift_s = 0;
-  std::vector<double> held_out_blocks;   // cost per half second; empty: cannot be simulated there
+  std::vector<double> train_blocks;      // cost per half second, of the training logs
+  std::vector<double> held_out_blocks;   // likewise held out; empty: cannot be simulated there
+  double block_floor = 1;                // what noise alone costs in such a block
   double held_out_cost = 0;
+  double held_out_floors = 0;            // root mean square of residual over noise
+  double held_out_error = 0;             // normalised: see ReplayError; in windows
+  std::vector<LogReplay> held_out;       // predictions there
   std::size_t parameters = 0;            // of the effects
   std::string Name() const;
 };
@@ -34,6 +39,7 @@ struct Workbench {
   std::vector<double> weights;   // per experiment signal: 1 / noise
   double window_s = 1;
   double time_step_s = 0;
+  double sample_s = 0;           // of the logs as they are: what a delay must exceed
   std::size_t max_windows = 0;
   Deadline deadline;
   bool by_windows = false;       // train and held-out logs are the same: every third window is held out
@@ -43,18 +49,15 @@ struct Workbench {
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
-// Fits from `start` on the training logs.
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance);
-// Fills the held-out fields.
+// Fits from `start` on the training logs. A fit that after a fair try still is far behind `rival_cost` is given up (0: never).
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, double rival_cost = 0);
+// Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
+void PolishCandidate(const Workbench& bench, Candidate* candidate);
+// Fills the blocks and the held-out fields.
 void ScoreCandidate(const Workbench& bench, Candidate* candidate);
 
-// By how much `b` explains the held-out logs better than `a`, block by block.
-struct PairedGain {
-  double gain = 0;      // cost of a less cost of b
-  double relative = 0;  // of a's cost
-  double z = 0;         // gain over its standard error, blocks taken as independent
-};
-PairedGain CompareCandidates(const Candidate& a, const Candidate& b);
+// Error on the held-out logs when each is one free run (see ReplayError), with zero offsets and the initial state fitted; infinity where that diverges.
+double FreeRunError(const Workbench& bench, const Candidate& candidate);
 
 }  // namespace gapscope
 

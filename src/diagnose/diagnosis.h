@@ -35,7 +35,18 @@ struct CandidateReport {
   double screen_drop = 0;       // share of the baseline's cost that the score test promises
   double absorbed = 0;          // share of its trace that the baseline can imitate
   bool refitted = false, converged = false;
+  double bic = 0;               // lower is better
   std::string reason;           // why it was, or was not, accepted
+};
+
+// What the verdict and its probability rest on.
+struct VerdictEvidence {
+  double floors_before = 0, floors_left = 0;  // residual over the sensors' noise, root mean square, held out: refitted base model, final model
+  double removed = 0;                         // share of what exceeds the noise that went away, in windows
+  double free_run_before = 0, free_run_left = 0, free_run_removed = 0;  // normalised errors of one free run a log, and the share that went away; infinity, 0: it diverges
+  double gain_train = 0, gain_held_out = 0;   // of the last effect (or the best one that was not accepted): shares of its parent's cost
+  double z = 0;                               // over its standard error
+  double rival_lead = 0, rival_z = 0;         // lead over the nearest rival: share of that gain, standard errors
 };
 
 struct Diagnosis {
@@ -45,7 +56,7 @@ struct Diagnosis {
   std::vector<std::vector<std::string>> ambiguous;
   // Held-out errors, normalised: see ReplayError; in windows.
   double nominal = 0, refit = 0, final = 0, floor = 0, closed = 0;
-  double floors_left = 0;       // residual over the sensors' noise, root mean square, with the final model
+  VerdictEvidence evidence;
   std::vector<ConditionShare> where;
   std::vector<CandidateReport> candidates;
   std::string next_command;
@@ -57,11 +68,14 @@ struct Diagnosis {
   bool uneven = false;          // train and held-out logs show the gap very differently
   std::shared_ptr<const Model> model;   // with the effects found
   std::vector<double> values;
+  std::shared_ptr<const Model> refit_model;  // the base model, refitted
+  std::vector<double> refit_values;
 };
 
 struct DiagnoseOptions {
   double budget_s = 60;
   double window_s = 1.0;
+  double sample_s = 0.004;          // logs are searched on stamps at least this far apart
   unsigned long seed = 0;
   std::size_t max_windows = 36;     // of the training logs
   std::function<void(const std::string&)> progress;

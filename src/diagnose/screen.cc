@@ -23,7 +23,39 @@ std::vector<std::vector<double>> Trials(const std::vector<PlacedParameter>& para
   return all;
 }
 
+// Where the test asks the parameters that carry the effect's size to go; a place (rest, phase, periods) stays on its trial value.
+double StepTo(const PlacedParameter& p, double trial, double scale) {
+  constexpr double kLeastScale = 0.3, kMostScale = 2;
+  const bool place = p.key.find("rest") != std::string::npos || p.key.find("phase") != std::string::npos || p.key.find("periods") != std::string::npos;
+  if (p.trials.empty() || place || p.neutral == p.high) return trial;
+  return std::clamp(p.neutral + std::clamp(scale, kLeastScale, kMostScale) * (trial - p.neutral), p.low, p.high);
+}
+
 }  // namespace
+
+Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, const FitProblem& parent, const FitPoint& point, const Snapshot& base) {
+  Trial best;
+  const Model& model = *child.model;
+  const auto placed = model.EffectParameters(use, bench.scales);
+  if (!placed.ok()) return best;
+  const std::vector<double> nominal = model.Nominal();
+  for (const auto& trial : Trials(placed.value())) {
+    std::vector<double> tried = nominal;
+    for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = trial[i];
+    const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, base);
+    if (!test.valid) continue;
+    constexpr double kAllAbsorbed = 0.999;
+    best.visible = best.visible || test.absorbed < kAllAbsorbed;
+    if (best.valid && test.drop <= best.drop * base.cost) continue;
+    best.valid = true;
+    best.drop = test.drop / base.cost;
+    best.absorbed = test.absorbed;
+    best.dy = test.dy;
+    for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = StepTo(placed.value()[i], trial[i], test.scale);
+    best.values = std::move(tried);
+  }
+  return best;
+}
 
 std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses) {
   std::vector<Screened> screened;
@@ -35,42 +67,11 @@ std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const st
     effects.push_back(use);
     auto made = MakeCandidate(bench, effects);
     if (!made.ok()) continue;
-    Screened entry{.use = use, .child = std::move(made).value()};
-    const Model& model = *entry.child.model;
-    const auto placed = model.EffectParameters(use, bench.scales);
-    if (!placed.ok()) continue;
-    std::vector<double> values = model.Nominal();
-    for (std::size_t i = 0; i < parent.values.size(); ++i) {
-      if (const int index = model.IndexOf(parent.model->parameters()[i].name); index >= 0) values[index] = parent.values[i];
-    }
-    bool first = true;
-    for (const auto& trial : Trials(placed.value())) {
-      std::vector<double> tried = values;
-      for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = trial[i];
-      // A late command replaces the nuisance shift: it starts from there.
-      const FitPoint point = entry.child.problem->FromParent(*parent.problem, parent.point, tried, {});
-      const ColumnTest test = entry.child.problem->TestColumn(point, *parent.problem, base);
-      if (!test.valid) continue;
-      if (test.absorbed < 0.999) entry.visible = true;
-      if (!first && test.drop <= entry.drop * base.cost) continue;
-      first = false;
-      entry.drop = test.drop / base.cost;
-      entry.absorbed = test.absorbed;
-      entry.dy = test.dy;
-      entry.values = tried;
-      // The step that the test asks for: of the parameters that carry the effect's size.
-      for (std::size_t i = 0; i < trial.size(); ++i) {
-        const auto& p = placed.value()[i];
-        if (p.trials.empty() || p.key.find("rest") != std::string::npos || p.key.find("phase") != std::string::npos || p.key.find("periods") != std::string::npos) continue;
-        const double scale = std::clamp(test.scale, 0.3, 2.0);
-        const double target = p.neutral == p.high ? trial[i] : p.neutral + scale * (trial[i] - p.neutral);
-        entry.values[model.IndexOf(p.name)] = std::clamp(target, p.low, p.high);
-      }
-    }
-    if (first) continue;
-    screened.push_back(std::move(entry));
+    Screened entry{.use = use, .trial = {}, .child = std::move(made).value()};
+    entry.trial = TryEffect(bench, entry.child, use, *parent.problem, parent.point, base);
+    if (entry.trial.valid) screened.push_back(std::move(entry));
   }
-  std::stable_sort(screened.begin(), screened.end(), [](const Screened& a, const Screened& b) { return a.drop > b.drop; });
+  std::stable_sort(screened.begin(), screened.end(), [](const Screened& a, const Screened& b) { return a.trial.drop > b.trial.drop; });
   return screened;
 }
 

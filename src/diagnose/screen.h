@@ -1,4 +1,4 @@
-// The score test of every effect at a fitted candidate: one replay per trial value instead of a refit.
+// The score test over all candidate effects: what would each one explain, before any refit (see FitProblem::TestColumn).
 #ifndef GAPSCOPE_DIAGNOSE_SCREEN_H_
 #define GAPSCOPE_DIAGNOSE_SCREEN_H_
 
@@ -6,17 +6,26 @@
 
 namespace gapscope {
 
-struct Screened {
-  EffectUse use;
-  double drop = 0;       // of the training cost, as a share
-  double absorbed = 1;   // of the best trial
-  bool visible = false;  // some trial leaves a trace that the parent cannot imitate
-  std::vector<double> values;   // of the child's parameters: where its fit starts
-  Eigen::VectorXd dy;           // the parent's answer
-  Candidate child;              // model and problem, not fitted
+// The most promising of an effect's trial values.
+struct Trial {
+  double drop = 0;              // share of the parent's cost that the best step promises
+  double absorbed = 1;          // share of the column that the parent can imitate, at that trial
+  std::vector<double> values;   // the child's parameters to start from
+  Eigen::VectorXd dy;           // and how the parent's own coordinates answer
+  bool visible = false;         // some trial value leaves a column that the parent cannot imitate
+  bool valid = false;           // false: no trial value can be simulated
 };
 
-// Every effect of `uses` on top of `parent`, best first. Effects that do not go together with the parent's are left out.
+// Tries the values of `use`, the last effect of `child`, against `base`: a snapshot of `parent` at `point`, whose parameters are `values`.
+Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, const FitProblem& parent, const FitPoint& point, const Snapshot& base);
+
+struct Screened {
+  EffectUse use;
+  Trial trial;
+  Candidate child;              // its model and problem, unfitted
+};
+
+// Tests `uses` on top of `parent` at its optimum; the most promising first. Effects that do not go with the parent's are left out.
 std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses);
 
 }  // namespace gapscope

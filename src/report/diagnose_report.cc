@@ -50,6 +50,10 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
     json["ambiguous"].push_back(names);
   }
   json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)}, {"final", JsonNumber(d.final)}, {"floor", JsonNumber(d.floor)}, {"closed", JsonNumber(d.closed)}, {"held_out", true}};
+  const VerdictEvidence& e = d.evidence;
+  json["evidence"] = {{"floors_before", JsonNumber(e.floors_before)}, {"floors_left", JsonNumber(e.floors_left)}, {"removed", JsonNumber(e.removed)}, {"free_run_before", JsonNumber(e.free_run_before)}, {"free_run_left", JsonNumber(e.free_run_left)},
+                      {"free_run_removed", JsonNumber(e.free_run_removed)}, {"gain_train", JsonNumber(e.gain_train)},
+                      {"gain_held_out", JsonNumber(e.gain_held_out)}, {"standard_errors", JsonNumber(e.z)}, {"rival_lead", JsonNumber(e.rival_lead)}, {"rival_standard_errors", JsonNumber(e.rival_z)}};
   json["where"] = ordered_json::array();
   for (const auto& w : d.where) {
     json["where"].push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", JsonNumber(w.share_of_error)}, {"share_of_time", JsonNumber(w.share_of_time)}, {"low", JsonNumber(w.low)},
@@ -61,9 +65,17 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
     ordered_json entry = {{"name", c.name.substr(0, at)}};
     if (at != std::string::npos) entry["on"] = c.name.substr(at + 1);
     entry.update({{"probability", c.probability}, {"held_out_error", JsonNumber(c.held_out_error)}, {"screen_drop", c.screen_drop}, {"absorbed", c.absorbed}, {"refitted", c.refitted},
-                  {"converged", c.converged}, {"reason", c.reason}});
+                  {"converged", c.converged}, {"bic", JsonNumber(c.bic)}, {"reason", c.reason}});
     json["candidates"].push_back(std::move(entry));
   }
+  // As `replay --with EFFECT --set NAME=VALUE` takes them.
+  const auto model_json = [](const Model& model, const std::vector<double>& values) {
+    ordered_json effects = ordered_json::array(), parameters = ordered_json::object();
+    for (const auto& use : model.effects()) effects.push_back(use.Text());
+    for (std::size_t i = 0; i < values.size(); ++i) parameters[model.parameters()[i].name] = JsonNumber(values[i]);
+    return ordered_json{{"effects", effects}, {"parameters", parameters}};
+  };
+  if (d.refit_model) json["models"] = {{"refit", model_json(*d.refit_model, d.refit_values)}, {"final", model_json(*d.model, d.values)}};
   json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
   json["explanation"] = d.explanation;
   json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
+#include "src/tune/fit_problem_parts.h"
 #include "src/tune/journal.h"
 
 namespace gapscope {
@@ -16,39 +16,11 @@ constexpr double kStatePriorSamples = 5;
 constexpr double kOffsetBound_rad = 0.3;
 // Of the sum of squares, per residual and squared range of a coordinate.
 constexpr double kAnchor = 1e-8;
-constexpr double kBlock_s = 0.5;
 
 }  // namespace
 
 double Coordinate::ToSearch(double value) const { return logarithmic ? std::log(value) : value / scale; }
 double Coordinate::ToValue(double search) const { return logarithmic ? std::exp(search) : search * scale; }
-
-// How a signal of a log enters the cost.
-struct FitProblem::Scaling {
-  double weight = 0;     // 1 / standard deviation of the signal; 0: not scored
-  double deviation = 1;
-  int offset = -1;       // index in y
-  int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
-};
-
-struct FitProblem::FitWindow {
-  std::size_t log = 0;
-  Window rows;
-  std::size_t first_scored = 0;  // row in the window
-  double weight = 1;
-  InitialState start;            // from the log, without offsets
-  std::vector<int> qpos, dof;    // per measured joint: its addresses in the state, in the order of the state vector
-  Eigen::VectorXd prior;         // weight of each state correction
-};
-
-struct FitProblem::Worker {
-  Worker(const Model& model, double step) : simulator(model, step) {}
-  Simulator simulator;
-  InitialState start;
-  std::vector<double> values, base, perturbed;
-  Eigen::VectorXd residual, other;
-  Eigen::MatrixXd jacobian;
-};
 
 FitProblem::~FitProblem() = default;
 
@@ -125,7 +97,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     // In samples.
     low.push_back(-1);
     high.push_back(1);
-    shift_scale_s_ = step;
+    shift_scale_s_ = options_.shift_range_s > 0 ? options_.shift_range_s : step;
   }
   low_ = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
   high_ = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));
@@ -140,15 +112,20 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     scale *= scale;
   }
   anchor_weight_ = kAnchor * scale * static_cast<double>(residuals()) * (high_ - low_).cwiseAbs2().cwiseMax(1e-12).cwiseInverse();
-  if (options_.prior_share > 0) {
+  prior_weight_ = Eigen::VectorXd::Zero(low_.size());
+  for (std::size_t i = 0; i < coordinates_.size() && options_.prior_share > 0; ++i) {
     // In units of the noise: only meaningful with weights of 1 / noise. An effect's parameters are what is asked for.
-    for (std::size_t i = 0; i < coordinates_.size(); ++i) {
-      if (model.parameters()[coordinates_[i].parameter].name.find('@') != std::string::npos) continue;
-      const auto k = static_cast<Eigen::Index>(i);
-      const double deviation = options_.prior_share * (high_[k] - low_[k]);
-      anchor_weight_[k] += 1 / (deviation * deviation);
-    }
+    if (model.parameters()[coordinates_[i].parameter].name.find('@') != std::string::npos) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    const double deviation = options_.prior_share * (high_[k] - low_[k]);
+    prior_weight_[k] = 1 / (deviation * deviation);
   }
+  anchor_weight_ += prior_weight_;
+}
+
+void FitProblem::ScalePrior(double factor) {
+  anchor_weight_ += (factor - 1) * prior_weight_;
+  prior_weight_ *= factor;
 }
 
 double FitProblem::AnchorCost(const FitPoint& point) const { return 0.5 * anchor_weight_.cwiseProduct((point.y - anchor_).cwiseAbs2()).sum(); }
@@ -266,10 +243,17 @@ double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs) {
   return record[0];
 }
 
-double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs) {
+double FitProblem::CostAndResiduals(const FitPoint& point, std::vector<Eigen::VectorXd>* residuals) {
+  ++evaluations_;
+  ++replays_;
+  return CostNow(point, nullptr, residuals);
+}
+
+double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs, std::vector<Eigen::VectorXd>* residuals) {
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<double> costs(windows_.size());
+  if (residuals) residuals->resize(windows_.size());
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
@@ -279,6 +263,7 @@ double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs
     }
     Residuals(window, point, worker.base, worker.residual);
     costs[w] = WindowCost(worker.residual, window, point.states[w]);
+    if (residuals) (*residuals)[w] = worker.residual;
   });
   double total = 0;
   if (log_costs) log_costs->assign(recordings_.size(), 0.0);
@@ -307,249 +292,6 @@ void FitProblem::UpdateRobustScale(const FitPoint& point) {
   if (all.empty()) return;
   std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
   huber_threshold_ = options_.huber * 1.4826 * all[all.size() / 2];  // the median of |r| as a standard deviation
-}
-
-Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns columns) {
-  ++evaluations_;
-  const std::size_t parameters = columns == Columns::kStates ? 0 : coordinates_.size() * (columns == Columns::kCentral ? 2 : 1);
-  replays_ += 1 + parameters + (columns != Columns::kStates && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
-  if (!journal_) return LinearizeNow(point, step, columns);
-  std::vector<double> record;
-  if (journal_->Next(point, &record)) return Unpack(record);
-  Linearization result = LinearizeNow(point, step, columns);
-  journal_->Append(point, Pack(result));
-  return result;
-}
-
-Linearization FitProblem::LinearizeNow(const FitPoint& point, double step, Columns columns, Snapshot* keep) {
-  const bool all = columns != Columns::kStates;
-  const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0;
-  struct Part {
-    double cost = 0;
-    Eigen::MatrixXd hessian;
-    Eigen::VectorXd gradient;
-    Eigen::MatrixXd gain;
-    Eigen::VectorXd state_step;
-    std::vector<std::pair<long, Eigen::VectorXd>> blocks;  // by half second of the log
-    bool valid = false;
-  };
-  std::vector<Part> parts(windows_.size());
-  const std::vector<double> values = Values(point);
-  const double shift = Shift(point);
-  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
-    Worker& worker = GetWorker(index);
-    const FitWindow& window = windows_[w];
-    const Eigen::VectorXd& state = point.states[w];
-    Part& part = parts[w];
-    if (!Simulate(worker, window, point, values, state, shift, worker.base)) return;
-    Residuals(window, point, worker.base, worker.residual);
-    part.cost = WindowCost(worker.residual, window, state);
-    const Eigen::Index m = state.size(), rows = worker.residual.size();
-    worker.jacobian.setZero(rows, n + m);
-    const std::size_t signals = recordings_[window.log].measured.size();
-    const auto difference = [&](Eigen::Index column, double h, bool simulated) {
-      if (!simulated) return false;
-      Residuals(window, point, worker.perturbed, worker.other);
-      worker.jacobian.col(column) = (worker.other - worker.residual) / h;
-      return true;
-    };
-    worker.values = values;
-    for (Eigen::Index i = 0; i < parameters; ++i) {
-      const Coordinate& c = coordinates_[static_cast<std::size_t>(i)];
-      // Towards the inside, so that the step does not leave the bounds; the other way when that cannot be simulated.
-      double h = point.y[i] + step <= c.high ? step : -step;
-      for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
-        worker.values[c.parameter] = c.ToValue(point.y[i] + h);
-        if (difference(i, h, Simulate(worker, window, point, worker.values, state, shift, worker.perturbed))) break;
-      }
-      if (columns == Columns::kCentral && point.y[i] - h >= c.low && point.y[i] - h <= c.high) {
-        worker.values[c.parameter] = c.ToValue(point.y[i] - h);
-        if (Simulate(worker, window, point, worker.values, state, shift, worker.perturbed)) {
-          Residuals(window, point, worker.perturbed, worker.other);
-          worker.jacobian.col(i) = 0.5 * (worker.jacobian.col(i) - (worker.other - worker.residual) / h);
-        }
-      }
-      worker.values[c.parameter] = values[c.parameter];
-    }
-    if (all && shift_scale_s_ > 0) {
-      constexpr double kShiftStep = 0.2;  // samples
-      difference(n - 1, kShiftStep, Simulate(worker, window, point, values, state, shift + kShiftStep * shift_scale_s_, worker.perturbed));
-    }
-    Eigen::VectorXd moved = state;
-    for (Eigen::Index j = 0; j < m; ++j) {
-      const double h = 0.02 / window.prior[j];  // small beside what the log leaves open
-      moved[j] += h;
-      difference(n + j, h, Simulate(worker, window, point, values, moved, shift, worker.perturbed));
-      moved[j] = state[j];
-    }
-    // An offset moves its own prediction, and the start the other way.
-    for (std::size_t s = 0; s < signals; ++s) {
-      const Scaling& scaling = scaling_[window.log][s];
-      if (scaling.offset < 0 || !all) continue;
-      auto column = worker.jacobian.col(scaling.offset);
-      if (scaling.joint_state >= 0) {
-        column = -scaling.deviation * worker.jacobian.col(n + scaling.joint_state);
-      } else {
-        FitPoint other = point;
-        constexpr double kOffsetStep = 0.01;
-        other.y[scaling.offset] += kOffsetStep;
-        if (!Simulate(worker, window, other, values, state, shift, worker.perturbed)) continue;
-        Residuals(window, point, worker.perturbed, worker.other);
-        column = (worker.other - worker.residual) / kOffsetStep;
-      }
-      const Eigen::Index scored = static_cast<Eigen::Index>(window.rows.rows() - window.first_scored);
-      const double* measured = recordings_[window.log].measured[s].values.data() + window.rows.begin + window.first_scored;
-      for (Eigen::Index r = 0; r < scored; ++r) {
-        if (std::isfinite(measured[r])) column[static_cast<Eigen::Index>(s) * scored + r] += scaling.weight * scaling.deviation;
-      }
-    }
-    // Huber's weights.
-    for (Eigen::Index i = 0; i < rows; ++i) {
-      if (const double a = std::abs(worker.residual[i]); a > huber_threshold_) {
-        const double weight = std::sqrt(huber_threshold_ / a);
-        worker.jacobian.row(i) *= weight;
-        worker.residual[i] *= weight;
-      }
-    }
-    if (keep) {
-      keep->residuals[w] = worker.residual;
-      keep->jacobians[w] = worker.jacobian;
-    }
-    const Eigen::MatrixXd full = worker.jacobian.transpose() * worker.jacobian;
-    const Eigen::VectorXd slope = worker.jacobian.transpose() * worker.residual;
-    Eigen::MatrixXd own = full.bottomRightCorner(m, m);
-    own.diagonal() += window.prior.cwiseAbs2();
-    const Eigen::VectorXd own_slope = slope.tail(m) + window.prior.cwiseAbs2().cwiseProduct(state);
-    if (m > 0) {
-      const Eigen::LDLT<Eigen::MatrixXd> solver(own);
-      part.gain = solver.solve(full.bottomLeftCorner(m, n));
-      part.state_step = -solver.solve(own_slope);
-      part.hessian = full.topLeftCorner(n, n) - full.topRightCorner(n, m) * part.gain;
-      part.gradient = slope.head(n) + full.topRightCorner(n, m) * part.state_step;
-    } else {
-      part.hessian = full;
-      part.gradient = slope;
-      part.gain.resize(0, n);
-      part.state_step.resize(0);
-    }
-    part.valid = true;
-    if (!all) return;
-    // The gradient once more in blocks of time, at the states' optimum: rows less what the states take.
-    const Eigen::MatrixXd reduced = m > 0 ? Eigen::MatrixXd(worker.jacobian.leftCols(n) - worker.jacobian.rightCols(m) * part.gain) : Eigen::MatrixXd(worker.jacobian.leftCols(n));
-    const Eigen::VectorXd after = m > 0 ? Eigen::VectorXd(worker.residual + worker.jacobian.rightCols(m) * part.state_step) : worker.residual;
-    const Eigen::Index scored = static_cast<Eigen::Index>(window.rows.rows() - window.first_scored);
-    const double* time = recordings_[window.log].time_s.data() + window.rows.begin + window.first_scored;
-    for (Eigen::Index begin = 0; begin < scored;) {
-      const auto number = static_cast<long>(time[begin] / kBlock_s);
-      Eigen::Index end = begin + 1;
-      while (end < scored && static_cast<long>(time[end] / kBlock_s) == number) ++end;
-      Eigen::VectorXd block = Eigen::VectorXd::Zero(n);
-      for (std::size_t s = 0; s < signals; ++s) {
-        const Eigen::Index first = static_cast<Eigen::Index>(s) * scored + begin;
-        block += reduced.middleRows(first, end - begin).transpose() * after.segment(first, end - begin);
-      }
-      part.blocks.emplace_back(number, std::move(block));
-      begin = end;
-    }
-  });
-  Linearization result;
-  result.hessian = Eigen::MatrixXd::Zero(n, n);
-  result.gradient = Eigen::VectorXd::Zero(n);
-  result.valid = true;
-  std::map<std::pair<std::size_t, long>, Eigen::VectorXd> blocks;
-  for (std::size_t w = 0; w < parts.size(); ++w) {
-    Part& part = parts[w];
-    result.valid = result.valid && part.valid;
-    if (!part.valid) continue;
-    result.cost += part.cost;
-    result.hessian += part.hessian;
-    result.gradient += part.gradient;
-    for (auto& [number, block] : part.blocks) {
-      const auto [entry, added] = blocks.try_emplace({windows_[w].log, number}, block);
-      if (!added) entry->second += block;
-    }
-    result.state_gain.push_back(std::move(part.gain));
-    result.state_step.push_back(std::move(part.state_step));
-  }
-  for (auto& [key, block] : blocks) {
-    result.block_logs.push_back(static_cast<int>(key.first));
-    result.block_gradients.push_back(std::move(block));
-  }
-  result.cost += AnchorCost(point);
-  result.gradient += anchor_weight_.cwiseProduct(point.y - anchor_);
-  result.hessian.diagonal() += anchor_weight_;
-  return result;
-}
-
-Snapshot FitProblem::Capture(const FitPoint& point, double step) {
-  Snapshot snapshot;
-  snapshot.residuals.resize(windows_.size());
-  snapshot.jacobians.resize(windows_.size());
-  ++evaluations_;
-  snapshot.linearization = LinearizeNow(point, step, Columns::kAll, &snapshot);
-  snapshot.valid = snapshot.linearization.valid;
-  snapshot.cost = snapshot.linearization.cost;
-  return snapshot;
-}
-
-ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const Snapshot& base) {
-  GS_CHECK(parent.windows_.size() == windows_.size());
-  const Eigen::Index n = base.linearization.gradient.size();
-  struct Part {
-    Eigen::VectorXd cross;   // reduced J' c
-    double square = 0, slope = 0, raw = 0;
-    bool valid = false;
-  };
-  std::vector<Part> parts(windows_.size());
-  const std::vector<double> values = Values(point);
-  const double shift = Shift(point);
-  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
-    Worker& worker = GetWorker(index);
-    const FitWindow& window = windows_[w];
-    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) return;
-    Residuals(window, point, worker.base, worker.residual);
-    const Eigen::VectorXd column = worker.residual - base.residuals[w];
-    const Eigen::MatrixXd& jacobian = base.jacobians[w];
-    const Eigen::Index m = jacobian.cols() - n;
-    Part& part = parts[w];
-    const Eigen::VectorXd all = jacobian.transpose() * column;
-    part.raw = part.square = column.squaredNorm();
-    part.slope = column.dot(base.residuals[w]);
-    part.cross = all.head(n);
-    if (m > 0) {
-      // The states' own answer: with gain = S^-1 Jx' Jy and step = -S^-1 Jx' r, S^-1 Jx' c needs S once more.
-      Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
-      own.diagonal() += window.prior.cwiseAbs2();
-      const Eigen::VectorXd answer = own.ldlt().solve(all.tail(m));
-      part.square -= all.tail(m).dot(answer);
-      part.slope += all.tail(m).dot(base.linearization.state_step[w]);
-      part.cross -= base.linearization.state_gain[w].transpose() * all.tail(m);
-    }
-    part.valid = true;
-  });
-  ++replays_;
-  ColumnTest test;
-  Eigen::VectorXd cross = Eigen::VectorXd::Zero(n);
-  double square = 0, slope = 0, raw = 0;
-  for (const Part& part : parts) {
-    if (!part.valid) return test;
-    cross += part.cross;
-    square += part.square;
-    slope += part.slope;
-    raw += part.raw;
-  }
-  test.valid = true;
-  if (!(raw > 0)) return test;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(base.linearization.hessian);
-  const Eigen::VectorXd answer = solver.solve(cross);
-  const double left = square - cross.dot(answer), pull = slope - answer.dot(base.linearization.gradient);
-  test.absorbed = std::clamp(1 - left / raw, 0.0, 1.0);
-  constexpr double kLeast = 1e-6;  // of the column: below it is rounding
-  if (!(left > kLeast * raw)) return test;
-  test.scale = std::clamp(-pull / left, 0.0, 2.0);
-  test.drop = -(test.scale * pull + 0.5 * test.scale * test.scale * left);
-  test.dy = -(test.scale * answer);
-  return test;
 }
 
 FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent_point, const std::vector<double>& values, const Eigen::VectorXd& parent_dy) const {

@@ -38,6 +38,7 @@ struct FitOptions {
   bool fit_offsets = true;          // zero offsets of measured positions, per log
   bool fit_shift = true;            // command shift within +-1 sample, common to all logs
   bool fit_states = true;           // initial state of each window
+  double shift_range_s = 0;         // the shift lies within +- this; 0: one sample
   double shift_s = 0;               // where no shift is fitted: this one
   std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
   Normalization normalization = Normalization::kDeviation;
@@ -74,13 +75,13 @@ struct Linearization {
   bool valid = false;                       // false: the point cannot be simulated
 };
 
-// Residuals and Jacobian of a point, kept to test what one more column would explain (see FitProblem::TestColumn).
+// Residuals and Jacobian of a point: for normal equations (FitProblem::Reduce), or to test what one more column would explain (TestColumn).
 struct Snapshot {
-  double cost = 0;
   std::vector<Eigen::VectorXd> residuals;   // per window, weighted
   std::vector<Eigen::MatrixXd> jacobians;   // per window: y, then the window's states
-  Linearization linearization;
-  bool valid = false;
+  bool valid = false;                       // false: the point cannot be simulated
+  Linearization linearization;              // of Capture
+  double cost = 0;
 };
 
 // What a column would do to the cost, with all of y and the states free to answer it (score test; Rao, Proc. Cambridge Phil. Soc. 44, 1948).
@@ -102,6 +103,8 @@ class FitProblem {
   std::size_t size() const { return low_.size(); }
   const Eigen::VectorXd& low() const { return low_; }
   const Eigen::VectorXd& high() const { return high_; }
+  // Multiplies the weight of what is known beforehand (prior_share), as the variance of the residuals does that of the data.
+  void ScalePrior(double factor);
   const Eigen::VectorXd& anchor_weight() const { return anchor_weight_; }  // on the hessian's diagonal
   std::size_t windows() const;
   std::size_t residuals() const;           // scored rows x signals
@@ -114,11 +117,20 @@ class FitProblem {
 
   // Cost; infinity where a replay diverges. `log_costs` receives each log's part.
   double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr);
+  // The same with each window's weighted residuals, which no journal keeps.
+  double CostAndResiduals(const FitPoint& point, std::vector<Eigen::VectorXd>* residuals);
+  bool journaled() const { return journal_ != nullptr; }
   // `step`: finite difference in search coordinates. Columns of parameters, offsets and shift may be left out: the gradient and hessian are zero then.
   // kCentral: all, those of parameters by central differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns
   // that are parallel to rounding, which one-sided ones are not.
   enum class Columns { kAll, kStates, kCentral };
   Linearization Linearize(const FitPoint& point, double step, Columns columns = Columns::kAll);
+  // Linearize in two steps. Blocks of the gradient are made only when asked for.
+  Snapshot Differentiate(const FitPoint& point, double step, Columns columns);
+  Linearization Reduce(const FitPoint& point, const Snapshot& snapshot, bool with_blocks);
+  // Moves a snapshot of `from` to `to`, whose residuals are known, without a replay: Broyden's rank-one update of each window's Jacobian
+  // (Broyden, Mathematics of Computation 19, 1965).
+  void UpdateSecant(Snapshot& snapshot, const FitPoint& from, const FitPoint& to, std::vector<Eigen::VectorXd> residuals);
   // Moves y by dy and each window's state by its own best answer to that.
   FitPoint Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const;
 
@@ -142,13 +154,16 @@ class FitProblem {
   void UpdateRobustScale(const FitPoint& point);
 
  private:
-  Linearization LinearizeNow(const FitPoint& point, double step, Columns columns, Snapshot* keep = nullptr);
-  double CostNow(const FitPoint& point, std::vector<double>* log_costs);
+  double CostNow(const FitPoint& point, std::vector<double>* log_costs, std::vector<Eigen::VectorXd>* residuals = nullptr);
   double AnchorCost(const FitPoint& point) const;
   struct FitWindow;
   struct Worker;
   struct Scaling;
 
+  void CountDifferences(Columns columns);
+  bool DifferentiateWindow(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double step, Columns columns,
+                           Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const;
+  void ApplyRobustWeights(Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const;  // Huber's
   bool Simulate(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift,
                 std::vector<double>& predicted) const;
   void Residuals(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted, Eigen::VectorXd& residual) const;
@@ -166,6 +181,7 @@ class FitProblem {
   std::vector<std::vector<Scaling>> scaling_;   // per log, per signal
   std::vector<std::unique_ptr<Worker>> workers_;
   double huber_threshold_;
+  Eigen::VectorXd prior_weight_;                // part of anchor_weight_
   Eigen::VectorXd anchor_, anchor_weight_;      // a pull to the start, weak enough to only hold directions that the logs leave open
   Journal* journal_ = nullptr;
   std::size_t replays_ = 0, evaluations_ = 0;

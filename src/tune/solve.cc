@@ -8,6 +8,8 @@
 namespace gapscope {
 namespace {
 
+constexpr double kLeastDamping = 1e-9;
+
 bool Late(const Deadline& deadline) { return deadline && std::chrono::steady_clock::now() >= *deadline; }
 
 // The damped step inside the bounds: a coordinate that the step would push through its bound is put on it and the rest is solved again.
@@ -47,8 +49,28 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
   return step;
 }
 
+// Moves on with the Jacobian of the last linearization, kept up by secant updates: a step costs one replay instead of one per column. Ends when a step
+// gains less than promised, or little: only a true Jacobian can tell the bottom.
+void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& options, std::vector<Eigen::VectorXd>& residuals, double* damping, SolveResult* result) {
+  constexpr int kMostSteps = 8;
+  constexpr double kPoorRatio = 0.2;  // of the promised gain
+  for (int i = 0; i < kMostSteps && !Late(options.deadline); ++i) {
+    const Linearization at = problem.Reduce(result->point, snapshot, false);
+    const Eigen::VectorXd step = BoundedStep(at, result->point, problem.low(), problem.high(), *damping);
+    const FitPoint trial = problem.Move(result->point, at, step);
+    const double cost = problem.CostAndResiduals(trial, &residuals);
+    if (!(cost < result->cost)) return;
+    const double gained = result->cost - cost, promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
+    problem.UpdateSecant(snapshot, result->point, trial, std::move(residuals));
+    result->point = trial;
+    result->cost = cost;
+    *damping = std::max(*damping * 0.3, kLeastDamping);
+    if (gained < 3 * options.tolerance * cost || gained < kPoorRatio * promised) return;
+  }
+}
+
 SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
-  constexpr double kLeastDamping = 1e-9, kMostDamping = 1e8, kSmallDamping = 1e-3, kWorthwhile = 0.1;
+  constexpr double kMostDamping = 1e8, kSmallDamping = 1e-3, kWorthwhile = 0.1;
   SolveResult result{.point = start, .cost = problem.Cost(start), .termination = Termination::kIterations};
   if (!std::isfinite(result.cost)) {
     result.termination = Termination::kNotSimulated;
@@ -59,14 +81,26 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
     result.termination = Termination::kConverged;
     return result;
   }
-  double damping = 1e-2, difference = options.coarse_step;
+  const bool secant = options.secant && !problem.journaled();
+  double damping = options.damping, difference = options.coarse_step;
   int quiet = 0;
   for (; result.iterations < options.max_iterations; ++result.iterations) {
     if (Late(options.deadline)) {
       result.termination = Termination::kBudget;
       return result;
     }
-    const Linearization at = problem.Linearize(result.point, difference);
+    if (options.hopeless && options.hopeless(result.cost, result.iterations)) {
+      result.termination = Termination::kHopeless;
+      return result;
+    }
+    Snapshot snapshot;
+    Linearization at;
+    if (secant) {
+      snapshot = problem.Differentiate(result.point, difference, FitProblem::Columns::kAll);
+      at = problem.Reduce(result.point, snapshot, false);
+    } else {
+      at = problem.Linearize(result.point, difference);
+    }
     if (!at.valid) {
       result.termination = Termination::kNotSimulated;
       return result;
@@ -78,14 +112,17 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
       const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
       if (rejected >= 2 && promised < kWorthwhile * options.tolerance * result.cost) break;
       const FitPoint trial = problem.Move(result.point, at, step);
-      const double cost = problem.Cost(trial);
+      std::vector<Eigen::VectorXd> residuals;
+      const double cost = secant ? problem.CostAndResiduals(trial, &residuals) : problem.Cost(trial);
       if (cost < result.cost) {
         small = result.cost - cost < options.tolerance * result.cost;
         undamped = damping <= kSmallDamping;
-        result.point = trial;
-        result.cost = cost;
         damping = std::max(damping * 0.1, kLeastDamping);
         accepted = true;
+        if (secant && !small) problem.UpdateSecant(snapshot, result.point, trial, std::move(residuals));
+        result.point = trial;
+        result.cost = cost;
+        if (secant && !small) SecantSteps(problem, snapshot, options, residuals, &damping, &result);
         break;
       }
       damping = damping < 1e-3 ? 1e-3 : damping * 8;
@@ -98,7 +135,7 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
     // Done with this finite difference: the finer one sees the bottom better.
     if (difference > options.fine_step) {
       difference = options.fine_step;
-      damping = std::min(damping, 1e-2);
+      damping = std::min(damping, options.damping);
       continue;
     }
     // A small step means the bottom when it was hardly damped, or when it happens again and again (a narrow valley).
@@ -190,6 +227,7 @@ std::string TerminationText(Termination termination) {
     case Termination::kIterations: return "iteration limit";
     case Termination::kBudget: return "budget spent";
     case Termination::kStalled: return "stalled at the start";
+    case Termination::kHopeless: return "given up: far behind";
     case Termination::kNotSimulated: return "the start cannot be simulated";
   }
   return "";

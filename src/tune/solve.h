@@ -29,12 +29,15 @@ struct SolveOptions {
   int max_iterations = 60;       // of LM; NLopt: evaluations = 20 times that
   double tolerance = 1e-4;       // stop when a step lowers the cost by less than this share
   double coarse_step = 0.05, fine_step = 0.01;  // finite differences, in search coordinates: first coarse, once converged fine
+  double damping = 1e-2;         // LM: of the first step, relative to the diagonal
+  bool secant = true;            // LM, without a journal: between two Jacobians, steps with secant updates of the last one
+  std::function<bool(double cost, int iteration)> hopeless;  // asked before each Jacobian; true ends the fit
   Deadline deadline;
   unsigned long seed = 0;
   std::function<void(const Progress&)> progress;
 };
 
-enum class Termination { kConverged, kIterations, kBudget, kStalled, kNotSimulated };
+enum class Termination { kConverged, kIterations, kBudget, kStalled, kHopeless, kNotSimulated };
 std::string TerminationText(Termination termination);
 
 struct SolveResult {

@@ -104,7 +104,7 @@ const std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"rated_speed_rad_per_s", "rad/s", 0, 0, 1e9},
     {"no_load_speed_rad_per_s", "rad/s", 0, 0, 1e9},
     {"generating_factor", "1", 1, 0, 1e6},
-    {"sag_fraction", "1", 0, 0, 1},
+    {"sag_fraction", "1", 0, 0, 100},
     {"sag_time_constant_s", "s", 0.3, 0, 1e6},
     {"droop_at_peak", "1", 0, 0, 1},
     {"droop_reference_n_m", "N m", 1, 1e-12, 1e9},

@@ -1,0 +1,38 @@
+#include "src/diagnose/coarsen.h"
+
+#include <algorithm>
+
+namespace gapscope {
+
+Recording Coarsen(const Recording& recording, double least_step_s) {
+  constexpr double kSlack = 0.95;  // of the step: stamps jitter
+  std::vector<std::size_t> kept;
+  for (std::size_t row = 0; row < recording.rows(); ++row) {
+    if (kept.empty() || recording.time_s[row] - recording.time_s[kept.back()] >= kSlack * least_step_s) kept.push_back(row);
+  }
+  if (kept.size() == recording.rows() || kept.size() < 2) return recording;
+  Recording coarse = recording;
+  const auto pick = [&](const std::vector<double>& values) {
+    std::vector<double> picked;
+    for (const std::size_t row : kept) picked.push_back(values[row]);
+    return picked;
+  };
+  coarse.time_s = pick(recording.time_s);
+  for (auto& measured : coarse.measured) measured.values = pick(measured.values);
+  for (auto& command : coarse.commands) {
+    const std::vector<double> fine = command.values;
+    command.values = pick(fine);
+    for (std::size_t k = 0; k + 1 < kept.size(); ++k) {
+      double sum = 0;
+      for (std::size_t row = kept[k]; row < kept[k + 1]; ++row) sum += fine[row] * (recording.time_s[row + 1] - recording.time_s[row]);
+      command.values[k] = sum / (coarse.time_s[k + 1] - coarse.time_s[k]);
+    }
+  }
+  std::vector<double> steps;
+  for (std::size_t k = 0; k + 1 < kept.size(); ++k) steps.push_back(coarse.time_s[k + 1] - coarse.time_s[k]);
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  coarse.timeline.median_step_s = steps[steps.size() / 2];
+  return coarse;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,63 @@
+#include "src/diagnose/explain.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "src/diagnose/rules.h"
+
+namespace gapscope {
+
+std::string Reason(const Candidate& candidate, const SearchResult& found) {
+  const Candidate &base = *found.base, &chosen = *found.chosen;
+  if (&candidate == &base) {
+    return &chosen == &base ? "no effect explains the logs better by more than chance" : fmt::format("{} removes {:.1f} % of its held-out cost", chosen.Name(), 100 * Compare(base, chosen).held_out);
+  }
+  if (candidate.held_out_blocks.empty()) return "its fit cannot be simulated along the held-out logs";
+  const std::string converged = candidate.converged ? "" : " (fit not converged)";
+  const Evidence gain = Compare(base, candidate);
+  if (std::find(chosen.effects.begin(), chosen.effects.end(), candidate.effects.front()) != chosen.effects.end()) {
+    return fmt::format("accepted: removes {:.1f} % of the held-out cost ({:.1f} standard errors){}", 100 * gain.held_out, gain.z, converged);
+  }
+  if (!Convincing(gain, kFirst)) return fmt::format("removes {:.2f} % of the held-out cost ({:.1f} standard errors): not more than chance{}", 100 * gain.held_out, gain.z, converged);
+  const Evidence behind = Compare(candidate, chosen);
+  return fmt::format("removes {:.1f} % of the held-out cost, but {} removes {:.1f} % of what it leaves ({:.1f} standard errors){}", 100 * gain.held_out, chosen.Name(), 100 * behind.held_out,
+                     behind.z, converged);
+}
+
+std::string Explain(const Diagnosis& d) {
+  std::string text = fmt::format("Held out, the nominal model misses by {:.3g} of the signals' standard deviation; retuning its parameters brings that to {:.3g} ({:.1f} times the sensors' noise). ",
+                                 d.nominal, d.refit, d.evidence.floors_before);
+  switch (d.verdict) {
+    case Verdict::kNone: text += "The model explains the logs down to their noise: there is no gap to explain."; break;
+    case Verdict::kParameters: text += "Retuned parameters close the gap; no further effect improves the prediction of logs that the fit did not see."; break;
+    case Verdict::kEffects:
+    case Verdict::kAmbiguous: {
+      for (const auto& found : d.effects) {
+        text += fmt::format("{} explains {:.0f} % of the gap that closes", found.use.Text(), 100 * found.share_of_gap);
+        for (const auto& effect : Catalogue()) {
+          if (effect.name == found.use.effect) {
+            text += " (" + effect.meaning + "; signature: " + effect.signature + ")";
+            break;
+          }
+        }
+        text += ". ";
+      }
+      text += fmt::format("With it the held-out error is {:.3g}, {:.1f} times the noise.", d.final, d.evidence.floors_left);
+      if (d.verdict == Verdict::kAmbiguous) {
+        text += " But these logs cannot tell it from";
+        for (std::size_t i = 1; i < d.ambiguous.front().size(); ++i) text += (i > 1 ? ", " : " ") + d.ambiguous.front()[i];
+        text += ": what each leaves unexplained is the same.";
+      }
+      break;
+    }
+    case Verdict::kUnknown:
+      text += fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise. ", d.evidence.floors_left);
+      if (!d.where.empty()) text += "It lies mostly at: " + d.where.front().signal + ", " + d.where.front().condition + ".";
+      break;
+  }
+  if (d.budget_spent) text += " The time budget ended the search early.";
+  return text;
+}
+
+}  // namespace gapscope

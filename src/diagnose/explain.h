@@ -1,0 +1,17 @@
+// The diagnosis in words.
+#ifndef GAPSCOPE_DIAGNOSE_EXPLAIN_H_
+#define GAPSCOPE_DIAGNOSE_EXPLAIN_H_
+
+#include "src/diagnose/diagnosis.h"
+#include "src/diagnose/search.h"
+
+namespace gapscope {
+
+// Why a candidate was, or was not, accepted.
+std::string Reason(const Candidate& candidate, const SearchResult& found);
+// The verdict in a paragraph. `floors_before`, `floors_left`: residual over noise of the refitted base model and of the final one.
+std::string Explain(const Diagnosis& diagnosis);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_EXPLAIN_H_

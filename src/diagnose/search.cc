@@ -1,0 +1,204 @@
+#include "src/diagnose/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "src/diagnose/rules.h"
+
+namespace gapscope {
+namespace {
+
+constexpr int kFirstIterations = 14, kFinalIterations = 20;
+constexpr double kFirstTolerance = 2e-3, kFinalTolerance = 2e-4;
+constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4;  // leaders of the screen that are refitted, beside the partners of the first two
+constexpr double kWorthImitating = 0.8;                // a leader that leaves less than this share of its parent's cost
+
+bool Late(const Workbench& bench) { return bench.deadline && std::chrono::steady_clock::now() >= *bench.deadline; }
+
+void SortByMisfit(Candidates* children) {
+  std::stable_sort(children->begin(), children->end(), [](const auto& a, const auto& b) { return LogMisfit(*a) < LogMisfit(*b); });
+}
+
+// A fit from a start of its own, kept if it ends below the candidate's.
+void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance) {
+  if (!std::isfinite(candidate->problem->Cost(start))) return;
+  const FitPoint before = candidate->point;
+  const double cost = candidate->train_cost;
+  const bool converged = candidate->converged;
+  FitCandidate(bench, candidate, start, iterations, tolerance);
+  if (candidate->train_cost < cost) return;
+  candidate->point = before;
+  candidate->train_cost = cost;
+  candidate->converged = converged;
+  candidate->values = candidate->problem->Values(before);
+  candidate->shift_s = candidate->problem->Shift(before);
+}
+
+// Indices into the screen: the leaders by the score test, then the partners of the first two wherever they act.
+std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::size_t refits) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < layer.screen.size() && order.size() < refits; ++i) {
+    if (layer.screen[i].trial.visible) order.push_back(i);
+  }
+  for (std::size_t leader = 0, leaders = std::min<std::size_t>(2, order.size()); leader < leaders; ++leader) {
+    for (std::size_t i = 0; i < layer.screen.size(); ++i) {
+      const bool known = std::find(order.begin(), order.end(), i) != order.end();
+      if (!known && layer.screen[i].trial.visible && ArePartners(layer.screen[order[leader]].use, layer.screen[i].use, model)) order.push_back(i);
+    }
+  }
+  return order;
+}
+
+// From the screen's own step, and where that ends above the parent from hardly any effect.
+void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child) {
+  FitPoint start = child->problem->FromParent(*parent.problem, parent.point, trial.values, trial.dy);
+  if (!std::isfinite(child->problem->Cost(start))) start = child->problem->FromParent(*parent.problem, parent.point, trial.values, {});
+  FitCandidate(bench, child, start, kFirstIterations, kFirstTolerance, rival_cost);
+  if (child->train_cost <= parent.train_cost * 1.0005 || Late(bench)) return;
+  const auto placed = child->model->EffectParameters(use, bench.scales);
+  if (!placed.ok()) return;
+  std::vector<double> neutral = trial.values;
+  for (const auto& p : placed.value()) neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
+  TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations, kFirstTolerance);
+}
+
+// Rivals start anew where they best imitate the leader: an unconverged rival looks exactly like a rejected one.
+void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
+  constexpr std::size_t kMost = 3;
+  Candidate& leader = *layer->children.front();
+  if (!(leader.train_cost < kWorthImitating * parent.train_cost) || Late(bench)) return;
+  const FitPoint at = parent.problem->FromParent(*leader.problem, leader.point, leader.model->Nominal(), {});
+  const Snapshot snapshot = parent.problem->Capture(at, 0.01);
+  if (!snapshot.valid) return;
+  std::size_t tried = 0;
+  for (std::size_t i = 1; i < layer->children.size() && tried < kMost && !Late(bench); ++i) {
+    Candidate& rival = *layer->children[i];
+    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) || rival.train_cost < 1.02 * leader.train_cost) continue;
+    const Trial trial = TryEffect(bench, rival, rival.effects.back(), *parent.problem, at, snapshot);
+    if (!trial.valid) continue;
+    ++tried;
+    FitPoint start = rival.problem->FromParent(*parent.problem, at, trial.values, trial.dy);
+    if (!std::isfinite(rival.problem->Cost(start))) start = rival.problem->FromParent(*parent.problem, at, trial.values, {});
+    TryStart(bench, &rival, start, kFirstIterations, kFirstTolerance);
+    ScoreCandidate(bench, &rival);
+  }
+}
+
+void Explore(const Workbench& bench, Candidate& parent, std::size_t refits, const Say& say, Layer* layer) {
+  const auto possible = parent.model->PossibleEffects();
+  if (!possible.ok()) return;
+  std::vector<EffectUse> uses;
+  for (const auto& use : possible.value()) {
+    if (IsFinding(use, *parent.model)) uses.push_back(use);
+  }
+  layer->screen = Screen(bench, parent, uses);
+  double best_cost = parent.train_cost;
+  for (const std::size_t index : Leaders(*layer, *parent.model, refits)) {
+    if (Late(bench)) break;
+    Screened& entry = layer->screen[index];
+    say("fitting " + entry.use.Text());
+    auto child = std::make_unique<Candidate>(std::move(entry.child));
+    FitChild(bench, parent, entry.use, entry.trial, best_cost, child.get());
+    best_cost = std::min(best_cost, child->train_cost);
+    ScoreCandidate(bench, child.get());
+    layer->children.push_back(std::move(child));
+  }
+  if (layer->children.empty()) return;
+  SortByMisfit(&layer->children);
+  ImitateLeader(bench, parent, layer);
+  SortByMisfit(&layer->children);
+  // The leaders once more to the end.
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !Late(bench); ++i) {
+    Candidate& leader = *layer->children[i];
+    if (i > 0 && leader.train_cost > 1.5 * layer->children.front()->train_cost) break;
+    FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
+    ScoreCandidate(bench, &leader);
+  }
+  SortByMisfit(&layer->children);
+}
+
+// The best child, or a simpler one that it contains when the richer is not convincingly better.
+Candidate* Simplest(const Layer& layer, const Candidate& parent) {
+  if (layer.children.empty()) return nullptr;
+  Candidate* best = layer.children.front().get();
+  for (const auto& child : layer.children) {
+    if (child.get() == best || !Contains(*best, *child)) continue;
+    const Evidence more = Compare(*child, *best);
+    const bool much = more.gain > kNestedShare * Compare(parent, *best).gain;
+    if (!much || !Convincing(more, kNested)) best = child.get();
+  }
+  return best;
+}
+
+}  // namespace
+
+bool AreRivals(const Candidate& a, const Candidate& b) { return !Convincing(Compare(b, a), kTold); }
+
+Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
+  SearchResult result;
+  say("refitting the baseline");
+  GS_ASSIGN(Candidate nominal, MakeCandidate(bench, {}));
+  result.base = std::make_unique<Candidate>();
+  GS_ASSIGN(*result.base, MakeCandidate(bench, {}));
+  Candidate& base = *result.base;
+  const FitPoint start = base.problem->Start();
+  if (!std::isfinite(base.problem->Cost(start))) {
+    return Error{.what = "the base model cannot be simulated along these logs, even in windows", .where = bench.experiment.path,
+                 .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
+  }
+  nominal.point = start;
+  nominal.values = nominal.model->Nominal();
+  ScoreCandidate(bench, &nominal);
+  result.nominal = std::make_unique<Candidate>(std::move(nominal));
+  FitCandidate(bench, &base, start, kFinalIterations, kFinalTolerance);
+  ScoreCandidate(bench, &base);
+  result.single = result.chosen = &base;
+
+  const double train_floors = std::sqrt(2 * base.train_cost / static_cast<double>(std::max<std::size_t>(1, base.problem->residuals())));
+  constexpr double kUneven = 1.5;
+  result.uneven = std::max(train_floors / base.held_out_floors, base.held_out_floors / train_floors) > kUneven;
+  if (result.uneven && stop_if_uneven) return result;
+
+  say("screening");
+  // Where the base model is at the noise already, fewer refits show that nothing is missing.
+  Explore(bench, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, say, &result.first);
+  Candidate* single = Simplest(result.first, base);
+  if (single && Convincing(Compare(base, *single), kFirst)) result.single = result.chosen = single;
+
+  if (single && result.single == single && single->held_out_floors > kRemains && !Late(bench)) {
+    say("looking for a second effect");
+    Explore(bench, *single, kSecondRefits, say, &result.second);
+    if (const Candidate* pair = Simplest(result.second, *single)) {
+      const Evidence more = Compare(*single, *pair);
+      const double excess = single->held_out_floors - 1;
+      const double removed = (single->held_out_floors - pair->held_out_floors) / std::max(excess, 1e-9);
+      if (Convincing(more, kSecond) && removed > kSecondExcess) result.chosen = pair;
+    }
+    // Backward: does the first one still matter?
+    if (result.chosen != single && !Late(bench)) {
+      GS_ASSIGN(Candidate other, MakeCandidate(bench, {result.chosen->effects[1]}));
+      std::vector<double> values = other.model->Nominal();
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        if (const int index = result.chosen->model->IndexOf(other.model->parameters()[i].name); index >= 0) values[i] = result.chosen->values[index];
+      }
+      FitCandidate(bench, &other, other.problem->FromParent(*result.chosen->problem, result.chosen->point, values, {}), kFinalIterations, kFinalTolerance);
+      ScoreCandidate(bench, &other);
+      result.first.children.push_back(std::make_unique<Candidate>(std::move(other)));
+      const Candidate* alone = result.first.children.back().get();
+      if (!Convincing(Compare(*alone, *result.chosen), kSecond)) result.single = result.chosen = alone;
+    }
+  }
+  // What the logs leave open goes to where the base model's nominal values pull it: undamped steps, as damping holds it where the search left it.
+  if (!Late(bench) && result.chosen != &base) {
+    auto* chosen = const_cast<Candidate*>(result.chosen);
+    PolishCandidate(bench, chosen);
+    ScoreCandidate(bench, chosen);
+  }
+  result.budget_spent = Late(bench);
+  result.free_run_before = FreeRunError(bench, base);
+  result.free_run_left = result.chosen == &base ? result.free_run_before : FreeRunError(bench, *result.chosen);
+  return result;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,38 @@
+// The search for effects: refits the base model, screens all effects, refits the leaders, adds a second effect where one is not enough.
+#ifndef GAPSCOPE_DIAGNOSE_SEARCH_H_
+#define GAPSCOPE_DIAGNOSE_SEARCH_H_
+
+#include "src/diagnose/evidence.h"
+#include "src/diagnose/screen.h"
+
+namespace gapscope {
+
+using Candidates = std::vector<std::unique_ptr<Candidate>>;
+
+// What was found on top of one parent.
+struct Layer {
+  std::vector<Screened> screen;  // all effects, the most promising first; their candidates are spent where they were refitted
+  Candidates children;           // refitted, the best first
+};
+
+struct SearchResult {
+  std::unique_ptr<Candidate> nominal, base;  // base: refitted
+  Layer first, second;           // on top of the base; on top of `single`
+  const Candidate* single = nullptr;  // the accepted single effect, or the base
+  const Candidate* chosen = nullptr;  // single, or a pair
+  double free_run_before = 0, free_run_left = 0;  // see FreeRunError: of the base, of the chosen one
+  bool uneven = false;           // train and held-out logs show the gap very differently; then nothing else was searched unless asked to
+  bool budget_spent = false;
+};
+
+using Say = std::function<void(const std::string&)>;
+
+// `stop_if_uneven`: ends after the base model's refit when the split is a poor one. Errors: the base model cannot be simulated along the logs.
+Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
+
+// Two effects on the same parent that explain the logs equally well: `a` is not convincingly better than `b`.
+bool AreRivals(const Candidate& a, const Candidate& b);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_SEARCH_H_

@@ -1,0 +1,100 @@
+#include "src/diagnose/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "src/diagnose/rules.h"
+
+namespace gapscope {
+namespace {
+
+double Sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
+
+// The candidate that comes closest to the chosen one without containing it or being contained.
+const Candidate* NearestRival(const Candidates& field, const Candidate& chosen) {
+  const Candidate* nearest = nullptr;
+  for (const auto& rival : field) {
+    if (rival.get() == &chosen || rival->held_out_blocks.empty() || Contains(*rival, chosen) || Contains(chosen, *rival)) continue;
+    if (!nearest || LogMisfit(*rival) < LogMisfit(*nearest)) nearest = rival.get();
+  }
+  return nearest;
+}
+
+// Probability that the verdict is right as a whole: logistic in what the bank of twin cases showed to matter (scripts/blind/calibrate).
+double Confidence(Verdict verdict, const VerdictEvidence& e, std::size_t effects) {
+  const double excess = std::log(std::max(e.floors_left, 1.0));
+  switch (verdict) {
+    case Verdict::kNone:
+    case Verdict::kParameters: return Sigmoid(3.0 - 4 * excess);
+    case Verdict::kEffects: return Sigmoid((effects == 1 ? 2.5 : 0.5) + 4 * std::min(e.rival_lead, 0.5) - 2.5 * excess);
+    case Verdict::kAmbiguous: return Sigmoid(0.8 - 2.5 * excess);
+    case Verdict::kUnknown: return Sigmoid(1.0 + excess);
+  }
+  return 0;
+}
+
+}  // namespace
+
+Judgement Judge(const SearchResult& found) {
+  Judgement result;
+  const Candidate &base = *found.base, &chosen = *found.chosen;
+  const bool pair = chosen.effects.size() == 2;
+  const Candidate& parent = pair ? *found.single : base;
+  const Candidates& field = pair ? found.second.children : found.first.children;
+
+  VerdictEvidence& e = result.evidence;
+  e.floors_before = base.held_out_floors;
+  e.floors_left = chosen.held_out_floors;
+  const double excess = e.floors_before - std::min(1.0, e.floors_left);
+  e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
+  e.free_run_before = found.free_run_before;
+  e.free_run_left = found.free_run_left;
+  if (std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0) e.free_run_removed = 1 - e.free_run_left / e.free_run_before;
+  const Candidate* best = &chosen != &base ? &chosen : field.empty() ? nullptr : field.front().get();
+  if (best) {
+    const Evidence gain = Compare(parent, *best);
+    e.gain_train = gain.train;
+    e.gain_held_out = gain.held_out;
+    e.z = gain.z;
+    if (const Candidate* rival = NearestRival(field, *best)) {
+      const Evidence lead = Compare(*rival, *best);
+      e.rival_lead = gain.gain > 0 ? lead.gain / gain.gain : 0;
+      e.rival_z = lead.z;
+    }
+  }
+
+  if (&chosen != &base) {
+    for (const auto& rival : field) {
+      if (rival.get() != &chosen && !rival->held_out_blocks.empty() && !Contains(*rival, chosen) && !Contains(chosen, *rival) && AreRivals(chosen, *rival)) result.rivals.push_back(rival.get());
+    }
+  }
+  if (e.floors_left > kUnknownFloors && std::max(e.removed, e.free_run_removed) < kUnknownRemoved) {
+    result.verdict = Verdict::kUnknown;
+  } else if (&chosen == &base) {
+    result.verdict = Convincing(Compare(*found.nominal, base), kRetuned) ? Verdict::kParameters : Verdict::kNone;
+  } else {
+    result.verdict = result.rivals.empty() ? Verdict::kEffects : Verdict::kAmbiguous;
+  }
+  result.probability = Confidence(result.verdict, e, chosen.effects.size());
+  if (found.budget_spent) result.probability *= 0.8;
+
+  // Single explanations share the verdict's probability by how close they come to the leader.
+  const Candidate* leader = found.single;
+  result.explanations.push_back(&base);
+  for (const auto& child : found.first.children) result.explanations.push_back(child.get());
+  std::vector<double> odds;
+  for (const Candidate* c : result.explanations) {
+    const Evidence lead = Compare(*c, *leader);
+    odds.push_back(c == leader ? 0 : std::exp(-0.5 * std::max(0.0, lead.z) - 20 * std::max(0.0, lead.held_out)));
+  }
+  const double others = std::accumulate(odds.begin(), odds.end(), 0.0);
+  const bool told = result.verdict != Verdict::kUnknown && result.verdict != Verdict::kAmbiguous;
+  const double own = told ? std::max(result.probability, 1 / (1 + others)) : 1 / (1 + others);
+  for (std::size_t i = 0; i < odds.size(); ++i) {
+    result.probabilities.push_back(result.explanations[i] == leader ? (others > 0 ? own : 1) : odds[i] / others * (1 - own));
+  }
+  return result;
+}
+
+}  // namespace gapscope

@@ -63,14 +63,19 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
 }
 
 void PolishCandidate(const Workbench& bench, Candidate* candidate) {
-  constexpr double kPriorLevel = 0.1;  // of the cost, in which the prior counts one per squared standard deviation
-  // A model that leaves more than the noise has residuals that lie, and count for less.
-  candidate->problem->ScalePrior(std::max(1.0, candidate->held_out_floors * candidate->held_out_floors));
-  candidate->train_cost = candidate->problem->Cost(candidate->point);
-  const SolveOptions options{.max_iterations = 5, .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0), .coarse_step = 0.01, .fine_step = 0.01, .damping = 1e-8, .secant = false,
-                             .deadline = bench.deadline};
-  const SolveResult solved = Solve(*candidate->problem, candidate->point, options);
-  if (!(solved.cost <= candidate->train_cost)) return;
+  constexpr double kPriorLevel = 0.2;  // of the cost, in which the prior counts one half per squared standard deviation
+  FitOptions fit = bench.Options(*candidate->model, true);
+  fit.logarithmic_effects = true;
+  auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
+  // The prior's centre is nominal; a model that leaves more than the noise has residuals that lie, and count for less.
+  problem->CentrePrior(candidate->model->Nominal());
+  problem->ScalePrior(std::max(1.0, candidate->held_out_floors * candidate->held_out_floors));
+  const FitPoint start = problem->FromParent(*candidate->problem, candidate->point, candidate->values, {});
+  const SolveOptions options{.max_iterations = 8, .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0), .coarse_step = 0.01, .fine_step = 0.01, .damping = 1e-8, .central = true,
+                             .secant = false, .deadline = bench.deadline};
+  const SolveResult solved = Solve(*problem, start, options);
+  if (!std::isfinite(solved.cost)) return;
+  candidate->problem = std::move(problem);
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
   candidate->values = candidate->problem->Values(solved.point);

@@ -19,8 +19,8 @@ constexpr double kAnchor = 1e-8;
 
 }  // namespace
 
-double Coordinate::ToSearch(double value) const { return logarithmic ? std::log(value) : value / scale; }
-double Coordinate::ToValue(double search) const { return logarithmic ? std::exp(search) : search * scale; }
+double Coordinate::ToSearch(double value) const { return logarithmic ? std::log(std::max(scale * value, 1e-300)) : value / scale; }
+double Coordinate::ToValue(double search) const { return logarithmic ? scale * std::exp(search) : search * scale; }
 
 FitProblem::~FitProblem() = default;
 
@@ -33,6 +33,14 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     c.scale = c.logarithmic ? 1 : std::max({std::abs(p.nominal), 0.05 * (p.high - p.low), std::numeric_limits<double>::min()});
     c.low = c.ToSearch(p.low);
     c.high = c.ToSearch(p.high);
+    const double value = values_[index];
+    if (options_.logarithmic_effects && !c.logarithmic && value != 0 && p.name.find('@') != std::string::npos && p.unit.starts_with("N m")) {
+      constexpr double kLeast = 1e-3;  // of the value: zero is out of reach, and was not the answer
+      c.logarithmic = true;
+      c.scale = value > 0 ? 1 : -1;
+      c.low = c.ToSearch(kLeast * value);
+      c.high = c.ToSearch(value > 0 ? p.high : p.low);
+    }
     coordinates_.push_back(c);
     low.push_back(c.low);
     high.push_back(c.high);
@@ -123,6 +131,13 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
   anchor_weight_ += prior_weight_;
 }
 
+void FitProblem::CentrePrior(const std::vector<double>& values) {
+  for (std::size_t i = 0; i < coordinates_.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (prior_weight_[k] > 0) anchor_[k] = std::clamp(coordinates_[i].ToSearch(values[coordinates_[i].parameter]), low_[k], high_[k]);
+  }
+}
+
 void FitProblem::ScalePrior(double factor) {
   anchor_weight_ += (factor - 1) * prior_weight_;
   prior_weight_ *= factor;
@@ -148,7 +163,7 @@ FitPoint FitProblem::Start() const {
   for (std::size_t i = 0; i < coordinates_.size(); ++i) {
     const Coordinate& c = coordinates_[i];
     const double value = values_[c.parameter];
-    point.y[i] = std::clamp(c.logarithmic ? c.ToSearch(std::max(value, std::numeric_limits<double>::min())) : c.ToSearch(value), c.low, c.high);
+    point.y[i] = std::clamp(c.ToSearch(value), c.low, c.high);
   }
   for (const auto& window : windows_) point.states.push_back(Eigen::VectorXd::Zero(window.prior.size()));
   return point;
@@ -301,11 +316,11 @@ FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent
   for (std::size_t i = 0; i < coordinates_.size(); ++i) {
     const Coordinate& c = coordinates_[i];
     const auto k = static_cast<Eigen::Index>(i);
-    point.y[k] = std::clamp(c.logarithmic ? std::log(std::max(values[c.parameter], 1e-300)) : c.ToSearch(values[c.parameter]), c.low, c.high);
+    point.y[k] = std::clamp(c.ToSearch(values[c.parameter]), c.low, c.high);
     const std::string& name = model_.parameters()[c.parameter].name;
     for (std::size_t j = 0; j < parent.coordinates_.size(); ++j) {
       const Coordinate& other = parent.coordinates_[j];
-      if (parent.model_.parameters()[other.parameter].name == name) point.y[k] = std::clamp(c.ToSearch(std::max(other.ToValue(y[static_cast<Eigen::Index>(j)]), c.logarithmic ? 1e-300 : -1e300)), c.low, c.high);
+      if (parent.model_.parameters()[other.parameter].name == name) point.y[k] = std::clamp(c.ToSearch(other.ToValue(y[static_cast<Eigen::Index>(j)])), c.low, c.high);
     }
   }
   for (std::size_t l = 0; l < scaling_.size(); ++l) {

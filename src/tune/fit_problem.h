@@ -43,15 +43,16 @@ struct FitOptions {
   std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
   Normalization normalization = Normalization::kDeviation;
   double prior_share = 0;           // standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing
+  bool logarithmic_effects = false; // torques and stiffnesses of effects as logarithms, those of zero excepted: a factor common to all torques is then a straight line
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 
-// A parameter in search coordinates: logarithmic where its lower bound is positive, else in units of `scale`.
+// A parameter in search coordinates: logarithmic where its lower bound is positive (or asked for: FitOptions::logarithmic_effects), else in units of `scale`.
 struct Coordinate {
   int parameter = 0;
   bool logarithmic = false;
-  double scale = 1, low = 0, high = 0;  // bounds in search coordinates
-  double ToSearch(double value) const;
+  double scale = 1, low = 0, high = 0;  // bounds in search coordinates; logarithmic: scale is the sign, +-1
+  double ToSearch(double value) const;  // logarithmic: what is zero or of the other sign becomes a very small number
   double ToValue(double search) const;
 };
 
@@ -105,6 +106,8 @@ class FitProblem {
   const Eigen::VectorXd& high() const { return high_; }
   // Multiplies the weight of what is known beforehand (prior_share), as the variance of the residuals does that of the data.
   void ScalePrior(double factor);
+  // What is known beforehand of the base parameters lies around `values` (as the model's Nominal()) instead of around the start.
+  void CentrePrior(const std::vector<double>& values);
   const Eigen::VectorXd& anchor_weight() const { return anchor_weight_; }  // on the hessian's diagonal
   std::size_t windows() const;
   std::size_t residuals() const;           // scored rows x signals

@@ -81,6 +81,7 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
     result.termination = Termination::kConverged;
     return result;
   }
+  const auto columns = options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll;
   const bool secant = options.secant && !problem.journaled();
   double damping = options.damping, difference = options.coarse_step;
   int quiet = 0;
@@ -96,10 +97,10 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
     Snapshot snapshot;
     Linearization at;
     if (secant) {
-      snapshot = problem.Differentiate(result.point, difference, FitProblem::Columns::kAll);
+      snapshot = problem.Differentiate(result.point, difference, columns);
       at = problem.Reduce(result.point, snapshot, false);
     } else {
-      at = problem.Linearize(result.point, difference);
+      at = problem.Linearize(result.point, difference, columns);
     }
     if (!at.valid) {
       result.termination = Termination::kNotSimulated;

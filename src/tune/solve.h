@@ -30,6 +30,7 @@ struct SolveOptions {
   double tolerance = 1e-4;       // stop when a step lowers the cost by less than this share
   double coarse_step = 0.05, fine_step = 0.01;  // finite differences, in search coordinates: first coarse, once converged fine
   double damping = 1e-2;         // LM: of the first step, relative to the diagonal
+  bool central = false;          // LM: central differences, whose columns of parameters that only act as a ratio are parallel
   bool secant = true;            // LM, without a journal: between two Jacobians, steps with secant updates of the last one
   std::function<bool(double cost, int iteration)> hopeless;  // asked before each Jacobian; true ends the fit
   Deadline deadline;

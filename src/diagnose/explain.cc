@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "src/diagnose/rules.h"
 
@@ -55,6 +56,10 @@ std::string Explain(const Diagnosis& d) {
       text += fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise. ", d.evidence.floors_left);
       if (!d.where.empty()) text += "It lies mostly at: " + d.where.front().signal + ", " + d.where.front().condition + ".";
       break;
+  }
+  const VerdictEvidence& e = d.evidence;
+  if (!d.effects.empty() && std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left)) {
+    text += fmt::format(" Over whole logs in one run the error goes from {:.3g} to {:.3g}.", e.free_run_before, e.free_run_left);
   }
   if (d.budget_spent) text += " The time budget ended the search early.";
   return text;

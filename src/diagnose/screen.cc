@@ -42,7 +42,7 @@ Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, 
   for (const auto& trial : Trials(placed.value())) {
     std::vector<double> tried = nominal;
     for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = trial[i];
-    const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, base);
+    const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
     if (!test.valid) continue;
     constexpr double kAllAbsorbed = 0.999;
     best.visible = best.visible || test.absorbed < kAllAbsorbed;

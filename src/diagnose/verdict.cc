@@ -86,7 +86,9 @@ Judgement Judge(const SearchResult& found) {
   std::vector<double> odds;
   for (const Candidate* c : result.explanations) {
     const Evidence lead = Compare(*c, *leader);
-    odds.push_back(c == leader ? 0 : std::exp(-0.5 * std::max(0.0, lead.z) - 20 * std::max(0.0, lead.held_out)));
+    constexpr double kBehind = 0.9, kRicher = 0.2;  // none comes before the leader; what only adds to it hardly counts
+    const double odd = std::exp(-0.5 * std::max(0.0, lead.z) - 20 * std::max(0.0, lead.held_out));
+    odds.push_back(c == leader ? 0 : odd * (Contains(*c, *leader) ? kRicher : kBehind));
   }
   const double others = std::accumulate(odds.begin(), odds.end(), 0.0);
   const bool told = result.verdict != Verdict::kUnknown && result.verdict != Verdict::kAmbiguous;

@@ -7,6 +7,21 @@
 #include "src/tune/journal.h"
 
 namespace gapscope {
+namespace {
+
+// The solution of hessian x = right, with the fixed coordinates held at zero.
+Eigen::VectorXd SolveFree(Eigen::MatrixXd hessian, Eigen::VectorXd right, const std::vector<char>& fixed) {
+  for (Eigen::Index i = 0; i < right.size(); ++i) {
+    if (!fixed[static_cast<std::size_t>(i)]) continue;
+    hessian.row(i).setZero();
+    hessian.col(i).setZero();
+    hessian(i, i) = 1;
+    right[i] = 0;
+  }
+  return hessian.ldlt().solve(right);
+}
+
+}  // namespace
 
 Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns columns) {
   std::vector<double> record;
@@ -227,7 +242,7 @@ Snapshot FitProblem::Capture(const FitPoint& point, double step) {
   return snapshot;
 }
 
-ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const Snapshot& base) {
+ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const FitPoint& parent_point, const Snapshot& base) {
   GS_CHECK(parent.windows_.size() == windows_.size());
   const Eigen::Index n = base.linearization.gradient.size();
   struct Part {
@@ -275,15 +290,31 @@ ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& paren
   }
   test.valid = true;
   if (!(raw > 0)) return test;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(base.linearization.hessian);
-  const Eigen::VectorXd answer = solver.solve(cross);
-  const double left = square - cross.dot(answer), pull = slope - answer.dot(base.linearization.gradient);
-  test.absorbed = std::clamp(1 - left / raw, 0.0, 1.0);
-  constexpr double kLeast = 1e-6;  // of the column: below it is rounding
-  if (!(left > kLeast * raw)) return test;
-  test.scale = std::clamp(-pull / left, 0.0, 2.0);
-  test.drop = -(test.scale * pull + 0.5 * test.scale * test.scale * left);
-  test.dy = -(test.scale * answer);
+  // A coordinate on its bound cannot answer by going further: the nuisance shift of a command that is later than one sample.
+  std::vector<char> fixed(static_cast<std::size_t>(n), 0);
+  Eigen::VectorXd answer;
+  double left = 0, pull = 0;
+  for (bool again = true; again;) {
+    again = false;
+    answer = SolveFree(base.linearization.hessian, cross, fixed);
+    left = square - cross.dot(answer);
+    pull = slope - answer.dot(base.linearization.gradient);
+    constexpr double kLeast = 1e-6;  // of the column: below it is rounding
+    test.absorbed = std::clamp(1 - left / raw, 0.0, 1.0);
+    if (!(left > kLeast * raw)) {
+      test.scale = test.drop = 0;
+      test.dy = Eigen::VectorXd::Zero(n);
+    } else {
+      test.scale = std::clamp(-pull / left, 0.0, 2.0);
+      test.drop = -(test.scale * pull + 0.5 * test.scale * test.scale * left);
+      test.dy = -(test.scale * answer);
+    }
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double edge = 1e-6 * (parent.high_[i] - parent.low_[i]);
+      const bool outward = (parent_point.y[i] >= parent.high_[i] - edge && answer[i] < 0) || (parent_point.y[i] <= parent.low_[i] + edge && answer[i] > 0);
+      if (outward && !fixed[static_cast<std::size_t>(i)]) fixed[static_cast<std::size_t>(i)] = 1, again = true;
+    }
+  }
   return test;
 }
 

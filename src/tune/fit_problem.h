@@ -140,7 +140,7 @@ class FitProblem {
   // Snapshot of a point.
   Snapshot Capture(const FitPoint& point, double step);
   // The change of residuals from `base` (a snapshot of `parent` at `parent_point`, over the same windows) to this problem at `point`, as a column.
-  ColumnTest TestColumn(const FitPoint& point, const FitProblem& parent, const Snapshot& base);
+  ColumnTest TestColumn(const FitPoint& point, const FitProblem& parent, const FitPoint& parent_point, const Snapshot& base);
   // A parent's solution as a point of this problem, whose model has more parameters: they start from `values` (this model's parameters).
   FitPoint FromParent(const FitProblem& parent, const FitPoint& parent_point, const std::vector<double>& values, const Eigen::VectorXd& parent_dy) const;
   // Cost of each half second of each window, in the order of windows; states as they are. Empty where it cannot be simulated.

@@ -8,6 +8,18 @@ namespace gapscope {
 
 namespace {
 
+bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
+  if (candidate.effects.empty()) return false;
+  const auto placed = candidate.model->EffectParameters(candidate.effects.back(), bench.scales);
+  if (!placed.ok()) return false;
+  constexpr double kEdge = 1e-3;  // of the range
+  return std::any_of(placed.value().begin(), placed.value().end(), [&](const PlacedParameter& p) {
+    const double value = candidate.values[candidate.model->IndexOf(p.name)], edge = kEdge * (p.high - p.low);
+    const bool share = p.key == "motor_share" || p.key == "damping_ratio";  // shapes that the logs hardly know
+    return !share && ((value <= p.low + edge && p.neutral != p.low) || (value >= p.high - edge && p.neutral != p.high));
+  });
+}
+
 // Base parameters are known to about +-20 % and their bounds lie at nominal / 1.6 and nominal * 1.6.
 constexpr double kPriorShare = 0.15;
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known beforehand.
@@ -89,6 +101,7 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
   FitProblem problem(*candidate->model, bench.data.held_out, options, candidate->values, bench.pool);
   FitPoint point = problem.Start();
   candidate->held_out_cost = std::numeric_limits<double>::infinity();
+  candidate->at_bound = LastEffectAtBound(bench, *candidate);
   candidate->held_out_error = std::numeric_limits<double>::infinity();
   candidate->held_out_floors = candidate->held_out_error;
   candidate->held_out_blocks.clear();

@@ -17,6 +17,7 @@ struct Candidate {
   FitPoint point;
   double train_cost = 0;
   bool converged = false;
+  bool at_bound = false;                 // a parameter of its last effect ended on a bound that does not mean "no effect"
   std::vector<double> values;
   double shift_s = 0;
   std::vector<double> train_blocks;      // cost per half second, of the training logs

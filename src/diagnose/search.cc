@@ -16,8 +16,14 @@ constexpr double kWorthImitating = 0.8;                // a leader that leaves l
 
 bool Late(const Workbench& bench) { return bench.deadline && std::chrono::steady_clock::now() >= *bench.deadline; }
 
-void SortByMisfit(Candidates* children) {
+// The best first. An effect with a parameter on its bound is stretched into something it is not: it comes after one that gains nearly as much.
+void SortByMisfit(const Candidate& parent, Candidates* children) {
   std::stable_sort(children->begin(), children->end(), [](const auto& a, const auto& b) { return LogMisfit(*a) < LogMisfit(*b); });
+  if (children->empty() || !children->front()->at_bound) return;
+  constexpr double kNearly = 0.6;
+  const double most = Compare(parent, *children->front()).gain;
+  const auto sound = std::find_if(children->begin(), children->end(), [&](const auto& c) { return !c->at_bound && Compare(parent, *c).gain > kNearly * most; });
+  if (sound != children->end()) std::rotate(children->begin(), sound, sound + 1);
 }
 
 // A fit from a start of its own, kept if it ends below the candidate's.
@@ -105,9 +111,9 @@ void Explore(const Workbench& bench, Candidate& parent, std::size_t refits, cons
     layer->children.push_back(std::move(child));
   }
   if (layer->children.empty()) return;
-  SortByMisfit(&layer->children);
+  SortByMisfit(parent, &layer->children);
   ImitateLeader(bench, parent, layer);
-  SortByMisfit(&layer->children);
+  SortByMisfit(parent, &layer->children);
   // The leaders once more to the end.
   for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !Late(bench); ++i) {
     Candidate& leader = *layer->children[i];
@@ -115,18 +121,22 @@ void Explore(const Workbench& bench, Candidate& parent, std::size_t refits, cons
     FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
     ScoreCandidate(bench, &leader);
   }
-  SortByMisfit(&layer->children);
+  SortByMisfit(parent, &layer->children);
 }
 
-// The best child, or a simpler one that it contains when the richer is not convincingly better.
+// The best child, or a simpler one when the richer is not convincingly better: one that it contains, or one with fewer parameters.
 Candidate* Simplest(const Layer& layer, const Candidate& parent) {
   if (layer.children.empty()) return nullptr;
   Candidate* best = layer.children.front().get();
   for (const auto& child : layer.children) {
-    if (child.get() == best || !Contains(*best, *child)) continue;
+    if (child.get() == best || child->held_out_blocks.empty()) continue;
     const Evidence more = Compare(*child, *best);
-    const bool much = more.gain > kNestedShare * Compare(parent, *best).gain;
-    if (!much || !Convincing(more, kNested)) best = child.get();
+    if (Contains(*best, *child)) {
+      const bool much = more.gain > kNestedShare * Compare(parent, *best).gain;
+      if (!much || !Convincing(more, kNested)) best = child.get();
+    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z) {
+      best = child.get();
+    }
   }
   return best;
 }

@@ -53,7 +53,7 @@ double LogMisfit(const Candidate& candidate) {
 
 bool Convincing(const Evidence& e, const Limits& limits) {
   if (std::min(e.train, e.held_out) > kLarge) return e.z > kFewZ;
-  return e.train > limits.share && e.held_out > limits.share && e.z > limits.z;
+  return e.train > 0 && e.held_out > limits.share && e.z > limits.z;
 }
 
 }  // namespace gapscope

@@ -20,7 +20,8 @@ Evidence Compare(const Candidate& a, const Candidate& b);
 // Sum over all blocks of log(cost + floor): what orders candidates. Infinity for one that cannot be simulated somewhere.
 double LogMisfit(const Candidate& candidate);
 
-// What makes a gain convincing: a share of the cost on both sides of the split, and more than chance; or so large a share that few blocks are enough.
+// What makes a gain convincing: a share of the held-out cost, some of the training cost, and more than chance; or so large a share of both that few
+// blocks are enough.
 struct Limits {
   double share = 0.01, z = 2.5;
 };

@@ -9,7 +9,7 @@ Effect Effect_supply_sag() {
       .parameters = {
           {.key = "time_constant_s", .unit = "s", .scale = ScaleKind::kOne, .neutral = 0.3, .low = 0.05, .high = 3, .trials = {0.1, 0.4}, .start = 0.3},
           {.key = "sag_fraction", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 4, .trials = {0.3, 1.5}, .start = 0.3},
-          {.key = "limit_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 5, .low = 0.05, .high = 5, .trials = {0.8, 1.6}, .start = 0.8},
+          {.key = "limit_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 5, .low = 0.05, .high = 5, .trials = {1.2, 0.6}, .start = 0.8},
       },
       .meaning = "the drive's ceiling falls under load",
       .signature = "the limit falls with load and time",

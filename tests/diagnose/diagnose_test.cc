@@ -1,0 +1,98 @@
+// The diagnosis on logs of the independent twin plant (tests/twin), whose cause is known here and not to the program. The full blind check is
+// scripts/blind_check.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include "src/diagnose/diagnosis.h"
+#include "tests/twin/case.h"
+#include "tests/twin/output.h"
+
+namespace gapscope {
+namespace {
+
+// A case of the twin, its logs bound to the rig's experiment.
+struct Logs {
+  Experiment experiment;
+  std::vector<Recording> recordings;
+  std::vector<twin::EffectLabel> effects;
+};
+
+Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect, std::uint64_t seed) {
+  twin::Case c;
+  std::string problem;
+  twin::CaseRequest request;
+  request.seed = seed;
+  request.kind = kind;
+  request.rig = rig;
+  request.effect = effect;
+  EXPECT_TRUE(twin::MakeCase(request, &c, &problem)) << problem;
+  Logs logs;
+  auto experiment = LoadExperiment(GAPSCOPE_SOURCE_DIR "/models/" + rig + "/experiment.yaml");
+  EXPECT_TRUE(experiment.ok());
+  logs.experiment = experiment.value();
+  logs.effects = c.effects;
+  const std::string folder = ::testing::TempDir() + "diagnose_" + std::to_string(::getpid());
+  int number = 0;
+  for (const auto& record : twin::MakeRecords(c, true)) {
+    const std::string path = folder + "/log_" + std::to_string(number++) + ".csv";
+    EXPECT_TRUE(twin::WriteText(path, twin::CsvText(record), &problem)) << problem;
+    auto recording = LoadRecording(logs.experiment, path);
+    EXPECT_TRUE(recording.ok());
+    logs.recordings.push_back(std::move(recording).value());
+  }
+  std::filesystem::remove_all(folder);
+  return logs;
+}
+
+Diagnosis DiagnoseLogs(const Logs& logs) {
+  ThreadPool pool(2);
+  auto result = Diagnose(logs.experiment, SplitData(logs.recordings, {}), {.budget_s = 0}, pool);
+  EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().Text());
+  return std::move(result).value();
+}
+
+TEST(DiagnoseTest, NamesATorqueBias) {
+  const Logs logs = MakeLogs("flexlink", twin::Kind::kSingle, "torque_bias@hub", 31);
+  const Diagnosis d = DiagnoseLogs(logs);
+  ASSERT_EQ(d.verdict, Verdict::kEffects) << d.explanation;
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].use.Text(), "torque_bias@hub");
+  EXPECT_GT(d.probability, 0.5);
+  // The scale common to all torques is only known from the nominal values, to +-20 %.
+  const double truth = logs.effects[0].parameters.front().second;
+  EXPECT_NEAR(d.effects[0].parameters[0].value / truth, 1, 0.25);
+  EXPECT_LT(d.final, 0.3 * d.refit);
+  EXPECT_GT(d.closed, 0.8);
+  double sum = 0;
+  for (const auto& c : d.candidates) sum += c.probability;
+  EXPECT_NEAR(sum, 1, 1e-9);
+}
+
+TEST(DiagnoseTest, NamesATorqueSpeedCurve) {
+  const Diagnosis d = DiagnoseLogs(MakeLogs("qube", twin::Kind::kSingle, "torque_speed_curve@motor", 32));
+  ASSERT_FALSE(d.effects.empty()) << d.explanation;
+  EXPECT_EQ(d.effects[0].use.Text(), "torque_speed_curve@motor") << d.explanation;
+}
+
+TEST(DiagnoseTest, NamesNothingWhereNothingIsMissing) {
+  const Diagnosis d = DiagnoseLogs(MakeLogs("flexjoint", twin::Kind::kNone, "", 33));
+  EXPECT_TRUE(d.verdict == Verdict::kNone || d.verdict == Verdict::kParameters) << d.explanation;
+  EXPECT_TRUE(d.effects.empty());
+}
+
+// Commands that have nothing to do with the motion: no effect may be named with confidence.
+TEST(DiagnoseTest, ShuffledCommandsAreNoEffect) {
+  Logs logs = MakeLogs("flexlink", twin::Kind::kNone, "", 34);
+  std::mt19937_64 random(5);
+  for (auto& recording : logs.recordings) std::shuffle(recording.commands[0].values.begin(), recording.commands[0].values.end(), random);
+  const Diagnosis d = DiagnoseLogs(logs);
+  EXPECT_EQ(d.verdict, Verdict::kUnknown) << d.explanation;
+}
+
+}  // namespace
+}  // namespace gapscope

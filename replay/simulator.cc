@@ -10,7 +10,7 @@
 namespace gapscope {
 namespace {
 
-constexpr double kPreRoll_s = 0.6;
+constexpr double kPreRoll_s = 1.5, kHistory_s = 0.2;  // for lags and a sagging supply; for delays alone
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
 ModelPtr CopyForReplay(const mjModel& model) {
@@ -211,7 +211,7 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
   if (!remembers_ || window.begin == 0) return;
-  const double from = recording.time_s[window.begin] - kPreRoll_s;
+  const double from = recording.time_s[window.begin] - (m->na > 0 ? kPreRoll_s : kHistory_s);
   std::size_t first = window.begin;
   while (first > 0 && recording.time_s[first - 1] >= from) --first;
   const int integrator = m->opt.integrator;

@@ -43,7 +43,7 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
     GS_ASSIGN(const std::string xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
     GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
     GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
-    GS_RETURN_IF_ERROR(WriteReport(out, json, experiment, {data.train, data.held_out}, {{"nominal", base, base->Nominal()}, {"diagnosed", diagnosis.model, diagnosis.values}}, pool));
+    GS_RETURN_IF_ERROR(WriteReport(out, json, experiment, {data.train, data.held_out}, {{"nominal", base, base->Nominal()}, {"refitted", diagnosis.refit_model, diagnosis.refit_values}, {"diagnosed", diagnosis.model, diagnosis.values}}, pool));
   }
   fmt::print("{}", flags.common.json ? json + "\n" : DiagnosisTable(diagnosis));
   return kDone;

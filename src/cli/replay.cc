@@ -8,6 +8,7 @@
 #include "src/cli/session.h"
 #include "src/core/file.h"
 #include "src/report/replay_report.h"
+#include "src/tune/tune.h"
 
 namespace gapscope::cli {
 namespace {
@@ -17,6 +18,7 @@ struct ReplayFlags {
   ModelFlags model;
   std::string mode;
   double window_s = 0, time_step_s = 0, fail_above = 0;
+  bool nuisances = false;
 };
 
 Result<int> RunReplay(const ReplayFlags& flags) {
@@ -29,7 +31,11 @@ Result<int> RunReplay(const ReplayFlags& flags) {
     return Error{.what = "no controller is described", .where = flags.model.experiment, .actual = "--mode closed_loop", .allowed = "free_run, windows"};
   }
   if (flags.window_s > 0) options.window_s = flags.window_s;
-  const ReplayResult result = Replay(*session.model, session.recordings, options, *session.pool);
+  ReplayResult result = Replay(*session.model, session.recordings, options, *session.pool);
+  if (flags.nuisances) {
+    const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
+    result.logs = Evaluate(*session.model, session.recordings, session.values, std::nullopt, options.mode, fit, *session.pool);
+  }
   const Comparison comparison = Compare(result, session.recordings, *session.pool);
   // The other way of looking at the same logs: local error in windows against accumulated error in a free run.
   ReplayOptions other = options;
@@ -80,6 +86,7 @@ void AddReplay(CLI::App& program, Run& run) {
   command->add_option("--mode", flags->mode, "free_run, windows or closed_loop (default: the experiment's)")->check(CLI::IsMember({"free_run", "windows", "closed_loop"}));
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
   command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen so that halving it changes the error by < 1 %)")->check(FinitePositive());
+  command->add_flag("--nuisances", flags->nuisances, "Fit what is no finding first: zero offsets, initial states, a command shift below one sample; as tune and diagnose do");
   command->add_option("--fail-above", flags->fail_above, "Exit status 1 when the error is above this")->check(FinitePositive());
   command->footer("Example: gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out out");
   command->callback([flags, &run] { run = [flags] { return RunReplay(*flags); }; });

@@ -95,8 +95,8 @@ Result<int> RunTune(TuneFlags flags) {
     GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
     GS_RETURN_IF_ERROR(WriteTraces(out / "traces", {.logs = summary.held_out}, data.held_out));
     GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
-    std::vector<ReportPrediction> predictions = {{"nominal", Evaluate(*session.model, data.train, session.values, 0, options, *session.pool)}, {"tuned", summary.train}};
-    for (auto& log : Evaluate(*session.model, data.held_out, session.values, 0, options, *session.pool)) predictions[0].logs.push_back(std::move(log));
+    std::vector<ReportPrediction> predictions = {{"nominal", Evaluate(*session.model, data.train, session.values, 0, session.experiment.replay.mode, options, *session.pool)}, {"tuned", summary.train}};
+    for (auto& log : Evaluate(*session.model, data.held_out, session.values, 0, session.experiment.replay.mode, options, *session.pool)) predictions[0].logs.push_back(std::move(log));
     predictions[1].logs.insert(predictions[1].logs.end(), summary.held_out.begin(), summary.held_out.end());
     GS_RETURN_IF_ERROR(WriteReport(out, json, session.experiment, {data.train, data.held_out}, std::move(predictions), *session.model, session.values, session.model->parameters()));
   }

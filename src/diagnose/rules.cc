@@ -1,7 +1,7 @@
 #include "src/diagnose/rules.h"
 
 #include <algorithm>
-#include <map>
+#include <iterator>
 
 namespace gapscope {
 namespace {
@@ -28,15 +28,17 @@ bool IsServoJoint(const std::string& joint, const Model& model) {
   return false;
 }
 
-// richer -> simpler effects that it contains, on the same joint.
-const std::multimap<std::string, std::string>& Containment() {
-  static const std::multimap<std::string, std::string> table = {
-      {"stribeck_friction", "coulomb_friction"}, {"direction_asymmetry", "coulomb_friction"}, {"supply_sag", "torque_limit"},
-      {"cable_spring", "torque_bias"},           {"gravity_offset", "torque_bias"},           {"direction_asymmetry", "torque_bias"},
-      {"cogging", "gravity_offset"},             {"cogging", "cable_spring"},                 {"cogging", "torque_bias"},
-  };
-  return table;
-}
+// richer -> simpler effects that it contains, on the same joint. Exactly, or only as far as its bounds let it: a cable whose rest angle lies far away is
+// nearly a bias, and where the travel is small the logs cannot tell the two.
+struct Containment {
+  const char *richer, *simpler;
+  bool exact;
+};
+constexpr Containment kContainments[] = {
+    {"stribeck_friction", "coulomb_friction", true}, {"direction_asymmetry", "coulomb_friction", true}, {"direction_asymmetry", "torque_bias", true}, {"supply_sag", "torque_limit", true},
+    {"cogging", "gravity_offset", true},             {"cogging", "cable_spring", true},                 {"cogging", "torque_bias", true},
+    {"cable_spring", "torque_bias", false},          {"gravity_offset", "torque_bias", false},
+};
 
 }  // namespace
 
@@ -56,15 +58,18 @@ bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
   return false;
 }
 
-bool Contains(const Candidate& richer, const Candidate& simpler) {
+bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
   if (richer.effects.size() != simpler.effects.size() || richer.effects.empty()) return false;
   for (std::size_t i = 0; i + 1 < richer.effects.size(); ++i) {
     if (richer.effects[i] != simpler.effects[i]) return false;
   }
   const EffectUse &a = richer.effects.back(), &b = simpler.effects.back();
   if (JointOf(a.on, *richer.model) != JointOf(b.on, *richer.model)) return false;
-  const auto range = Containment().equal_range(a.effect);
-  return std::any_of(range.first, range.second, [&](const auto& entry) { return entry.second == b.effect; });
+  return std::any_of(std::begin(kContainments), std::end(kContainments), [&](const Containment& c) { return a.effect == c.richer && b.effect == c.simpler && (c.exact || !exactly); });
+}
+
+bool MayBeRivals(const Candidate& a, const Candidate& b) {
+  return !Contains(a, b, true) && !Contains(b, a, true) && !a.at_bound && !b.at_bound;
 }
 
 }  // namespace gapscope

@@ -14,15 +14,17 @@ inline constexpr double kSecondExcess = 0.6;                   // and of what th
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains
 inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains
 inline constexpr Limits kTold{.share = 0.03, .z = 2.5};        // the winner over a rival; below, the two are ambiguous
-inline constexpr double kUnknownFloors = 1.6, kUnknownRemoved = 0.8;   // left above the noise, and share of the excess removed (in windows, or of a free run)
+inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.8;   // left above the noise, and share of the excess removed (in windows, or of a free run)
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 
 // Whether the effect can be a finding here: a bias on a servo equals a zero offset, viscous friction is a parameter.
 bool IsFinding(const EffectUse& use, const Model& model);
 // Whether the effects are known to be confused with each other, at places that are one.
 bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
-// Whether `richer` can do all that `simpler` does (same other effects).
-bool Contains(const Candidate& richer, const Candidate& simpler);
+// Whether `richer` can do all that `simpler` does (same other effects); `exactly`: not only nearly, as far as its bounds go.
+bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = false);
+// Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.
+bool MayBeRivals(const Candidate& a, const Candidate& b);
 
 }  // namespace gapscope
 

@@ -12,6 +12,7 @@ namespace {
 constexpr int kFirstIterations = 14, kFinalIterations = 20;
 constexpr double kFirstTolerance = 2e-3, kFinalTolerance = 2e-4;
 constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4;  // leaders of the screen that are refitted, beside the partners of the first two
+constexpr double kNearly = 0.6;                        // of the best one's gain
 constexpr double kWorthImitating = 0.8;                // a leader that leaves less than this share of its parent's cost
 
 bool Late(const Workbench& bench) { return bench.deadline && std::chrono::steady_clock::now() >= *bench.deadline; }
@@ -20,7 +21,6 @@ bool Late(const Workbench& bench) { return bench.deadline && std::chrono::steady
 void SortByMisfit(const Candidate& parent, Candidates* children) {
   std::stable_sort(children->begin(), children->end(), [](const auto& a, const auto& b) { return LogMisfit(*a) < LogMisfit(*b); });
   if (children->empty() || !children->front()->at_bound) return;
-  constexpr double kNearly = 0.6;
   const double most = Compare(parent, *children->front()).gain;
   const auto sound = std::find_if(children->begin(), children->end(), [&](const auto& c) { return !c->at_bound && Compare(parent, *c).gain > kNearly * most; });
   if (sound != children->end()) std::rotate(children->begin(), sound, sound + 1);
@@ -134,7 +134,7 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent) {
     if (Contains(*best, *child)) {
       const bool much = more.gain > kNestedShare * Compare(parent, *best).gain;
       if (!much || !Convincing(more, kNested)) best = child.get();
-    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z) {
+    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
     }
   }
@@ -194,8 +194,12 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
       }
       FitCandidate(bench, &other, other.problem->FromParent(*result.chosen->problem, result.chosen->point, values, {}), kFinalIterations, kFinalTolerance);
       ScoreCandidate(bench, &other);
-      result.first.children.push_back(std::make_unique<Candidate>(std::move(other)));
-      const Candidate* alone = result.first.children.back().get();
+      // In the place of an earlier fit of the same effect, if there is one.
+      auto& singles = result.first.children;
+      auto place = std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects == other.effects; });
+      if (place == singles.end()) place = singles.insert(singles.end(), nullptr);
+      *place = std::make_unique<Candidate>(std::move(other));
+      const Candidate* alone = place->get();
       if (!Convincing(Compare(*alone, *result.chosen), kSecond)) result.single = result.chosen = alone;
     }
   }

@@ -15,7 +15,7 @@ double Sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 const Candidate* NearestRival(const Candidates& field, const Candidate& chosen) {
   const Candidate* nearest = nullptr;
   for (const auto& rival : field) {
-    if (rival.get() == &chosen || rival->held_out_blocks.empty() || Contains(*rival, chosen) || Contains(chosen, *rival)) continue;
+    if (rival.get() == &chosen || rival->held_out_blocks.empty() || !MayBeRivals(*rival, chosen)) continue;
     if (!nearest || LogMisfit(*rival) < LogMisfit(*nearest)) nearest = rival.get();
   }
   return nearest;
@@ -66,7 +66,7 @@ Judgement Judge(const SearchResult& found) {
 
   if (&chosen != &base) {
     for (const auto& rival : field) {
-      if (rival.get() != &chosen && !rival->held_out_blocks.empty() && !Contains(*rival, chosen) && !Contains(chosen, *rival) && AreRivals(chosen, *rival)) result.rivals.push_back(rival.get());
+      if (rival.get() != &chosen && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) result.rivals.push_back(rival.get());
     }
   }
   if (e.floors_left > kUnknownFloors && std::max(e.removed, e.free_run_removed) < kUnknownRemoved) {

@@ -89,13 +89,14 @@ DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::si
   return split;
 }
 
-std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings, const std::vector<double>& values, double shift_s, const TuneOptions& options, ThreadPool& pool) {
+std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings, const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
+                                const TuneOptions& options, ThreadPool& pool) {
   if (recordings.empty()) return {};
   FitOptions fit = MakeFitOptions(options, {}, options.time_step_s);
-  fit.objective = model.experiment().replay.mode == ReplayMode::kWindows ? Objective::kWindows : Objective::kFreeRun;
+  fit.objective = mode == ReplayMode::kWindows ? Objective::kWindows : Objective::kFreeRun;
   fit.lead_in_s = 0;
-  fit.fit_shift = false;
-  fit.shift_s = shift_s;
+  fit.fit_shift = !shift_s;
+  fit.shift_s = shift_s.value_or(0);
   FitProblem problem(model, recordings, fit, values, pool);
   FitPoint point = problem.Start();
   SolveOptions solve{.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01};
@@ -194,9 +195,10 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   summary.tuned = std::move(uncertainty.tuned);
   summary.flat = std::move(uncertainty.flat);
   summary.correlated = std::move(uncertainty.correlated);
-  summary.error_nominal = ReplayError(Evaluate(model, data.held_out, model.Nominal(), 0, options, pool));
-  summary.train = Evaluate(model, data.train, summary.values, summary.shift_s, options, pool);
-  summary.held_out = Evaluate(model, data.held_out, summary.values, summary.shift_s, options, pool);
+  const ReplayMode mode = model.experiment().replay.mode;
+  summary.error_nominal = ReplayError(Evaluate(model, data.held_out, model.Nominal(), 0, mode, options, pool));
+  summary.train = Evaluate(model, data.train, summary.values, summary.shift_s, mode, options, pool);
+  summary.held_out = Evaluate(model, data.held_out, summary.values, summary.shift_s, mode, options, pool);
   summary.error_train = ReplayError(summary.train);
   summary.error_held_out = ReplayError(summary.held_out);
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

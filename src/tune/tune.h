@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_TUNE_TUNE_H_
 #define GAPSCOPE_TUNE_TUNE_H_
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -66,9 +67,10 @@ struct TuneSummary {
 // Errors: nothing free; a journal that cannot be used; a start that cannot be simulated.
 Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::vector<double>& start, const TuneOptions& options, ThreadPool& pool);
 
-// Replays at fixed parameters with only the nuisances fitted (offsets per log and initial states): how held-out data is scored. `shift_s` as fitted.
-std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings, const std::vector<double>& values, double shift_s, const TuneOptions& options,
-                                ThreadPool& pool);
+// Replays at fixed parameters with only the nuisances fitted (offsets per log and initial states): how held-out data is scored. `shift_s`: of the
+// commands; none: fitted too, within one sample.
+std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings, const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
+                                const TuneOptions& options, ThreadPool& pool);
 
 // Intervals, flat directions and correlations at a solved point (in tune/uncertainty.cc).
 struct Uncertainty {

@@ -22,6 +22,8 @@ bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
 
 // Base parameters are known to about +-20 % and their bounds lie at nominal / 1.6 and nominal * 1.6.
 constexpr double kPriorShare = 0.15;
+// Sensors are zeroed by hand or at start: what a rest angle could explain as well is the rest angle's.
+constexpr double kPriorOffset_rad = 0.03;
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known beforehand.
 constexpr double kCorrelated = 10;
 
@@ -34,7 +36,8 @@ std::string Candidate::Name() const {
 }
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
-  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated), .huber = 0};
+  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
+                     .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated), .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;

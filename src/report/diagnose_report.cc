@@ -68,18 +68,11 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
                   {"converged", c.converged}, {"bic", JsonNumber(c.bic)}, {"reason", c.reason}});
     json["candidates"].push_back(std::move(entry));
   }
-  // As `replay --with EFFECT --set NAME=VALUE` takes them.
-  const auto model_json = [](const Model& model, const std::vector<double>& values) {
-    ordered_json effects = ordered_json::array(), parameters = ordered_json::object();
-    for (const auto& use : model.effects()) effects.push_back(use.Text());
-    for (std::size_t i = 0; i < values.size(); ++i) parameters[model.parameters()[i].name] = JsonNumber(values[i]);
-    return ordered_json{{"effects", effects}, {"parameters", parameters}};
-  };
-  if (d.refit_model) json["models"] = {{"refit", model_json(*d.refit_model, d.refit_values)}, {"final", model_json(*d.model, d.values)}};
   json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
   json["explanation"] = d.explanation;
   json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
   if (d.model) json["model"] = JsonModel(*d.model, d.values);
+  if (d.refit_model) json["refit_model"] = JsonModel(*d.refit_model, d.refit_values);
   json["wall_s"] = d.wall_s;
   json["budget_spent"] = d.budget_spent;
   json["seed"] = seed;

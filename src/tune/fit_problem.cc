@@ -128,6 +128,11 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     const double deviation = options_.prior_share * (high_[k] - low_[k]);
     prior_weight_[k] = 1 / (deviation * deviation);
   }
+  for (std::size_t l = 0; l < scaling_.size() && options_.prior_offset_rad > 0; ++l) {
+    for (const auto& scaling : scaling_[l]) {
+      if (scaling.offset >= 0) prior_weight_[scaling.offset] = std::pow(scaling.deviation / options_.prior_offset_rad, 2);
+    }
+  }
   anchor_weight_ += prior_weight_;
 }
 

@@ -43,6 +43,7 @@ struct FitOptions {
   std::vector<double> weights;      // per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation
   Normalization normalization = Normalization::kDeviation;
   double prior_share = 0;           // standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing
+  double prior_offset_rad = 0;      // likewise of zero offsets, around zero; 0: nothing
   bool logarithmic_effects = false; // torques and stiffnesses of effects as logarithms, those of zero excepted: a factor common to all torques is then a straight line
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };

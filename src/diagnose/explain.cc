@@ -17,6 +17,10 @@ std::string Reason(const Candidate& candidate, const SearchResult& found) {
   if (candidate.held_out_blocks.empty()) return "its fit cannot be simulated along the held-out logs";
   const std::string converged = candidate.converged ? "" : " (fit not converged)";
   const Evidence gain = Compare(base, candidate);
+  if (chosen.effects.size() == 2 && candidate.effects.front() == chosen.effects.back()) {
+    const Evidence more = Compare(*found.single, chosen);
+    return fmt::format("accepted beside {}: removes {:.1f} % of what that leaves ({:.1f} standard errors)", found.single->Name(), 100 * more.held_out, more.z);
+  }
   if (std::find(chosen.effects.begin(), chosen.effects.end(), candidate.effects.front()) != chosen.effects.end()) {
     return fmt::format("accepted: removes {:.1f} % of the held-out cost ({:.1f} standard errors){}", 100 * gain.held_out, gain.z, converged);
   }

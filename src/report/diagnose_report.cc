@@ -8,6 +8,26 @@ namespace gapscope {
 
 using nlohmann::ordered_json;
 
+namespace {
+
+// Words on lines of at most `width` characters.
+std::string Wrap(const std::string& text, std::size_t width) {
+  std::string wrapped;
+  std::size_t column = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    std::size_t end = text.find(' ', begin);
+    if (end == std::string::npos) end = text.size();
+    if (column > 0 && column + 1 + end - begin > width) wrapped += '\n', column = 0;
+    if (column > 0) wrapped += ' ', ++column;
+    wrapped.append(text, begin, end - begin);
+    column += end - begin;
+    begin = end + 1;
+  }
+  return wrapped;
+}
+
+}  // namespace
+
 std::string DiagnosisTable(const Diagnosis& d) {
   std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
   for (const auto& found : d.effects) {
@@ -20,7 +40,7 @@ std::string DiagnosisTable(const Diagnosis& d) {
     text += "  cannot be told apart on these logs: " + names + "\n";
   }
   text += fmt::format("\nheld-out error: nominal {:.4g} -> refit {:.4g} -> final {:.4g} -> floor {:.4g}; {:.0f} % of the gap closed\n", d.nominal, d.refit, d.final, d.floor, 100 * d.closed);
-  text += "\n" + d.explanation + "\n";
+  text += "\n" + Wrap(d.explanation, 120) + "\n";
   if (!d.where.empty()) {
     text += fmt::format("\n{:<18} {:<44} {:>9} {:>9}\n", "where", "", "of error", "of time");
     for (const auto& w : d.where) text += fmt::format("{:<18} {:<44} {:>8.0f}% {:>8.0f}%\n", w.signal, w.condition, 100 * w.share_of_error, 100 * w.share_of_time);

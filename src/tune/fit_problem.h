@@ -123,7 +123,6 @@ class FitProblem {
   double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr);
   // The same with each window's weighted residuals, which no journal keeps.
   double CostAndResiduals(const FitPoint& point, std::vector<Eigen::VectorXd>* residuals);
-  bool journaled() const { return journal_ != nullptr; }
   // `step`: finite difference in search coordinates. Columns of parameters, offsets and shift may be left out: the gradient and hessian are zero then.
   // kCentral: all, those of parameters by central differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns
   // that are parallel to rounding, which one-sided ones are not.
@@ -152,8 +151,11 @@ class FitProblem {
 
   std::size_t replays() const { return replays_; }   // passes over all windows
   std::size_t evaluations() const { return evaluations_; }  // calls of Cost and Linearize
-  // Results are recorded there, and taken from there as long as the same calls come in the same order.
+  // Results of Cost and Linearize are recorded there, and taken from there as long as the same calls come in the same order; an optimiser may record
+  // its own state there between calls that are not.
   void set_journal(Journal* journal) { journal_ = journal; }
+  Journal* journal() const { return journal_; }
+  void CountResumed(std::size_t evaluations, std::size_t replays) { evaluations_ += evaluations, replays_ += replays; }
   // Huber threshold in residual units; infinity: plain squares. Set from the residuals of the last Cost().
   void UpdateRobustScale(const FitPoint& point);
 

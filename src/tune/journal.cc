@@ -86,8 +86,9 @@ Journal::~Journal() {
 
 bool Journal::Next(const FitPoint& point, std::vector<double>* record) {
   if (next_ >= records_.size()) return false;
-  if (records_[next_].first != HashPoint(point)) {
-    records_.resize(next_);  // another path from here on
+  const auto& numbers = records_[next_].second;
+  if (records_[next_].first != Hash(numbers.data(), sizeof(double) * numbers.size(), HashPoint(point))) {
+    records_.resize(next_);  // another path from here on, or a damaged record
     return false;
   }
   *record = records_[next_++].second;
@@ -95,7 +96,7 @@ bool Journal::Next(const FitPoint& point, std::vector<double>* record) {
 }
 
 void Journal::Append(const FitPoint& point, const std::vector<double>& record) {
-  const std::uint64_t head[2] = {HashPoint(point), record.size()};
+  const std::uint64_t head[2] = {Hash(record.data(), sizeof(double) * record.size(), HashPoint(point)), record.size()};
   std::fwrite(head, 8, 2, file_);
   std::fwrite(record.data(), 8, record.size(), file_);
   std::fflush(file_);

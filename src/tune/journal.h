@@ -1,4 +1,4 @@
-// What a fit has computed so far, so that an interrupted one goes on to the same result: every evaluation in order, with a hash of its point.
+// What a fit has computed so far, so that an interrupted one goes on to the same result: every evaluation or iteration in order, with a hash of its point and numbers.
 #ifndef GAPSCOPE_TUNE_JOURNAL_H_
 #define GAPSCOPE_TUNE_JOURNAL_H_
 

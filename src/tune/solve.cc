@@ -5,6 +5,8 @@
 #include <limits>
 #include <nlopt.hpp>
 
+#include "src/tune/journal.h"
+
 namespace gapscope {
 namespace {
 
@@ -49,103 +51,133 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
   return step;
 }
 
+// Where a Levenberg-Marquardt run is between two Jacobians: all that it takes to go on.
+struct LmState {
+  FitPoint point;
+  double cost = 0, damping = 0, difference = 0;
+  int quiet = 0, iterations = 0;
+  bool done = false;
+  Termination termination = Termination::kIterations;
+};
+
+std::vector<double> Pack(const LmState& s, std::size_t evaluations, std::size_t replays) {
+  std::vector<double> record = {s.cost, s.damping, s.difference, static_cast<double>(s.quiet), static_cast<double>(s.iterations), static_cast<double>(s.done), static_cast<double>(s.termination),
+                                static_cast<double>(evaluations), static_cast<double>(replays)};
+  record.insert(record.end(), s.point.y.begin(), s.point.y.end());
+  for (const auto& state : s.point.states) record.insert(record.end(), state.begin(), state.end());
+  return record;
+}
+
+void Unpack(const std::vector<double>& record, LmState* s, FitProblem* problem) {
+  s->cost = record[0], s->damping = record[1], s->difference = record[2];
+  s->quiet = static_cast<int>(record[3]), s->iterations = static_cast<int>(record[4]), s->done = record[5] != 0;
+  s->termination = static_cast<Termination>(static_cast<int>(record[6]));
+  problem->CountResumed(static_cast<std::size_t>(record[7]), static_cast<std::size_t>(record[8]));
+  std::size_t at = 9;
+  for (double& y : s->point.y) y = record[at++];
+  for (auto& state : s->point.states) {
+    for (double& x : state) x = record[at++];
+  }
+}
+
 // Moves on with the Jacobian of the last linearization, kept up by secant updates: a step costs one replay instead of one per column. Ends when a step
 // gains less than promised, or little: only a true Jacobian can tell the bottom.
-void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& options, std::vector<Eigen::VectorXd>& residuals, double* damping, SolveResult* result) {
+void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& options, LmState* s) {
   constexpr int kMostSteps = 8;
   constexpr double kPoorRatio = 0.2;  // of the promised gain
+  std::vector<Eigen::VectorXd> residuals;
   for (int i = 0; i < kMostSteps && !Late(options.deadline); ++i) {
-    const Linearization at = problem.Reduce(result->point, snapshot, false);
-    const Eigen::VectorXd step = BoundedStep(at, result->point, problem.low(), problem.high(), *damping);
-    const FitPoint trial = problem.Move(result->point, at, step);
+    const Linearization at = problem.Reduce(s->point, snapshot, false);
+    const Eigen::VectorXd step = BoundedStep(at, s->point, problem.low(), problem.high(), s->damping);
+    const FitPoint trial = problem.Move(s->point, at, step);
     const double cost = problem.CostAndResiduals(trial, &residuals);
-    if (!(cost < result->cost)) return;
-    const double gained = result->cost - cost, promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
-    problem.UpdateSecant(snapshot, result->point, trial, std::move(residuals));
-    result->point = trial;
-    result->cost = cost;
-    *damping = std::max(*damping * 0.3, kLeastDamping);
+    if (!(cost < s->cost)) return;
+    const double gained = s->cost - cost, promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
+    problem.UpdateSecant(snapshot, s->point, trial, std::move(residuals));
+    s->point = trial;
+    s->cost = cost;
+    s->damping = std::max(s->damping * 0.3, kLeastDamping);
     if (gained < 3 * options.tolerance * cost || gained < kPoorRatio * promised) return;
   }
 }
 
-SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
+// One Jacobian, and the steps made with it.
+void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
   constexpr double kMostDamping = 1e8, kSmallDamping = 1e-3, kWorthwhile = 0.1;
-  SolveResult result{.point = start, .cost = problem.Cost(start), .termination = Termination::kIterations};
-  if (!std::isfinite(result.cost)) {
-    result.termination = Termination::kNotSimulated;
-    return result;
+  Snapshot snapshot = problem.Differentiate(s->point, s->difference, options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll);
+  const Linearization at = problem.Reduce(s->point, snapshot, false);
+  const auto end = [&](Termination termination) { s->done = true, s->termination = termination; };
+  if (!at.valid) return end(Termination::kNotSimulated);
+  bool accepted = false, small = false, undamped = false;
+  for (int rejected = 0; s->damping <= kMostDamping && !Late(options.deadline); ++rejected) {
+    const Eigen::VectorXd step = BoundedStep(at, s->point, problem.low(), problem.high(), s->damping);
+    // More damping only makes the step smaller: what it promises must be worth the replay.
+    const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
+    if (rejected >= 2 && promised < kWorthwhile * options.tolerance * s->cost) break;
+    const FitPoint trial = problem.Move(s->point, at, step);
+    std::vector<Eigen::VectorXd> residuals;
+    const double cost = problem.CostAndResiduals(trial, &residuals);
+    if (cost < s->cost) {
+      small = s->cost - cost < options.tolerance * s->cost;
+      undamped = s->damping <= kSmallDamping;
+      s->damping = std::max(s->damping * 0.1, kLeastDamping);
+      accepted = true;
+      const bool go_on = options.secant && !small;
+      if (go_on) problem.UpdateSecant(snapshot, s->point, trial, std::move(residuals));
+      s->point = trial;
+      s->cost = cost;
+      if (go_on) SecantSteps(problem, snapshot, options, s);
+      break;
+    }
+    s->damping = s->damping < 1e-3 ? 1e-3 : s->damping * 8;
   }
+  ++s->iterations;
+  if (accepted && !small) {
+    s->quiet = 0;
+    return;
+  }
+  // Done with this finite difference: the finer one sees the bottom better.
+  if (s->difference > options.fine_step) {
+    s->difference = options.fine_step;
+    s->damping = std::min(s->damping, options.damping);
+    return;
+  }
+  // A small step means the bottom when it was hardly damped, or when it happens again and again (a narrow valley).
+  if (accepted && ++s->quiet < (undamped ? 1 : 3)) return;
+  end(accepted || s->iterations > 1 ? Termination::kConverged : Termination::kStalled);
+}
+
+SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
+  LmState s{.point = start, .cost = problem.Cost(start), .damping = options.damping, .difference = options.coarse_step};
   const bool any_state = std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
-  if (start.y.size() == 0 && !any_state) {
-    result.termination = Termination::kConverged;
-    return result;
-  }
-  const auto columns = options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll;
-  const bool secant = options.secant && !problem.journaled();
-  double damping = options.damping, difference = options.coarse_step;
-  int quiet = 0;
-  for (; result.iterations < options.max_iterations; ++result.iterations) {
-    if (Late(options.deadline)) {
-      result.termination = Termination::kBudget;
-      return result;
-    }
-    if (options.hopeless && options.hopeless(result.cost, result.iterations)) {
-      result.termination = Termination::kHopeless;
-      return result;
-    }
-    Snapshot snapshot;
-    Linearization at;
-    if (secant) {
-      snapshot = problem.Differentiate(result.point, difference, columns);
-      at = problem.Reduce(result.point, snapshot, false);
-    } else {
-      at = problem.Linearize(result.point, difference, columns);
-    }
-    if (!at.valid) {
-      result.termination = Termination::kNotSimulated;
-      return result;
-    }
-    bool accepted = false, small = false, undamped = false;
-    for (int rejected = 0; damping <= kMostDamping && !Late(options.deadline); ++rejected) {
-      const Eigen::VectorXd step = BoundedStep(at, result.point, problem.low(), problem.high(), damping);
-      // More damping only makes the step smaller: what it promises must be worth the replay.
-      const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
-      if (rejected >= 2 && promised < kWorthwhile * options.tolerance * result.cost) break;
-      const FitPoint trial = problem.Move(result.point, at, step);
-      std::vector<Eigen::VectorXd> residuals;
-      const double cost = secant ? problem.CostAndResiduals(trial, &residuals) : problem.Cost(trial);
-      if (cost < result.cost) {
-        small = result.cost - cost < options.tolerance * result.cost;
-        undamped = damping <= kSmallDamping;
-        damping = std::max(damping * 0.1, kLeastDamping);
-        accepted = true;
-        if (secant && !small) problem.UpdateSecant(snapshot, result.point, trial, std::move(residuals));
-        result.point = trial;
-        result.cost = cost;
-        if (secant && !small) SecantSteps(problem, snapshot, options, residuals, &damping, &result);
+  if (!std::isfinite(s.cost)) {
+    s.termination = Termination::kNotSimulated;
+  } else if (start.y.size() == 0 && !any_state) {
+    s.termination = Termination::kConverged;
+  } else {
+    while (s.iterations < options.max_iterations && !s.done) {
+      std::vector<double> record;
+      if (problem.journal() && problem.journal()->Next(s.point, &record)) {
+        Unpack(record, &s, &problem);
+        continue;
+      }
+      if (Late(options.deadline)) {
+        s.termination = Termination::kBudget;
         break;
       }
-      damping = damping < 1e-3 ? 1e-3 : damping * 8;
+      if (options.hopeless && options.hopeless(s.cost, s.iterations)) {
+        s.termination = Termination::kHopeless;
+        break;
+      }
+      const FitPoint before = s.point;
+      const std::size_t evaluations = problem.evaluations(), replays = problem.replays();
+      Iterate(problem, options, &s);
+      if (options.progress) options.progress({.best = s.cost, .evaluations = problem.evaluations(), .iteration = s.iterations});
+      // An iteration that the deadline cut short is made anew.
+      if (problem.journal() && !Late(options.deadline)) problem.journal()->Append(before, Pack(s, problem.evaluations() - evaluations, problem.replays() - replays));
     }
-    if (options.progress) options.progress({.best = result.cost, .evaluations = problem.evaluations(), .iteration = result.iterations});
-    if (accepted && !small) {
-      quiet = 0;
-      continue;
-    }
-    // Done with this finite difference: the finer one sees the bottom better.
-    if (difference > options.fine_step) {
-      difference = options.fine_step;
-      damping = std::min(damping, options.damping);
-      continue;
-    }
-    // A small step means the bottom when it was hardly damped, or when it happens again and again (a narrow valley).
-    if (accepted && ++quiet < (undamped ? 1 : 3)) continue;
-    result.termination = accepted || result.iterations > 0 ? Termination::kConverged : Termination::kStalled;
-    ++result.iterations;
-    return result;
   }
-  return result;
+  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations};
 }
 
 // What NLopt's callbacks share. Nothing may be thrown through NLopt's C code.

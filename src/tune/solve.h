@@ -31,7 +31,7 @@ struct SolveOptions {
   double coarse_step = 0.05, fine_step = 0.01;  // finite differences, in search coordinates: first coarse, once converged fine
   double damping = 1e-2;         // LM: of the first step, relative to the diagonal
   bool central = false;          // LM: central differences, whose columns of parameters that only act as a ratio are parallel
-  bool secant = true;            // LM, without a journal: between two Jacobians, steps with secant updates of the last one
+  bool secant = true;            // LM: between two Jacobians, steps with secant updates of the last one
   std::function<bool(double cost, int iteration)> hopeless;  // asked before each Jacobian; true ends the fit
   Deadline deadline;
   unsigned long seed = 0;

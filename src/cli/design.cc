@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "src/cli/commands.h"
+#include "src/cli/feedback.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
 #include "src/report/design_report.h"
@@ -289,6 +290,8 @@ void AddDesign(CLI::App& program, Run& run) {
   add_input("triangle", WaveShape::kTriangle, "Triangle wave, rehearsed on the nominal model");
   add_input("multisine", WaveShape::kMultisine, "Up to 24 sines at once, rehearsed on the nominal model");
   add_input("square", WaveShape::kSquare, "Square wave (0.63 s: the flexible joint's), rehearsed on the nominal model");
+
+  AddFeedback(*design, run);
 
   auto optimal = std::make_shared<OptimalFlags>();
   optimal->rig.duration_s = 6;

@@ -1,12 +1,14 @@
 #include <fmt/core.h>
 
 #include <filesystem>
+#include <optional>
 #include <limits>
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
+#include "src/report/closed_loop_report.h"
 #include "src/report/replay_report.h"
 #include "src/tune/tune.h"
 
@@ -27,11 +29,16 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   ReplayOptions options{.mode = session.experiment.replay.mode, .window_s = session.experiment.replay.window_s, .time_step_s = flags.time_step_s, .values = session.values};
   if (flags.mode == "free_run") options.mode = ReplayMode::kFreeRun;
   if (flags.mode == "windows") options.mode = ReplayMode::kWindows;
-  if (flags.mode == "closed_loop") {
-    return Error{.what = "no controller is described", .where = flags.model.experiment, .actual = "--mode closed_loop", .allowed = "free_run, windows"};
-  }
+  if (flags.mode == "closed_loop") options.mode = ReplayMode::kClosedLoop;
   if (flags.window_s > 0) options.window_s = flags.window_s;
-  ReplayResult result = Replay(*session.model, session.recordings, options, *session.pool);
+  std::optional<ControllerSpec> controller;
+  ClosedLoopResult closed;
+  if (options.mode == ReplayMode::kClosedLoop) {
+    if (flags.nuisances) return Error{.what = "in a closed loop nothing is fitted", .where = "--nuisances", .cure = "leave it out, or replay in windows"};
+    GS_ASSIGN(controller, LoadController(session.experiment));
+    GS_ASSIGN(closed, ReplayClosedLoop(*session.model, session.recordings, *controller, options, *session.pool));
+  }
+  ReplayResult result = controller ? closed.result : Replay(*session.model, session.recordings, options, *session.pool);
   if (flags.nuisances) {
     const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
     result.logs = Evaluate(*session.model, session.recordings, session.values, std::nullopt, options.mode, fit, *session.pool);
@@ -49,7 +56,12 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   if (changed) {
     ReplayOptions nominal_options = options;
     nominal_options.values = nominal->Nominal();
-    before = Replay(*nominal, session.recordings, nominal_options, *session.pool).logs;
+    if (controller) {
+      GS_ASSIGN(auto nominal_loop, ReplayClosedLoop(*nominal, session.recordings, *controller, nominal_options, *session.pool));
+      before = std::move(nominal_loop.result.logs);
+    } else {
+      before = Replay(*nominal, session.recordings, nominal_options, *session.pool).logs;
+    }
   }
   const ReplayReport report{.result = result, .comparison = comparison, .model = *session.model, .values = session.values, .seed = flags.common.seed, .other_error = other_error,
                             .nominal_error = changed ? ReplayError(before) : std::numeric_limits<double>::quiet_NaN()};
@@ -64,10 +76,16 @@ Result<int> RunReplay(const ReplayFlags& flags) {
     predictions.push_back({changed ? "with what was added" : "nominal", result.logs});
     GS_RETURN_IF_ERROR(WriteReport(out, ReplayJson(report), session.experiment, {session.recordings, {}}, std::move(predictions), *session.model, session.values, session.model->parameters()));
   }
+  const std::string json = controller ? WithStatistics(ReplayJson(report), closed, session.recordings, *controller) : ReplayJson(report);
+  if (controller && !flags.common.out.empty()) {
+    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json", json + "\n"));
+    GS_RETURN_IF_ERROR(WriteSent(std::filesystem::path(flags.common.out) / "closed_loop", closed, session.recordings, *controller));
+  }
   if (flags.common.json) {
-    fmt::print("{}\n", ReplayJson(report));
+    fmt::print("{}\n", json);
   } else {
     fmt::print("{}", ReplayTable(report, ConsoleOf(1)));
+    if (controller) fmt::print("{}", StatisticsTable(closed, session.recordings, *controller));
   }
   if (flags.fail_above > 0 && !(comparison.error <= flags.fail_above)) {
     if (!flags.common.quiet) fmt::print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", comparison.error, flags.fail_above);

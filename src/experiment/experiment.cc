@@ -243,6 +243,7 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   const std::vector<YAML::Node> commands = map.List("commands"), limits = map.List("limits");
   const YAML::Node log = map.Child("log"), values = map.Child("values"), measured = map.Child("measured"),
                    parameters = map.Child("parameters"), set = map.Child("set"), replay = map.Child("replay");
+  map.Child("controller");  // LoadController of replay/controller.h reads it
   GS_RETURN_IF_ERROR(map.Finish());
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   experiment.model_path = (folder / model).lexically_normal().string();

@@ -85,6 +85,25 @@ TEST_F(DesignCliTest, OptimalPrintsACommandThatWorks) {
   EXPECT_TRUE(std::filesystem::exists(scratch_.Path("input.csv")));
 }
 
+// The Qube report's law and poles (docs/results_documents.md), with the arm of 0.04 kg that its gains imply.
+TEST_F(DesignCliTest, StateFeedbackOfTheQubeReport) {
+  const std::string up = Rig("qube") + " --at pendulum=3.141592653589793 --set arm.mass=0.04 --json";
+  const Answer lqr = Run("lqr " + up + " --q 10,10,1,10 --r 1");
+  ASSERT_EQ(lqr.status, 0) << lqr.err;
+  const auto json = nlohmann::json::parse(lqr.out);
+  EXPECT_EQ(json["schema"], "gapscope.design.feedback/1");
+  EXPECT_NEAR(json["gain"][0].get<double>(), -std::sqrt(10.0), 1e-4);  // sqrt(q / r): printed as 3.1623
+  EXPECT_NEAR(json["gain"][1].get<double>(), 53.2574, 0.01 * 53.2574);
+  EXPECT_NEAR(json["closed_loop_poles"][3][0].get<double>(), -115.67, 0.01 * 115.67);
+  const Answer poles = Run("poles " + up + " --poles=-2,-2.2,-15,-115");
+  ASSERT_EQ(poles.status, 0) << poles.err;
+  EXPECT_NEAR(nlohmann::json::parse(poles.out)["gain"][1].get<double>(), 74.6922, 0.01 * 74.6922);
+  EXPECT_EQ(Run("poles " + up + " --poles=-2,-3+4i,-15,-115").status, 2);
+  EXPECT_EQ(Run("poles " + up + " --poles=-2,x,-15,-115").status, 2);
+  EXPECT_EQ(Run("lqr " + up + " --q 1,2").status, 2);
+  EXPECT_EQ(Run("lqr " + Rig("qube") + " --at pendulum=1 --q 1,1,1,1").status, 2);
+}
+
 TEST_F(DesignCliTest, BadArgumentsAreBadInput) {
   const std::string rig = Rig("flexjoint");
   for (const std::string& arguments : {std::string("chirp"), std::string("chirp --inertia-kg-m2 nan --natural-frequency-hz 5 --damping-ratio 1 --speed-limit-rpm 100"),

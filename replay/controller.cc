@@ -1,0 +1,189 @@
+#include "replay/controller.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "src/experiment/yaml_reader.h"
+
+namespace gapscope {
+namespace {
+
+template <class List>
+std::size_t IndexOf(const List& inputs, const std::string& name) {
+  return static_cast<std::size_t>(std::find_if(inputs.begin(), inputs.end(), [&](const auto& i) { return i.name == name; }) - inputs.begin());
+}
+
+Status ReadInputs(YamlMap& map, const std::string& path, const Experiment& experiment, ControllerSpec* spec) {
+  for (const YAML::Node& item : map.List("inputs")) {
+    YamlMap one(item, path, "an input of the controller");
+    ControllerInput input{.name = one.Text("name"), .signal = one.Text("signal"), .scale = one.Number("scale", 1), .offset = one.Number("add", 0)};
+    const bool known = std::any_of(experiment.measured.begin(), experiment.measured.end(), [&](const auto& m) { return m.signal == input.signal; });
+    if (!known) one.Fail(item, {.what = "the controller reads a signal that is not measured", .actual = "'" + input.signal + "'"});
+    GS_RETURN_IF_ERROR(one.Finish());
+    spec->inputs.push_back(std::move(input));
+  }
+  return Ok();
+}
+
+Status ReadTerms(YamlMap& map, const std::string& path, ControllerSpec* spec) {
+  for (const YAML::Node& item : map.List("terms")) {
+    YamlMap one(item, path, "a term of the controller");
+    ControllerTerm term{.input = one.Text("input"), .proportional = one.Number("proportional", 0), .integral = one.Number("integral", 0), .derivative = one.Number("derivative", 0),
+                        .filter_rad_per_s = one.Number("filter_rad_per_s", 100), .integral_limit = one.Number("integral_limit", 0), .to = one.Text("to", "")};
+    for (const std::string& name : {term.input, term.to}) {
+      if (!name.empty() && IndexOf(spec->inputs, name) == spec->inputs.size()) one.Fail(item, {.what = "a term of an input that is not there", .actual = "'" + name + "'"});
+    }
+    if (!(term.filter_rad_per_s > 0) || term.integral_limit < 0) one.Fail(item, {.what = "'filter_rad_per_s' must be above zero, 'integral_limit' not below"});
+    GS_RETURN_IF_ERROR(one.Finish());
+    spec->terms.push_back(std::move(term));
+  }
+  return Ok();
+}
+
+Status ReadSwingUp(const YAML::Node& node, const std::string& path, ControllerSpec* spec) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap one(node, path, "'swing_up'");
+  SwingUp swing{.input = one.Text("input"), .catch_rad = one.Number("catch_rad"), .drop_rad = one.Number("drop_rad", 0), .gain = one.Number("gain"), .inertia_kg_m2 = one.Number("inertia_kg_m2"),
+                .torque_n_m = one.Number("torque_n_m"), .filter_rad_per_s = one.Number("filter_rad_per_s", 100), .limit = one.Number("limit", 0)};
+  if (IndexOf(spec->inputs, swing.input) == spec->inputs.size()) one.Fail(node, {.what = "a swing-up of an input that is not there", .actual = "'" + swing.input + "'"});
+  if (swing.drop_rad == 0) swing.drop_rad = 2 * swing.catch_rad;
+  if (!(swing.catch_rad > 0 && swing.drop_rad >= swing.catch_rad && swing.inertia_kg_m2 > 0 && swing.torque_n_m > 0 && swing.filter_rad_per_s > 0 && swing.limit >= 0)) {
+    one.Fail(node, {.what = "'catch_rad', 'inertia_kg_m2', 'torque_n_m' and 'filter_rad_per_s' are above zero, 'drop_rad' is not below 'catch_rad'"});
+  }
+  GS_RETURN_IF_ERROR(one.Finish());
+  spec->swing_up = std::move(swing);
+  return Ok();
+}
+
+}  // namespace
+
+Result<ControllerSpec> LoadController(const Experiment& experiment) {
+  const std::string& path = experiment.path;
+  GS_ASSIGN(const YAML::Node root, ReadYaml(path));
+  const YAML::Node node = root["controller"];
+  if (!node.IsDefined()) {
+    return Error{.what = "no controller is described", .where = path, .cure = "add 'controller:' (docs/experiment.md), or replay in free_run or windows"};
+  }
+  YamlMap map(node, path, "'controller'");
+  ControllerSpec spec{.actuator = map.Text("actuator"), .sample_s = map.Number("sample_s", 0), .limit = map.Number("limit", 0), .inputs = {}, .references = {}, .feedforward = map.Text("feedforward", ""), .terms = {}, .swing_up = {}};
+  if (spec.sample_s < 0 || spec.limit < 0) map.Fail(node, {.what = "'sample_s' and 'limit' are not negative"});
+  if (std::none_of(experiment.commands.begin(), experiment.commands.end(), [&](const auto& c) { return c.actuator == spec.actuator; })) {
+    map.Fail(node, {.what = "the controller drives an actuator without a command", .actual = "'" + spec.actuator + "'", .cure = "name one of 'commands:'"});
+  }
+  GS_RETURN_IF_ERROR(ReadInputs(map, path, experiment, &spec));
+  if (const YAML::Node references = map.Child("references"); references.IsDefined()) {
+    YamlMap names(references, path, "'references'");
+    for (const auto& pair : references) {
+      if (!pair.first.IsScalar()) break;
+      const std::string name = pair.first.Scalar();
+      if (IndexOf(spec.inputs, name) == spec.inputs.size()) names.Fail(pair.first, {.what = "a reference for an input that is not there", .actual = "'" + name + "'"});
+      spec.references[name] = names.Text(name.c_str());
+    }
+    GS_RETURN_IF_ERROR(names.Finish());
+  }
+  GS_RETURN_IF_ERROR(ReadTerms(map, path, &spec));
+  GS_RETURN_IF_ERROR(ReadSwingUp(map.Child("swing_up"), path, &spec));
+  if (spec.terms.empty()) map.Fail(node, {.what = "the controller has no 'terms'"});
+  GS_RETURN_IF_ERROR(map.Finish());
+  return spec;
+}
+
+Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment& experiment, const Recording& recording) {
+  Controller controller;
+  controller.spec_ = spec;
+  controller.recording_ = &recording;
+  for (std::size_t c = 0; c < recording.commands.size(); ++c) {
+    if (recording.commands[c].actuator == spec.actuator) controller.command_ = c;
+  }
+  std::optional<Log> log;
+  const auto bind = [&](const std::string& text, const std::string& what) -> Result<Source> {
+    Source source;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), source.constant);
+    if (parsed.ec == std::errc() && parsed.ptr == text.data() + text.size() && std::isfinite(source.constant)) return source;
+    if (!log) {
+      GS_ASSIGN(log, ReadLog(recording.log_path, experiment.read));
+    }
+    const Column* column = log->Find(text);
+    if (!column) return Error{.what = what + " is neither a column of the log nor a number", .where = recording.log_path, .actual = "'" + text + "'", .cure = "see 'controller:' in " + experiment.path};
+    GS_ASSIGN(source.column, ExtractColumn(*log, recording.timeline, *column, {.factor = 1, .offset = 0, .missing = experiment.timeline.missing}, nullptr));
+    return source;
+  };
+  for (const auto& input : spec.inputs) {
+    const auto signal = std::find_if(recording.measured.begin(), recording.measured.end(), [&](const auto& m) { return m.spec.signal == input.signal; });
+    if (signal == recording.measured.end()) return Error{.what = "the controller reads a signal that the log lacks", .where = recording.log_path, .actual = "'" + input.signal + "'"};
+    Input bound{.signal = static_cast<std::size_t>(signal - recording.measured.begin()), .scale = input.scale, .offset = input.offset, .reference = {}};
+    if (const auto reference = spec.references.find(input.name); reference != spec.references.end()) {
+      GS_ASSIGN(bound.reference, bind(reference->second, "the reference of '" + input.name + "'"));
+    }
+    controller.inputs_.push_back(std::move(bound));
+  }
+  for (const auto& term : spec.terms) controller.terms_.push_back({.spec = term, .input = IndexOf(spec.inputs, term.input), .to = term.to.empty() ? -1 : static_cast<int>(IndexOf(spec.inputs, term.to))});
+  if (!spec.feedforward.empty()) {
+    GS_ASSIGN(controller.feedforward_, bind(spec.feedforward, "the feedforward"));
+  }
+  if (spec.swing_up) controller.swing_input_ = IndexOf(spec.inputs, spec.swing_up->input);
+  controller.errors_.resize(controller.inputs_.size());
+  controller.Reset(Start::kZero);
+  return controller;
+}
+
+void Controller::Reset(Start start) {
+  for (auto& term : terms_) term.last_error = term.derivative = term.integral = 0;
+  law_ = sent_ = swing_angle_ = swing_speed_ = last_s_ = 0;
+  next_s_ = -std::numeric_limits<double>::infinity();
+  first_ = true, start_ = start, caught_ = !spec_.swing_up.has_value();
+}
+
+double Controller::Evaluate(Term& term, double error, double period_s) const {
+  const double n = term.spec.filter_rad_per_s;
+  if (first_ && start_ == Start::kSettled) term.last_error = error;
+  term.derivative = (n * (error - term.last_error) + term.derivative) / (1 + n * period_s);
+  term.last_error = error;
+  term.integral += term.spec.integral * error * period_s;
+  if (term.spec.integral_limit > 0) term.integral = std::clamp(term.integral, -term.spec.integral_limit, term.spec.integral_limit);
+  return term.spec.proportional * error + term.integral + term.spec.derivative * term.derivative;
+}
+
+double Controller::Swing(double reading, double period_s) {
+  const SwingUp& swing = *spec_.swing_up;
+  const double angle = std::remainder(reading, 2 * std::numbers::pi), turned = first_ ? 0 : std::remainder(angle - swing_angle_, 2 * std::numbers::pi);
+  swing_speed_ = (swing.filter_rad_per_s * turned + swing_speed_) / (1 + swing.filter_rad_per_s * period_s);
+  swing_angle_ = angle;
+  caught_ = std::abs(angle) < (caught_ ? swing.drop_rad : swing.catch_rad);
+  const double energy = 0.5 * swing.inertia_kg_m2 * swing_speed_ * swing_speed_ + swing.torque_n_m * (std::cos(angle) - 1);
+  const double direction = swing_speed_ * std::cos(angle);
+  // Hanging at rest no direction is better: a push.
+  return swing.gain * -energy * (direction < 0 ? -1 : 1);
+}
+
+double Controller::Step(std::size_t row, std::span<const double> readings) {
+  const double now = recording_->time_s[row];
+  if (now < next_s_ - 1e-9) return sent_;
+  const double period = spec_.sample_s > 0 ? spec_.sample_s : recording_->timeline.median_step_s;
+  next_s_ = spec_.sample_s > 0 ? (first_ ? now : next_s_) + spec_.sample_s : now;
+  for (std::size_t i = 0; i < inputs_.size(); ++i) errors_[i] = inputs_[i].reference.At(row) - (inputs_[i].scale * readings[inputs_[i].signal] + inputs_[i].offset);
+  double limit = spec_.limit, pumped = 0;
+  if (spec_.swing_up) pumped = Swing(inputs_[swing_input_].scale * readings[inputs_[swing_input_].signal] + inputs_[swing_input_].offset, period);
+  // Outer loops first: what they ask for moves the inner references.
+  for (auto& term : terms_) {
+    if (term.to >= 0) errors_[static_cast<std::size_t>(term.to)] += Evaluate(term, errors_[term.input], period);
+  }
+  law_ = 0;
+  for (auto& term : terms_) {
+    if (term.to < 0) law_ += Evaluate(term, errors_[term.input], period);
+  }
+  if (!caught_) {
+    law_ = pumped;
+    if (spec_.swing_up->limit > 0) limit = limit > 0 ? std::min(limit, spec_.swing_up->limit) : spec_.swing_up->limit;
+    for (auto& term : terms_) term.integral = 0;
+  }
+  first_ = false;
+  sent_ = law_ + feedforward_.At(row);
+  if (limit > 0) sent_ = std::clamp(sent_, -limit, limit);
+  return sent_;
+}
+
+}  // namespace gapscope

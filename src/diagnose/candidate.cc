@@ -67,9 +67,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
   constexpr int kFairTry = 6;
   constexpr double kFarBehind = 5;
   if (rival_cost > 0) options.hopeless = [=](double cost, int iteration) { return iteration >= kFairTry && cost > kFarBehind * rival_cost; };
-  const auto t0=std::chrono::steady_clock::now(); const auto r0=candidate->problem->replays();
   const SolveResult solved = Solve(*candidate->problem, start, options);
-  if(getenv("TRACE")) fprintf(stderr,"TRACE fit %s: cost %g it %d term %s replays %zu  %.2f s\n",candidate->Name().c_str(),solved.cost,solved.iterations,TerminationText(solved.termination).c_str(),candidate->problem->replays()-r0,std::chrono::duration<double>(std::chrono::steady_clock::now()-t0).count());
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
   candidate->converged = solved.termination == Termination::kConverged;

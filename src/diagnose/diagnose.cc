@@ -217,7 +217,6 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   }
   for (std::size_t i = 0; i < noise.size(); ++i) bench.weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
   bench.time_step_s = ChooseTimeStep(*model, data.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool).step_s;
-  if (getenv("TRACE")) fprintf(stderr, "TRACE step %g sample %g rows %zu of %zu, windows\n", bench.time_step_s, bench.sample_s, data.train[0].rows(), fine.train[0].rows());
   if (options.budget_s > 0) bench.deadline = begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
   const Say say = options.progress ? options.progress : [](const std::string&) {};
   GS_ASSIGN(const SearchResult found, Search(bench, !data.asked, say));

@@ -80,7 +80,7 @@ void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   std::size_t tried = 0;
   for (std::size_t i = 1; i < layer->children.size() && tried < kMost && !Late(bench); ++i) {
     Candidate& rival = *layer->children[i];
-    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) || rival.train_cost < 1.02 * leader.train_cost) continue;
+    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) || (rival.train_cost < 1.02 * leader.train_cost && !Contains(rival, leader))) continue;
     const Trial trial = TryEffect(bench, rival, rival.effects.back(), *parent.problem, at, snapshot);
     if (!trial.valid) continue;
     ++tried;

@@ -290,30 +290,35 @@ ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& paren
   }
   test.valid = true;
   if (!(raw > 0)) return test;
-  // A coordinate on its bound cannot answer by going further: the nuisance shift of a command that is later than one sample.
+  // A coordinate on its bound cannot go further: the nuisance shift of a command that is later than one sample. Those that push outward already are
+  // held; one that the column would pull back inside is let go, one that it would push out is held too.
+  std::vector<int> bound(static_cast<std::size_t>(n), 0);  // 1: on its upper bound, -1: on its lower one
   std::vector<char> fixed(static_cast<std::size_t>(n), 0);
-  Eigen::VectorXd answer;
-  double left = 0, pull = 0;
-  for (bool again = true; again;) {
-    again = false;
-    answer = SolveFree(base.linearization.hessian, cross, fixed);
-    left = square - cross.dot(answer);
-    pull = slope - answer.dot(base.linearization.gradient);
+  const Eigen::VectorXd& gradient = base.linearization.gradient;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double edge = 1e-6 * (parent.high_[i] - parent.low_[i]);
+    const auto k = static_cast<std::size_t>(i);
+    bound[k] = parent_point.y[i] >= parent.high_[i] - edge ? 1 : parent_point.y[i] <= parent.low_[i] + edge ? -1 : 0;
+    fixed[k] = bound[k] != 0 && bound[k] * gradient[i] < 0;
+  }
+  constexpr int kRounds = 8;
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::VectorXd answer = SolveFree(base.linearization.hessian, cross, fixed);
+    const double left = square - cross.dot(answer), pull = slope - answer.dot(gradient);
     constexpr double kLeast = 1e-6;  // of the column: below it is rounding
     test.absorbed = std::clamp(1 - left / raw, 0.0, 1.0);
-    if (!(left > kLeast * raw)) {
-      test.scale = test.drop = 0;
-      test.dy = Eigen::VectorXd::Zero(n);
-    } else {
-      test.scale = std::clamp(-pull / left, 0.0, 2.0);
-      test.drop = -(test.scale * pull + 0.5 * test.scale * test.scale * left);
-      test.dy = -(test.scale * answer);
-    }
+    const bool seen = left > kLeast * raw;
+    test.scale = seen ? std::clamp(-pull / left, 0.0, 2.0) : 0;
+    test.drop = -(test.scale * pull + 0.5 * test.scale * test.scale * left);
+    test.dy = -(test.scale * answer);
+    bool again = false;
+    const Eigen::VectorXd slopes = gradient + test.scale * (cross - base.linearization.hessian * answer);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const double edge = 1e-6 * (parent.high_[i] - parent.low_[i]);
-      const bool outward = (parent_point.y[i] >= parent.high_[i] - edge && answer[i] < 0) || (parent_point.y[i] <= parent.low_[i] + edge && answer[i] > 0);
-      if (outward && !fixed[static_cast<std::size_t>(i)]) fixed[static_cast<std::size_t>(i)] = 1, again = true;
+      const auto k = static_cast<std::size_t>(i);
+      const bool hold = fixed[k] ? bound[k] * slopes[i] <= 0 : bound[k] * test.dy[i] > 0;
+      if (bound[k] != 0 && hold != (fixed[k] != 0)) fixed[k] = hold, again = true;
     }
+    if (!again) break;
   }
   return test;
 }

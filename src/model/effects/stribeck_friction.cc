@@ -7,9 +7,9 @@ Effect Effect_stribeck_friction() {
       .name = "stribeck_friction",
       .place = EffectPlace::kJoint,
       .parameters = {
-          {.key = "friction_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1, .start = 0.02},
-          {.key = "breakaway_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1.5, .trials = {0.03, 0.1}, .start = 0.05},
-          {.key = "stribeck_speed_rad_per_s", .unit = "rad/s", .scale = ScaleKind::kSpeed, .neutral = 0.05, .low = 0.001, .high = 1, .start = 0.05},
+          {.key = "friction_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1, .trials = {0.01, 0.04}, .start = 0.02},
+          {.key = "breakaway_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1.5, .trials = {0.02, 0.08}, .start = 0.05},
+          {.key = "stribeck_speed_rad_per_s", .unit = "rad/s", .scale = ScaleKind::kSpeed, .neutral = 0.05, .low = 0.001, .high = 1, .trials = {0.02, 0.1}, .start = 0.05},
       },
       .meaning = "dry friction with a hump at low speed",
       .signature = "hump at low speed, stick-slip",

@@ -174,5 +174,53 @@ TEST(FitProblemTest, MissingSamplesAreLeftOut) {
   EXPECT_NEAR(problem.Values(found.point)[0], 1.2, 1e-3);
 }
 
+// On a linear problem a secant step leaves a Jacobian that explains the step, and normal equations with the cost of the new point.
+TEST(FitProblemTest, SecantUpdateExplainsItsStep) {
+  const Rig rig = LoadRig("qube");
+  const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
+  const std::vector<Recording> logs = {MakeLog(rig, rig.Values({{"arm.damping", 3e-4}}), command, 2, 0.004, 2e-3, 1)};
+  ThreadPool pool(1);
+  FitProblem problem(*rig.model, logs, {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004}, rig.model->Nominal(), pool);
+  const FitPoint from = problem.Start();
+  Snapshot snapshot = problem.Differentiate(from, 0.01, FitProblem::Columns::kAll);
+  const std::vector<Eigen::VectorXd> before = snapshot.residuals;
+  FitPoint to = from;
+  to.y[0] += 0.05;
+  to.y[1] -= 0.3;
+  to.states[1][0] += 0.01;
+  std::vector<Eigen::VectorXd> after;
+  const double cost = problem.CostAndResiduals(to, &after);
+  const std::vector<Eigen::VectorXd> kept = after;
+  problem.UpdateSecant(snapshot, from, to, std::move(after));
+  for (std::size_t w = 0; w < problem.windows(); ++w) {
+    Eigen::VectorXd moved(snapshot.jacobians[w].cols());
+    moved << to.y - from.y, to.states[w] - from.states[w];
+    EXPECT_LT((snapshot.jacobians[w] * moved - (kept[w] - before[w])).norm(), 1e-9 * kept[w].norm()) << w;
+  }
+  EXPECT_NEAR(problem.Reduce(to, snapshot, false).cost, cost, 1e-12 * cost);
+}
+
+// A command later than one sample drives the nuisance shift onto its bound: the score test must still see what a delay would explain.
+TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
+  const Rig truth = LoadRig("flexlink", {"command_delay@motor"}), rig = LoadRig("flexlink");
+  const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
+  const std::vector<Recording> logs = {MakeLog(truth, truth.Values({{"command_delay@motor.delay_s", 0.012}}), command, 4, 0.004, 2e-4, 1)};
+  ThreadPool pool(2);
+  const FitOptions options{.free = {rig.Index("motor.torque_per_ampere"), rig.Index("hub.inertia"), rig.Index("link.stiffness")}, .time_step_s = 0.004};
+  FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
+  const FitPoint point = Solve(parent, parent.Start(), {.tolerance = 1e-5}).point;
+  EXPECT_NEAR(parent.Shift(point), 0.004, 1e-9);
+  const Snapshot base = parent.Capture(point, 0.01);
+  ASSERT_TRUE(base.valid);
+  FitOptions of_child = options;
+  of_child.free = {truth.Index("motor.torque_per_ampere"), truth.Index("hub.inertia"), truth.Index("link.stiffness"), truth.Index("command_delay@motor.delay_s")};
+  FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
+  const auto drop = [&](double delay_s) {
+    return child.TestColumn(child.FromParent(parent, point, truth.Values({{"command_delay@motor.delay_s", delay_s}}), {}), parent, point, base).drop / base.cost;
+  };
+  EXPECT_GT(drop(0.008), 0.3);
+  EXPECT_LT(drop(0.001), 0.01);  // earlier than the shift already is
+}
+
 }  // namespace
 }  // namespace gapscope::testing

@@ -1,6 +1,7 @@
 #include "src/diagnose/rules.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 namespace gapscope {
@@ -70,6 +71,19 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
 
 bool MayBeRivals(const Candidate& a, const Candidate& b) {
   return !Contains(a, b, true) && !Contains(b, a, true) && !a.at_bound && !b.at_bound;
+}
+
+bool IsLessLikely(const Candidate& a, const Candidate& b) {
+  if (a.effects.empty() || b.effects.size() != a.effects.size() || a.effects.back().effect != "gravity_offset" || b.effects.back().effect != "cable_spring" || a.effects.back().on != b.effects.back().on) return false;
+  const mjModel& m = a.model->compiled();
+  const int joint = mj_name2id(&m, mjOBJ_JOINT, a.effects.back().on.c_str());
+  if (joint < 0) return false;
+  const DataPtr data(mj_makeData(&m));
+  mj_kinematics(&m, data.get());
+  const double* axis = data->xaxis + 3 * joint;
+  const double along = axis[0] * m.opt.gravity[0] + axis[1] * m.opt.gravity[1] + axis[2] * m.opt.gravity[2];
+  constexpr double kUpright = 0.99;  // cosine
+  return std::abs(along) > kUpright * std::hypot(m.opt.gravity[0], m.opt.gravity[1], m.opt.gravity[2]);
 }
 
 }  // namespace gapscope

@@ -26,6 +26,10 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = 
 // Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.
 bool MayBeRivals(const Candidate& a, const Candidate& b);
 
+// Whether `a` is the less likely of two that explain the logs equally well: gravity on a joint whose axis stands upright, where only a tilted rig would
+// feel it, beside a cable.
+bool IsLessLikely(const Candidate& a, const Candidate& b);
+
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_DIAGNOSE_RULES_H_

@@ -7,6 +7,9 @@
 #include "src/diagnose/rules.h"
 
 namespace gapscope {
+
+bool AreRivals(const Candidate& a, const Candidate& b) { return !Convincing(Compare(b, a), kTold); }
+
 namespace {
 
 constexpr int kFirstIterations = 14, kFinalIterations = 20;
@@ -136,14 +139,14 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent) {
       if (!much || !Convincing(more, kNested)) best = child.get();
     } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
+    } else if (IsLessLikely(*best, *child) && AreRivals(*best, *child)) {
+      best = child.get();
     }
   }
   return best;
 }
 
 }  // namespace
-
-bool AreRivals(const Candidate& a, const Candidate& b) { return !Convincing(Compare(b, a), kTold); }
 
 Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
   SearchResult result;

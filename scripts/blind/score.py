@@ -14,11 +14,6 @@ def load(folder, indices):
     return cases
 
 
-def same(a, b):
-    """Names of one effect at one place. The motor drives the first joint: one place, where an effect's name fits only one of the two."""
-    return a == b
-
-
 class Case:
     def __init__(self, index, label, verdict):
         self.index, self.label, self.verdict = index, label, verdict

@@ -20,7 +20,7 @@ struct TuneFlags {
   ModelFlags model;
   std::vector<std::string> hold_out, free, freeze, fixed_nuisances;
   std::string optimizer = "lm", objective = "both", normalization = "deviation";
-  double window_s = 0, budget_s = 0, time_step_s = 0, huber = 4;
+  double window_s = 0, budget_s = 0, time_step_s = 0, huber = 4, tolerance = 1e-4;
   int starts = 2;
   bool resume = false, actuator = false;
 };
@@ -50,6 +50,7 @@ Result<int> RunTune(TuneFlags flags) {
   const auto& names = OptimizerNames();
   options.solve.optimizer = static_cast<Optimizer>(std::find(names.begin(), names.end(), flags.optimizer) - names.begin());
   options.solve.seed = flags.common.seed;
+  options.solve.tolerance = flags.tolerance;
   options.objective = flags.objective == "windows" ? Objective::kWindows : flags.objective == "free_run" ? Objective::kFreeRun : Objective::kBoth;
   if (session.experiment.replay.mode == ReplayMode::kWindows && flags.objective == "both") options.objective = Objective::kWindows;
   for (const auto& nuisance : flags.fixed_nuisances) {
@@ -124,6 +125,7 @@ void AddTune(CLI::App& program, Run& run) {
       ->capture_default_str();
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
   command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")->check(FinitePositive());
+  command->add_option("--tolerance", flags->tolerance, "Stop when a step lowers the cost by less than this share")->check(CLI::Range(1e-9, 0.1))->capture_default_str();
   command->add_option("--huber", flags->huber, "Weigh residuals beyond this many standard deviations down; 0: plain squares")->check(CLI::NonNegativeNumber)->capture_default_str();
   command->add_option("--starts", flags->starts, "Starting points: the nominal values, then random ones")->check(CLI::Range(1, 1000))->capture_default_str();
   command->add_option("--budget", flags->budget_s, "Seconds; the best so far is reported when they are spent")->check(FinitePositive());

@@ -26,7 +26,7 @@ Eigen::VectorXd SolveFree(Eigen::MatrixXd hessian, Eigen::VectorXd right, const 
 Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns columns) {
   std::vector<double> record;
   if (journal_ && journal_->Next(point, &record)) {
-    CountDifferences(columns);
+    CountDifferences(columns, false);
     return Unpack(record);
   }
   const Snapshot snapshot = Differentiate(point, step, columns);
@@ -35,15 +35,16 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns 
   return result;
 }
 
-void FitProblem::CountDifferences(Columns columns) {
-  ++evaluations_;
+void FitProblem::CountDifferences(Columns columns, bool base_known) {
+  if (!base_known) ++evaluations_;
   const std::size_t parameters = columns == Columns::kStates ? 0 : coordinates_.size() * (columns == Columns::kCentral ? 2 : 1);
-  replays_ += 1 + parameters + (columns != Columns::kStates && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
+  replays_ += (base_known ? 0 : 1) + parameters + (columns != Columns::kStates && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
 }
 
-Snapshot FitProblem::Differentiate(const FitPoint& point, double step, Columns columns) {
-  CountDifferences(columns);
+Snapshot FitProblem::Differentiate(const FitPoint& point, double step, Columns columns, std::vector<Eigen::VectorXd> base) {
+  CountDifferences(columns, !base.empty());
   Snapshot snapshot;
+  snapshot.residuals = std::move(base);
   snapshot.residuals.resize(windows_.size());
   snapshot.jacobians.resize(windows_.size());
   std::vector<char> good(windows_.size(), 0);
@@ -60,8 +61,10 @@ bool FitProblem::DifferentiateWindow(Worker& worker, const FitWindow& window, co
   const bool all = columns != Columns::kStates;
   const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0, m = state.size();
   const double shift = Shift(point);
-  if (!Simulate(worker, window, point, values, state, shift, worker.base)) return false;
-  Residuals(window, point, worker.base, residual);
+  if (residual.size() == 0) {
+    if (!Simulate(worker, window, point, values, state, shift, worker.base)) return false;
+    Residuals(window, point, worker.base, residual);
+  }
   jacobian.setZero(residual.size(), n + m);
   const auto difference = [&](Eigen::Index column, double h, bool simulated) {
     if (!simulated) return false;

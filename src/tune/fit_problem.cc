@@ -248,14 +248,14 @@ double FitProblem::WindowCost(const Eigen::VectorXd& residual, const FitWindow& 
   return 0.5 * (cost + window.prior.cwiseProduct(state).squaredNorm());
 }
 
-double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs) {
+double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs, std::vector<Eigen::VectorXd>* residuals) {
   ++evaluations_;
   ++replays_;
-  if (!journal_) return CostNow(point, log_costs);
+  if (!journal_) return CostNow(point, log_costs, residuals);
   std::vector<double> record;
   if (!journal_->Next(point, &record)) {
     std::vector<double> costs;
-    record = {CostNow(point, &costs)};
+    record = {CostNow(point, &costs, residuals)};
     record.insert(record.end(), costs.begin(), costs.end());
     journal_->Append(point, record);
   }
@@ -267,6 +267,12 @@ double FitProblem::CostAndResiduals(const FitPoint& point, std::vector<Eigen::Ve
   ++evaluations_;
   ++replays_;
   return CostNow(point, nullptr, residuals);
+}
+
+std::vector<Eigen::VectorXd> FitProblem::ResidualsAgain(const FitPoint& point) {
+  std::vector<Eigen::VectorXd> residuals;
+  CostNow(point, nullptr, &residuals);
+  return residuals;
 }
 
 double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs, std::vector<Eigen::VectorXd>* residuals) {

@@ -119,17 +119,19 @@ class FitProblem {
   double Offset(const FitPoint& point, std::size_t log, std::size_t signal) const;
   double Shift(const FitPoint& point) const;
 
-  // Cost; infinity where a replay diverges. `log_costs` receives each log's part.
-  double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr);
-  // The same with each window's weighted residuals, which no journal keeps.
+  // Cost; infinity where a replay diverges. `log_costs` receives each log's part, `residuals` each window's weighted ones, unless the cost is the journal's.
+  double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr, std::vector<Eigen::VectorXd>* residuals = nullptr);
+  // The same, unknown to the journal.
   double CostAndResiduals(const FitPoint& point, std::vector<Eigen::VectorXd>* residuals);
+  // What the journal did not keep; not counted as a replay.
+  std::vector<Eigen::VectorXd> ResidualsAgain(const FitPoint& point);
   // `step`: finite difference in search coordinates. Columns of parameters, offsets and shift may be left out: the gradient and hessian are zero then.
   // kCentral: all, those of parameters by central differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns
   // that are parallel to rounding, which one-sided ones are not.
   enum class Columns { kAll, kStates, kCentral };
   Linearization Linearize(const FitPoint& point, double step, Columns columns = Columns::kAll);
-  // Linearize in two steps. Blocks of the gradient are made only when asked for.
-  Snapshot Differentiate(const FitPoint& point, double step, Columns columns);
+  // Linearize in two steps. `base`: the point's residuals where they are known. Blocks of the gradient are made only when asked for.
+  Snapshot Differentiate(const FitPoint& point, double step, Columns columns, std::vector<Eigen::VectorXd> base = {});
   Linearization Reduce(const FitPoint& point, const Snapshot& snapshot, bool with_blocks);
   // Moves a snapshot of `from` to `to`, whose residuals are known, without a replay: Broyden's rank-one update of each window's Jacobian
   // (Broyden, Mathematics of Computation 19, 1965).
@@ -166,7 +168,7 @@ class FitProblem {
   struct Worker;
   struct Scaling;
 
-  void CountDifferences(Columns columns);
+  void CountDifferences(Columns columns, bool base_known);
   bool DifferentiateWindow(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double step, Columns columns,
                            Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const;
   void ApplyRobustWeights(Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const;  // Huber's

@@ -10,7 +10,7 @@
 namespace gapscope {
 namespace {
 
-constexpr double kLeastDamping = 1e-9;
+constexpr double kLeastDamping = 1e-9, kSmallDamping = 1e-3;
 
 bool Late(const Deadline& deadline) { return deadline && std::chrono::steady_clock::now() >= *deadline; }
 
@@ -54,6 +54,7 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
 // Where a Levenberg-Marquardt run is between two Jacobians: all that it takes to go on.
 struct LmState {
   FitPoint point;
+  std::vector<Eigen::VectorXd> residuals;  // at the point; not journaled
   double cost = 0, damping = 0, difference = 0;
   int quiet = 0, iterations = 0;
   bool done = false;
@@ -69,6 +70,7 @@ std::vector<double> Pack(const LmState& s, std::size_t evaluations, std::size_t 
 }
 
 void Unpack(const std::vector<double>& record, LmState* s, FitProblem* problem) {
+  s->residuals.clear();
   s->cost = record[0], s->damping = record[1], s->difference = record[2];
   s->quiet = static_cast<int>(record[3]), s->iterations = static_cast<int>(record[4]), s->done = record[5] != 0;
   s->termination = static_cast<Termination>(static_cast<int>(record[6]));
@@ -93,18 +95,24 @@ void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& op
     const double cost = problem.CostAndResiduals(trial, &residuals);
     if (!(cost < s->cost)) return;
     const double gained = s->cost - cost, promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
-    problem.UpdateSecant(snapshot, s->point, trial, std::move(residuals));
+    problem.UpdateSecant(snapshot, s->point, trial, residuals);
     s->point = trial;
     s->cost = cost;
+    s->residuals = std::move(residuals);
     s->damping = std::max(s->damping * 0.3, kLeastDamping);
-    if (gained < 3 * options.tolerance * cost || gained < kPoorRatio * promised) return;
+    if (gained < kPoorRatio * promised) return;
+    if (gained < 3 * options.tolerance * cost) {
+      s->difference = options.fine_step;  // near the bottom, which the finer difference sees better
+      return;
+    }
   }
 }
 
 // One Jacobian, and the steps made with it.
 void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
-  constexpr double kMostDamping = 1e8, kSmallDamping = 1e-3, kWorthwhile = 0.1;
-  Snapshot snapshot = problem.Differentiate(s->point, s->difference, options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll);
+  constexpr double kMostDamping = 1e8, kWorthwhile = 0.1, kWorthwhileCoarse = 10;  // shares of the tolerance
+  Snapshot snapshot = problem.Differentiate(s->point, s->difference, options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll, std::move(s->residuals));
+  s->residuals = snapshot.residuals;
   const Linearization at = problem.Reduce(s->point, snapshot, false);
   const auto end = [&](Termination termination) { s->done = true, s->termination = termination; };
   if (!at.valid) return end(Termination::kNotSimulated);
@@ -113,7 +121,9 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
     const Eigen::VectorXd step = BoundedStep(at, s->point, problem.low(), problem.high(), s->damping);
     // More damping only makes the step smaller: what it promises must be worth the replay.
     const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
-    if (rejected >= 2 && promised < kWorthwhile * options.tolerance * s->cost) break;
+    // What little is left is for the finer difference to find.
+    const bool coarse = s->difference > options.fine_step;
+    if (rejected >= (coarse ? 1 : 2) && promised < (coarse ? kWorthwhileCoarse : kWorthwhile) * options.tolerance * s->cost) break;
     const FitPoint trial = problem.Move(s->point, at, step);
     std::vector<Eigen::VectorXd> residuals;
     const double cost = problem.CostAndResiduals(trial, &residuals);
@@ -122,10 +132,11 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
       undamped = s->damping <= kSmallDamping;
       s->damping = std::max(s->damping * 0.1, kLeastDamping);
       accepted = true;
-      const bool go_on = options.secant && !small;
-      if (go_on) problem.UpdateSecant(snapshot, s->point, trial, std::move(residuals));
+      const bool go_on = options.secant;
+      if (go_on) problem.UpdateSecant(snapshot, s->point, trial, residuals);
       s->point = trial;
       s->cost = cost;
+      s->residuals = std::move(residuals);
       if (go_on) SecantSteps(problem, snapshot, options, s);
       break;
     }
@@ -139,7 +150,7 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
   // Done with this finite difference: the finer one sees the bottom better.
   if (s->difference > options.fine_step) {
     s->difference = options.fine_step;
-    s->damping = std::min(s->damping, options.damping);
+    s->damping = std::min(s->damping, kSmallDamping);
     return;
   }
   // A small step means the bottom when it was hardly damped, or when it happens again and again (a narrow valley).
@@ -148,7 +159,8 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
 }
 
 SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
-  LmState s{.point = start, .cost = problem.Cost(start), .damping = options.damping, .difference = options.coarse_step};
+  LmState s{.point = start, .damping = options.damping, .difference = options.coarse_step};
+  s.cost = problem.Cost(start, nullptr, &s.residuals);
   const bool any_state = std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
   if (!std::isfinite(s.cost)) {
     s.termination = Termination::kNotSimulated;
@@ -170,6 +182,7 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
         break;
       }
       const FitPoint before = s.point;
+      if (s.residuals.empty()) s.residuals = problem.ResidualsAgain(s.point);  // resumed
       const std::size_t evaluations = problem.evaluations(), replays = problem.replays();
       Iterate(problem, options, &s);
       if (options.progress) options.progress({.best = s.cost, .evaluations = problem.evaluations(), .iteration = s.iterations});

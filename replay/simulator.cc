@@ -5,6 +5,7 @@
 #include <limits>
 #include <string_view>
 
+#include "replay/sensors.h"
 #include "src/plugins/motor/history.h"
 
 namespace gapscope {
@@ -166,38 +167,33 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       break;
     }
   }
-  DelaySignals(recording, window, predicted);
+  ApplySensors(recording, window, predicted);
   return result;
 }
 
-// A late sensor is an exact shift of the prediction: the cubic through the neighbouring stamps, read `delay` earlier. Offsets are added here too.
-void Simulator::DelaySignals(const Recording& recording, Window window, std::span<double> predicted) {
+void Simulator::ApplySensors(const Recording& recording, Window window, std::span<double> predicted) {
   const std::size_t signals = recording.measured.size(), rows = window.rows();
+  const std::span<const double> time(recording.time_s.data() + window.begin, rows);
   for (std::size_t s = 0; s < signals; ++s) {
-    const SignalSource& source = model_.source(recording.measured[s].index);
+    const auto& measured = recording.measured[s];
+    const SignalSource& source = model_.source(measured.index);
     const double delay = source.delay >= 0 ? values_[source.delay] : 0;
     const double offset = source.offset >= 0 ? values_[source.offset] : 0;
-    if (delay != 0 && rows > 1) {
-      if (column_.size() < rows) column_.resize(rows);
-      for (std::size_t r = 0; r < rows; ++r) column_[r] = predicted[r * signals + s];
-      const double* time = recording.time_s.data() + window.begin;
-      const auto slope = [&](std::size_t k) {
-        const std::size_t a = k > 0 ? k - 1 : 0, b = std::min(k + 1, rows - 1);
-        return (column_[b] - column_[a]) / (time[b] - time[a]);
-      };
-      std::size_t k = 0;
-      for (std::size_t r = 0; r < rows; ++r) {
-        const double t = time[r] - delay;
-        if (t <= time[0]) {
-          predicted[r * signals + s] = column_[0] + slope(0) * (t - time[0]);
-          continue;
-        }
-        while (k + 2 < rows && time[k + 1] <= t) ++k;
-        while (k > 0 && time[k] > t) --k;
-        const double h = time[k + 1] - time[k], x = (t - time[k]) / h;
-        const double a = column_[k], b = column_[k + 1], da = h * slope(k), db = h * slope(k + 1);
-        predicted[r * signals + s] = a + x * (da + x * (3 * (b - a) - 2 * da - db + x * (2 * (a - b) + da + db)));
+    if (rows > 1 && (delay != 0 || source.cutoff >= 0)) {
+      if (column_.size() < rows) column_.resize(rows), shaped_.resize(rows);
+      std::span<double> column(column_.data(), rows), shaped(shaped_.data(), rows);
+      for (std::size_t r = 0; r < rows; ++r) column[r] = predicted[r * signals + s];
+      if (source.cutoff >= 0) {
+        // What the filter held at the window's start is what was logged there.
+        const LocalFit held = FitLocally(recording, measured, window.begin, kInitialFitHalfWidth_s);
+        LowPass(time, column, {.cutoff_rad_per_s = values_[source.cutoff], .damping_ratio = values_[source.damping_ratio]}, held.value - offset, held.slope, shaped);
+        std::swap(column, shaped);
       }
+      if (delay != 0) {
+        Delay(time, column, delay, shaped);
+        std::swap(column, shaped);
+      }
+      for (std::size_t r = 0; r < rows; ++r) predicted[r * signals + s] = column[r];
     }
     if (offset != 0) {
       for (std::size_t r = 0; r < rows; ++r) predicted[r * signals + s] += offset;

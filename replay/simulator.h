@@ -46,7 +46,7 @@ class Simulator {
   bool SetParameters(std::span<const double> values, const Recording& recording);
 
   // Simulates the window from `start`. `predicted` receives rows() x recording.measured.size() numbers, row by row: at each stamp the value
-  // before that stamp's command acts; NaN after a divergence. A signal's delay and offset parameters are applied.
+  // before that stamp's command acts; NaN after a divergence. A signal's filter, delay and offset are applied.
   // `qpos`, when it is not empty, receives the pose at each stamp: rows() x model nq numbers; NaN after a divergence.
   RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted, std::span<double> qpos = {});
 
@@ -59,7 +59,8 @@ class Simulator {
   void PreRoll(const Recording& recording, Window window);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;
-  void DelaySignals(const Recording& recording, Window window, std::span<double> predicted);
+  // What the sensors make of the states: filter, delay, offset.
+  void ApplySensors(const Recording& recording, Window window, std::span<double> predicted);
 
   const Model& model_;
   ModelPtr mujoco_;
@@ -70,7 +71,7 @@ class Simulator {
   bool reads_torque_ = false;
   bool remembers_ = false;            // has states beside position and speed
   std::vector<double> values_;
-  std::vector<double> column_;        // scratch of DelaySignals
+  std::vector<double> column_, shaped_;  // scratch of ApplySensors
   std::vector<std::size_t> held_;     // per command: row held at the start of the step
 };
 

@@ -134,6 +134,11 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
                       .allowed = std::string("units of ") + units[0] + " or " + units[1]});
     }
     spec.resolution = map.Number("resolution", 0);
+    if (map.Has("filter")) {
+      YamlMap filter(item["filter"], path, "'filter'");
+      spec.filter = {.cutoff = filter.Text("cutoff_rad_per_s"), .damping_ratio = filter.Text("damping_ratio")};
+      GS_RETURN_IF_ERROR(filter.Finish());
+    }
     spec.optional = map.Flag("optional", false);
     spec.scored = map.Flag("score", true);
     spec.offset_parameter = map.Text("offset", "");

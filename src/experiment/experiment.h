@@ -35,6 +35,11 @@ struct CommandSpec {
 enum class SignalKind { kPosition, kVelocity, kTorque };
 
 // A column that is compared with the model.
+// Second-order low-pass that the rig applies to a signal before it is logged, w^2 / (s^2 + 2 z w s + w^2): names of parameters; empty: none.
+struct SensorFilter {
+  std::string cutoff, damping_ratio;
+};
+
 struct MeasuredSpec {
   std::string signal;                // name in results: "arm_rad"
   std::vector<std::string> columns;  // the first one that the log has
@@ -43,6 +48,7 @@ struct MeasuredSpec {
   std::string unit;                  // SI unit: "rad", "rad/s", "N m"
   double factor = 1, offset = 0;     // measured in SI = factor * column + offset
   double resolution = 0;             // size of one sensor count, SI; 0: unknown
+  SensorFilter filter;
   bool optional = false;
   bool scored = true;                // counts in the error
   WrapRepair wrap = WrapRepair::kKeep;

@@ -153,6 +153,11 @@ Status Model::ResolveNames() {
     if (!measured.offset_parameter.empty()) {
       GS_ASSIGN(source.offset, Find(measured.offset_parameter, file + ": offset of signal '" + measured.signal + "'"));
     }
+    if (!measured.filter.cutoff.empty()) {
+      const std::string where = file + ": filter of signal '" + measured.signal + "'";
+      GS_ASSIGN(source.cutoff, Find(measured.filter.cutoff, where));
+      GS_ASSIGN(source.damping_ratio, Find(measured.filter.damping_ratio, where));
+    }
     sources_.push_back(source);
   }
   return Ok();

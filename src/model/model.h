@@ -25,6 +25,7 @@ struct SignalSource {
   int estimate = -1;   // torque: address in plugin_state of a gapscope.motor's own estimate; -1: qfrc_actuator of `dof`
   int offset = -1;     // parameter that is added to the prediction
   int delay = -1;      // parameter: how late the signal is logged
+  int cutoff = -1, damping_ratio = -1;  // parameters of the low-pass between mechanism and log
 };
 
 // A joint split in a motor side and a load side (backlash, compliance).

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "src/compare/noise.h"
 #include "src/tune/fit_problem_parts.h"
 #include "src/tune/journal.h"
 
@@ -13,6 +14,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The log's own initial state counts as much as this many samples at the window's start.
 constexpr double kStatePriorSamples = 5;
+constexpr double kTypicalMismatch = 0.1;  // of a residual in units of its signal's deviation
 constexpr double kOffsetBound_rad = 0.3;
 // Of the sum of squares, per residual and squared range of a coordinate.
 constexpr double kAnchor = 1e-8;
@@ -23,6 +25,15 @@ double Coordinate::ToSearch(double value) const { return logarithmic ? std::log(
 double Coordinate::ToValue(double search) const { return logarithmic ? scale * std::exp(search) : search * scale; }
 
 FitProblem::~FitProblem() = default;
+
+// Weight of the log's own initial position. Residuals in units of the noise say what it is worth; in units of the signal's deviation a mismatch is far above
+// the noise, and the start must not be dragged off its sensor to make up for it.
+double FitProblem::StatePrior(const Recording& recording, const Recording::Measured& measured, const SignalSource& source, double weight) const {
+  const double samples = std::sqrt(kStatePriorSamples) * weight;
+  if (!options_.weights.empty() || source.cutoff >= 0) return samples;  // behind a filter the joint is not where the log says
+  const double noise = EstimateNoise(recording.time_s, measured.values, {.resolution = measured.spec.resolution}).total_std;
+  return noise > 0 ? std::max(samples, kTypicalMismatch / noise) : samples;
+}
 
 FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options, std::vector<double> values, ThreadPool& pool)
     : model_(model), recordings_(recordings), options_(std::move(options)), values_(std::move(values)), pool_(pool), workers_(pool.workers()), huber_threshold_(kInfinity) {
@@ -70,7 +81,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
         scalings[s].joint_state = static_cast<int>(2 * prototype.qpos.size());
         prototype.qpos.push_back(source.qpos);
         prototype.dof.push_back(source.dof);
-        const double weight = std::sqrt(kStatePriorSamples) * (scalings[s].weight > 0 ? scalings[s].weight : 1 / deviation);
+        const double weight = StatePrior(recording, measured, source, scalings[s].weight > 0 ? scalings[s].weight : 1 / deviation);
         prior.push_back(weight);
         prior.push_back(weight * kInitialFitHalfWidth_s);
       }

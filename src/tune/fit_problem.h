@@ -177,6 +177,7 @@ class FitProblem {
   void Residuals(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted, Eigen::VectorXd& residual) const;
   double WindowCost(const Eigen::VectorXd& residual, const FitWindow& window, const Eigen::VectorXd& state) const;
   Worker& GetWorker(int index);
+  double StatePrior(const Recording& recording, const Recording::Measured& measured, const SignalSource& source, double weight) const;
 
   const Model& model_;
   const std::vector<Recording>& recordings_;

@@ -133,6 +133,7 @@ const std::vector<Broken>& Table() {
       {"window_s: 0.5", "window_s: 0", {"'window_s' must be above"}},
       {"start_s: 0.1", "start_s: -1", {"'start_s' not below zero"}},
       {"resolution: 0.001", "resolution: -0.001", {"'resolution' is negative"}},
+      {"resolution: 0.001", "filter: {cutoff_rad_per_s: hinge.damping}", {"'filter'", "'damping_ratio'"}},
       {"wrap: 6.283185307179586", "wrap: 0", {"'wrap' is the period"}},
       {"unit: deg, scale: -1", "unit: deg, scale: 0", {"'scale'"}},
       {"unit: mV, add: 0.5", "unit: rev/s, scale: -1.7e308", {"'scale'"}},

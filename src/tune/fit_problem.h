@@ -158,6 +158,9 @@ class FitProblem {
   void set_journal(Journal* journal) { journal_ = journal; }
   Journal* journal() const { return journal_; }
   void CountResumed(std::size_t evaluations, std::size_t replays) { evaluations_ += evaluations, replays_ += replays; }
+  // Weighs the log's own initial states by its sensors' noise, in units of the residuals at a point: a model that misses by far must not make up for it
+  // by starting where the mechanism was not.
+  void WeighStates(const FitPoint& point);
   // Huber threshold in residual units; infinity: plain squares. Set from the residuals of the last Cost().
   void UpdateRobustScale(const FitPoint& point);
 
@@ -177,7 +180,6 @@ class FitProblem {
   void Residuals(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted, Eigen::VectorXd& residual) const;
   double WindowCost(const Eigen::VectorXd& residual, const FitWindow& window, const Eigen::VectorXd& state) const;
   Worker& GetWorker(int index);
-  double StatePrior(const Recording& recording, const Recording::Measured& measured, const SignalSource& source, double weight) const;
 
   const Model& model_;
   const std::vector<Recording>& recordings_;

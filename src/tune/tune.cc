@@ -100,7 +100,10 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   FitProblem problem(model, recordings, fit, values, pool);
   FitPoint point = problem.Start();
   SolveOptions solve{.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01};
-  if (std::isfinite(problem.Cost(point))) point = Solve(problem, point, solve).point;
+  if (std::isfinite(problem.Cost(point))) {
+    problem.WeighStates(point);
+    point = Solve(problem, point, solve).point;
+  }
   return problem.Predict(point);
 }
 
@@ -133,7 +136,8 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     problem->set_journal(journal.get());
     FitPoint point = random ? *random : problem->Start();
     SolveResult found = Solve(*problem, point, options.solve);
-    if (options.objective != Objective::kBoth && options.huber > 0 && found.termination != Termination::kNotSimulated) {
+    if (options.objective != Objective::kBoth && (options.huber > 0 || options.fit_states) && found.termination != Termination::kNotSimulated) {
+      if (options.fit_states) problem->WeighStates(found.point);
       problem->UpdateRobustScale(found.point);
       found = Solve(*problem, found.point, options.solve);
     }
@@ -145,6 +149,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
       joint.y = found.point.y;
       // Windows come log by log, each log's free run last: their states are found again from the log.
       if (std::isfinite(both->Cost(joint))) {
+        if (options.fit_states) both->WeighStates(joint);
         joint = SolveStates(*both, joint, 3);
         both->UpdateRobustScale(joint);
         const SolveResult polished = Solve(*both, joint, options.solve);

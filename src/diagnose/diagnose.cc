@@ -143,6 +143,25 @@ std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const
   return reports;
 }
 
+// Every second effect that was tried beside the first one.
+std::vector<CandidateReport> DescribeSeconds(const SearchResult& found) {
+  std::vector<CandidateReport> reports;
+  for (const auto& s : found.second.screen) {
+    CandidateReport report{.name = s.use.Text(), .held_out_error = kNan, .screen_drop = s.trial.drop, .absorbed = s.trial.absorbed};
+    for (const auto& c : found.second.children) {
+      if (c->effects.back() != s.use) continue;
+      const Evidence more = Compare(*found.second_parent, *c);
+      report.held_out_error = c->held_out_error;
+      report.refitted = true;
+      report.converged = c->converged;
+      report.bic = Bic(*c);
+      report.reason = fmt::format("removes {:.1f} % of what {} leaves ({:.1f} standard errors); {:.1f} times the noise is left", 100 * more.held_out, found.second_parent->Name(), more.z, c->held_out_floors);
+    }
+    reports.push_back(std::move(report));
+  }
+  return reports;
+}
+
 // The experiment that tells the leader from its nearest rival.
 void SuggestNext(const SearchResult& found, const std::string& experiment, Diagnosis* result) {
   std::vector<std::string> rivals;
@@ -176,6 +195,7 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
     result.ambiguous.push_back(std::move(group));
   }
   result.candidates = DescribeCandidates(found, judgement);
+  result.seconds = DescribeSeconds(found);
   SuggestNext(found, bench.experiment.path, &result);
   result.where = Locate(base, bench.data.held_out, seed);
   result.budget_spent = found.budget_spent;

@@ -59,6 +59,7 @@ struct Diagnosis {
   VerdictEvidence evidence;
   std::vector<ConditionShare> where;
   std::vector<CandidateReport> candidates;
+  std::vector<CandidateReport> seconds;  // tried beside the first effect, the most promising by the score test first; without probabilities
   std::string next_command;
   std::vector<std::string> next_separates;
   std::vector<std::string> train_logs, held_out_logs;

@@ -51,6 +51,14 @@ double LogMisfit(const Candidate& candidate) {
   return sum;
 }
 
+double TypicalFloors(const Candidate& candidate) {
+  if (candidate.held_out_blocks.empty()) return std::numeric_limits<double>::infinity();
+  std::vector<double> blocks = candidate.held_out_blocks;
+  const auto middle = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 2);
+  std::nth_element(blocks.begin(), middle, blocks.end());
+  return std::sqrt(*middle / candidate.block_floor);
+}
+
 bool Convincing(const Evidence& e, const Limits& limits) {
   if (std::min(e.train, e.held_out) > kLarge) return e.z > kFewZ;
   return e.train > 0 && e.held_out > limits.share && e.z > limits.z;

@@ -17,6 +17,10 @@ struct Evidence {
 // How `b` compares with `a`. An effect that cannot be simulated somewhere loses.
 Evidence Compare(const Candidate& a, const Candidate& b);
 
+// What a candidate leaves in the median half second of the held-out logs, over the noise: unlike Candidate::held_out_floors it does not see the few blocks
+// where a step's edge is a sample off.
+double TypicalFloors(const Candidate& candidate);
+
 // Sum over all blocks of log(cost + floor): what orders candidates. Infinity for one that cannot be simulated somewhere.
 double LogMisfit(const Candidate& candidate);
 

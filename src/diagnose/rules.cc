@@ -20,8 +20,9 @@ std::string JointOf(const std::string& on, const Model& model) {
   return on;
 }
 
-bool IsServoJoint(const std::string& joint, const Model& model) {
-  const mjModel& m = model.compiled();
+// A position servo, native or of a base model's gapscope.motor.
+bool IsServoJoint(const std::string& joint, const Model& base) {
+  const mjModel& m = base.compiled();
   for (int a = 0; a < m.nactuator; ++a) {
     const char* name = m.actuator_trntype[a] == mjTRN_JOINT ? mj_id2name(&m, mjOBJ_JOINT, m.actuator_trnid[2 * a]) : nullptr;
     if (name && joint == name && (m.actuator_biasprm[a * mjNBIAS + 1] != 0 || m.actuator_plugin[a] >= 0)) return true;
@@ -43,8 +44,8 @@ constexpr Containment kContainments[] = {
 
 }  // namespace
 
-bool IsFinding(const EffectUse& use, const Model& model) {
-  if (use.effect == "torque_bias" && IsServoJoint(JointOf(use.on, model), model)) return false;
+bool IsFinding(const EffectUse& use, const Model& base) {
+  if (use.effect == "torque_bias" && IsServoJoint(JointOf(use.on, base), base)) return false;
   // A column that is the only one measured of a system is late with everything else: tried all the same, the verdict then says ambiguous.
   return true;
 }

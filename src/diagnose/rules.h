@@ -10,15 +10,15 @@ namespace gapscope {
 inline constexpr Limits kFirst{.share = 0.01, .z = 2.5};       // the first effect over the refitted base model
 inline constexpr double kRemains = 1.25;                       // residual over noise below which nothing more is sought
 inline constexpr Limits kSecond{.share = 0.06, .z = 3.0};      // a second effect over the first
-inline constexpr double kSecondExcess = 0.6;                   // and of what the first left above the noise
+inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains
 inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains
 inline constexpr Limits kTold{.share = 0.03, .z = 2.5};        // the winner over a rival; below, the two are ambiguous
 inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.8;   // left above the noise, and share of the excess removed (in windows, or of a free run)
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 
-// Whether the effect can be a finding here: a bias on a servo equals a zero offset, viscous friction is a parameter.
-bool IsFinding(const EffectUse& use, const Model& model);
+// Whether the effect can be a finding on a base model (without effects, which may turn a plain motor into a plugin): a bias on a servo equals a zero offset, viscous friction is a parameter.
+bool IsFinding(const EffectUse& use, const Model& base);
 // Whether the effects are known to be confused with each other, at places that are one.
 bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
 // Whether `richer` can do all that `simpler` does (same other effects); `exactly`: not only nearly, as far as its bounds go.

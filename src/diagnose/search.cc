@@ -94,12 +94,35 @@ void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   }
 }
 
-void Explore(const Workbench& bench, Candidate& parent, std::size_t refits, const Say& say, Layer* layer) {
+// What contains Coulomb friction starts from where that ended: both directions alike, or a hump a little above the sliding level, below which a hump has no
+// gradient and its fit would stay Coulomb's.
+void StartFromCoulomb(const Workbench& bench, Layer* layer) {
+  constexpr double kSliding = 0.9, kHump = 1.5, kClearlyBetter = 0.9;
+  for (const auto& simple : layer->children) {
+    if (simple->effects.back().effect != "coulomb_friction" || simple->held_out_floors < kRemains) continue;
+    const std::string on = simple->effects.back().on;
+    const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
+    for (const auto& rich : layer->children) {
+      if (!Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost || Late(bench)) continue;
+      const auto placed = rich->model->EffectParameters(rich->effects.back(), bench.scales);
+      if (!placed.ok()) continue;
+      const bool hump = rich->effects.back().effect == "stribeck_friction";
+      std::vector<double> values = rich->model->Nominal();
+      for (const auto& p : placed.value()) {
+        values[rich->model->IndexOf(p.name)] = p.unit != "N m" ? p.start : !hump ? level : p.key == "breakaway_n_m" ? kHump * level : kSliding * level;
+      }
+      TryStart(bench, rich.get(), rich->problem->FromParent(*simple->problem, simple->point, values, {}), kFirstIterations, kFirstTolerance);
+      ScoreCandidate(bench, rich.get());
+    }
+  }
+}
+
+void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::size_t refits, const Say& say, Layer* layer) {
   const auto possible = parent.model->PossibleEffects();
   if (!possible.ok()) return;
   std::vector<EffectUse> uses;
   for (const auto& use : possible.value()) {
-    if (IsFinding(use, *parent.model)) uses.push_back(use);
+    if (IsFinding(use, base)) uses.push_back(use);
   }
   layer->screen = Screen(bench, parent, uses);
   double best_cost = parent.train_cost;
@@ -116,6 +139,7 @@ void Explore(const Workbench& bench, Candidate& parent, std::size_t refits, cons
   if (layer->children.empty()) return;
   SortByMisfit(parent, &layer->children);
   ImitateLeader(bench, parent, layer);
+  StartFromCoulomb(bench, layer);
   SortByMisfit(parent, &layer->children);
   // The leaders once more to the end.
   for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !Late(bench); ++i) {
@@ -125,6 +149,12 @@ void Explore(const Workbench& bench, Candidate& parent, std::size_t refits, cons
     ScoreCandidate(bench, &leader);
   }
   SortByMisfit(parent, &layer->children);
+}
+
+// Share of what stood above the noise that is gone; nothing where hardly anything stood.
+double RemovedExcess(double floors_before, double floors_after) {
+  constexpr double kLeastExcess = 0.1;
+  return floors_before > 1 + kLeastExcess ? (floors_before - std::max(floors_after, 1.0)) / (floors_before - 1) : 0;
 }
 
 // The best child, or a simpler one when the richer is not convincingly better: one that it contains, or one with fewer parameters.
@@ -175,18 +205,18 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
 
   say("screening");
   // Where the base model is at the noise already, fewer refits show that nothing is missing.
-  Explore(bench, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, say, &result.first);
+  Explore(bench, *base.model, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, say, &result.first);
   Candidate* single = Simplest(result.first, base);
   if (single && Convincing(Compare(base, *single), kFirst)) result.single = result.chosen = single;
 
   if (single && result.single == single && single->held_out_floors > kRemains && !Late(bench)) {
     say("looking for a second effect");
-    Explore(bench, *single, kSecondRefits, say, &result.second);
+    result.second_parent = single;
+    Explore(bench, *base.model, *single, kSecondRefits, say, &result.second);
     if (const Candidate* pair = Simplest(result.second, *single)) {
       const Evidence more = Compare(*single, *pair);
-      const double excess = single->held_out_floors - 1;
-      const double removed = (single->held_out_floors - pair->held_out_floors) / std::max(excess, 1e-9);
-      if (Convincing(more, kSecond) && removed > kSecondExcess) result.chosen = pair;
+      const double removed = RemovedExcess(single->held_out_floors, pair->held_out_floors), typically = RemovedExcess(TypicalFloors(*single), TypicalFloors(*pair));
+      if (Convincing(more, kSecond) && std::max(removed, typically) > kSecondExcess) result.chosen = pair;
     }
     // Backward: does the first one still matter?
     if (result.chosen != single && !Late(bench)) {

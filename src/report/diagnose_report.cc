@@ -88,6 +88,12 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
                   {"converged", c.converged}, {"bic", JsonNumber(c.bic)}, {"reason", c.reason}});
     json["candidates"].push_back(std::move(entry));
   }
+  json["second_effects"] = ordered_json::array();
+  for (const auto& c : d.seconds) {
+    const std::size_t at = c.name.find('@');
+    json["second_effects"].push_back({{"name", c.name.substr(0, at)}, {"on", c.name.substr(at + 1)}, {"held_out_error", JsonNumber(c.held_out_error)}, {"screen_drop", c.screen_drop},
+                                      {"absorbed", c.absorbed}, {"refitted", c.refitted}, {"converged", c.converged}, {"reason", c.reason}});
+  }
   json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
   json["explanation"] = d.explanation;
   json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};

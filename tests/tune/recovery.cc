@@ -80,10 +80,9 @@ int main(int argc, char** argv) {
         fmt::print("  {:<28} reported flat in all runs\n", parameters[i].name);
         continue;
       }
-      const double share = static_cast<double>(inside[i]) / known[i];
-      status = share < 0.9 ? 1 : status;
-      fmt::print("  {:<28} identifiable in {:>3}, inside its interval in {:>3} ({:.0f} %), mean width {:.2g} of the value\n", parameters[i].name, known[i], inside[i], 100 * share,
-                 width[i] / known[i]);
+      const int missed = known[i] - inside[i];
+      status = missed > 0.1 * done ? 1 : status;
+      fmt::print("  {:<28} known in {:>3} runs, flat in the others; outside its interval in {:>3}, mean width {:.2g} of the value\n", parameters[i].name, known[i], missed, width[i] / known[i]);
     }
     std::fflush(stdout);
   }

@@ -58,6 +58,42 @@ Status ReadSwingUp(const YAML::Node& node, const std::string& path, ControllerSp
   return Ok();
 }
 
+// A list of rows, each a list of `columns` numbers.
+Eigen::MatrixXd ReadMatrix(YamlMap& map, const char* key, Eigen::Index rows, Eigen::Index columns) {
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(rows, columns);
+  const std::vector<YAML::Node> lines = map.List(key);
+  const YAML::Node at = map.Child(key);
+  const auto wrong = [&] {
+    map.Fail(at, {.what = std::string("'") + key + "' is not a matrix of this size", .allowed = std::to_string(rows) + " lists of " + std::to_string(columns) + " numbers"});
+    return Eigen::MatrixXd(Eigen::MatrixXd::Zero(rows, columns));
+  };
+  if (static_cast<Eigen::Index>(lines.size()) != rows) return wrong();
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const YAML::Node& line = lines[static_cast<std::size_t>(i)];
+    if (!line.IsSequence() || static_cast<Eigen::Index>(line.size()) != columns) return wrong();
+    for (Eigen::Index j = 0; j < columns; ++j) {
+      double value = 0;
+      if (!YAML::convert<double>::decode(line[static_cast<std::size_t>(j)], value) || !std::isfinite(value)) return wrong();
+      matrix(i, j) = value;
+    }
+  }
+  return matrix;
+}
+
+Status ReadObserver(const YAML::Node& node, const std::string& path, ControllerSpec* spec) {
+  if (!node.IsDefined()) return Ok();
+  YamlMap one(node, path, "'observer'");
+  const auto n = static_cast<Eigen::Index>(one.List("a").size()), inputs = static_cast<Eigen::Index>(spec->inputs.size());
+  ObserverSpec observer{.a = ReadMatrix(one, "a", n, n), .c = ReadMatrix(one, "c", inputs, n), .gain = ReadMatrix(one, "gain", n, inputs), .b = {}, .feedback = {}};
+  const std::vector<double> b = one.NumberList("b", static_cast<std::size_t>(n)), feedback = one.NumberList("feedback", static_cast<std::size_t>(n));
+  if (n == 0 || b.empty() || feedback.empty()) one.Fail(node, {.what = "an observer needs 'a', 'b', 'c', 'gain' and 'feedback'"});
+  GS_RETURN_IF_ERROR(one.Finish());
+  observer.b = Eigen::Map<const Eigen::VectorXd>(b.data(), n);
+  observer.feedback = Eigen::Map<const Eigen::VectorXd>(feedback.data(), n);
+  spec->observer = std::move(observer);
+  return Ok();
+}
+
 }  // namespace
 
 Result<ControllerSpec> LoadController(const Experiment& experiment) {
@@ -68,7 +104,7 @@ Result<ControllerSpec> LoadController(const Experiment& experiment) {
     return Error{.what = "no controller is described", .where = path, .cure = "add 'controller:' (docs/experiment.md), or replay in free_run or windows"};
   }
   YamlMap map(node, path, "'controller'");
-  ControllerSpec spec{.actuator = map.Text("actuator"), .sample_s = map.Number("sample_s", 0), .limit = map.Number("limit", 0), .inputs = {}, .references = {}, .feedforward = map.Text("feedforward", ""), .terms = {}, .swing_up = {}};
+  ControllerSpec spec{.actuator = map.Text("actuator"), .sample_s = map.Number("sample_s", 0), .limit = map.Number("limit", 0), .inputs = {}, .references = {}, .feedforward = map.Text("feedforward", ""), .terms = {}, .swing_up = {}, .observer = {}};
   if (spec.sample_s < 0 || spec.limit < 0) map.Fail(node, {.what = "'sample_s' and 'limit' are not negative"});
   if (std::none_of(experiment.commands.begin(), experiment.commands.end(), [&](const auto& c) { return c.actuator == spec.actuator; })) {
     map.Fail(node, {.what = "the controller drives an actuator without a command", .actual = "'" + spec.actuator + "'", .cure = "name one of 'commands:'"});
@@ -86,7 +122,8 @@ Result<ControllerSpec> LoadController(const Experiment& experiment) {
   }
   GS_RETURN_IF_ERROR(ReadTerms(map, path, &spec));
   GS_RETURN_IF_ERROR(ReadSwingUp(map.Child("swing_up"), path, &spec));
-  if (spec.terms.empty()) map.Fail(node, {.what = "the controller has no 'terms'"});
+  GS_RETURN_IF_ERROR(ReadObserver(map.Child("observer"), path, &spec));
+  if (spec.terms.empty() && !spec.observer) map.Fail(node, {.what = "the controller has neither 'terms' nor 'observer'"});
   GS_RETURN_IF_ERROR(map.Finish());
   return spec;
 }
@@ -125,13 +162,17 @@ Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment
     GS_ASSIGN(controller.feedforward_, bind(spec.feedforward, "the feedforward"));
   }
   if (spec.swing_up) controller.swing_input_ = IndexOf(spec.inputs, spec.swing_up->input);
+  if (spec.observer) controller.observer_.emplace(*spec.observer);
   controller.errors_.resize(controller.inputs_.size());
+  controller.inputs_now_.resize(controller.inputs_.size());
+  controller.references_now_.resize(controller.inputs_.size());
   controller.Reset(Start::kZero);
   return controller;
 }
 
 void Controller::Reset(Start start) {
   for (auto& term : terms_) term.last_error = term.derivative = term.integral = 0;
+  if (observer_) observer_->Reset();
   law_ = sent_ = swing_angle_ = swing_speed_ = last_s_ = 0;
   next_s_ = -std::numeric_limits<double>::infinity();
   first_ = true, start_ = start, caught_ = !spec_.swing_up.has_value();
@@ -164,14 +205,19 @@ double Controller::Step(std::size_t row, std::span<const double> readings) {
   if (now < next_s_ - 1e-9) return sent_;
   const double period = spec_.sample_s > 0 ? spec_.sample_s : recording_->timeline.median_step_s;
   next_s_ = spec_.sample_s > 0 ? (first_ ? now : next_s_) + spec_.sample_s : now;
-  for (std::size_t i = 0; i < inputs_.size(); ++i) errors_[i] = inputs_[i].reference.At(row) - (inputs_[i].scale * readings[inputs_[i].signal] + inputs_[i].offset);
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    inputs_now_[i] = inputs_[i].scale * readings[inputs_[i].signal] + inputs_[i].offset;
+    references_now_[i] = inputs_[i].reference.At(row);
+    errors_[i] = references_now_[i] - inputs_now_[i];
+  }
   double limit = spec_.limit, pumped = 0;
-  if (spec_.swing_up) pumped = Swing(inputs_[swing_input_].scale * readings[inputs_[swing_input_].signal] + inputs_[swing_input_].offset, period);
+  if (spec_.swing_up) pumped = Swing(inputs_now_[swing_input_], period);
   // Outer loops first: what they ask for moves the inner references.
   for (auto& term : terms_) {
     if (term.to >= 0) errors_[static_cast<std::size_t>(term.to)] += Evaluate(term, errors_[term.input], period);
   }
-  law_ = 0;
+  // The observer hears what was really sent, saturation included.
+  law_ = observer_ ? observer_->Step(inputs_now_, references_now_, sent_, period) : 0;
   for (auto& term : terms_) {
     if (term.to < 0) law_ += Evaluate(term, errors_[term.input], period);
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "replay/observer.h"
 #include "src/experiment/recording.h"
 
 namespace gapscope {
@@ -39,6 +40,7 @@ struct ControllerSpec {
   std::string feedforward;        // column added to the law's output, or a number; empty: none
   std::vector<ControllerTerm> terms;
   std::optional<SwingUp> swing_up;
+  std::optional<ObserverSpec> observer;  // its state feedback is added to the terms
 };
 
 // The section of the experiment's file. Errors: no such section; unknown keys, inputs, signals (file:line:column).
@@ -86,7 +88,8 @@ class Controller {
   std::vector<Term> terms_;
   Source feedforward_;
   std::size_t command_ = 0, swing_input_ = 0;
-  std::vector<double> errors_;
+  std::optional<Observer> observer_;
+  std::vector<double> errors_, inputs_now_, references_now_;
   double law_ = 0, sent_ = 0, next_s_ = 0, last_s_ = 0, swing_angle_ = 0, swing_speed_ = 0;
   bool first_ = true, caught_ = false;
   Start start_ = Start::kZero;

@@ -1,12 +1,14 @@
 // The loop closed in simulation: the law's arithmetic, balance, swing-up and catch, a cascade; and the real Qube's own law on its own log.
 #include "replay/closed_loop.h"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 
+#include "src/design/linear.h"
 #include "tests/experiment/scratch.h"
 
 namespace gapscope {
@@ -61,6 +63,79 @@ controller:
     - {input: theta, proportional: -6, derivative: -1.8, filter_rad_per_s: 50}
     - {input: alpha, proportional: -30, derivative: -2.5, filter_rad_per_s: 50}
 )";
+
+std::string Rows(const Eigen::MatrixXd& m) {
+  std::string text = "[";
+  for (Eigen::Index i = 0; i < m.rows(); ++i) {
+    text += i > 0 ? ", [" : "[";
+    for (Eigen::Index j = 0; j < m.cols(); ++j) text += (j > 0 ? ", " : "") + fmt::format("{:.17g}", m(i, j));
+    text += "]";
+  }
+  return text + "]";
+}
+
+// LQR on the state of an observer, about upright: x is arm, pendulum - pi and their speeds.
+std::string ObserverSection(const LinearSystem& system, const Eigen::MatrixXd& c, const Eigen::MatrixXd& gain, const Eigen::MatrixXd& feedback, const std::string& inputs) {
+  return "\ncontroller:\n  actuator: motor\n  limit: 10\n  inputs: [" + inputs + "]\n  observer:\n    a: " + Rows(system.a) + "\n    b: " + Rows(system.b.transpose()).substr(1, Rows(system.b.transpose()).size() - 2) +
+         "\n    c: " + Rows(c) + "\n    gain: " + Rows(gain) + "\n    feedback: " + Rows(feedback).substr(1, Rows(feedback).size() - 2) + "\n";
+}
+
+TEST_F(ClosedLoopTest, KalmanFilterAndLuenbergerObserverBalanceTheQubeFromItsAngles) {
+  Load(kBalance, kPi, 0.02);  // for the model alone
+  const auto system = Linearize(*model_, model_->Nominal(), {}, {{"pendulum", kPi}}, 0);
+  ASSERT_TRUE(system.ok()) << system.error().Text();
+  const auto& [a, b, names] = system.value();
+  const auto lqr = Lqr(a, b, Eigen::Vector4d(5, 30, 1, 1).asDiagonal(), Eigen::MatrixXd::Identity(1, 1));
+  ASSERT_TRUE(lqr.ok());
+  const std::string arm = "{name: theta, signal: arm_rad}", pendulum = ", {name: alpha, signal: pendulum_rad, add: -3.141592653589793}";
+  const Eigen::MatrixXd both = Eigen::MatrixXd::Identity(2, 4), one = Eigen::MatrixXd::Identity(1, 4);
+  const Eigen::MatrixXd readings = 1e-6 * Eigen::MatrixXd::Identity(2, 2);  // 1 mrad counts at 500 Hz are of this order
+  const auto kalman = KalmanGain(a, both, Eigen::Vector4d(0, 0, 1, 1).asDiagonal(), readings);
+  ASSERT_TRUE(kalman.ok());
+  const auto placed = ObserverGain(a, one, {{-40, 0}, {-45, 0}, {-50, 0}, {-55, 0}});
+  ASSERT_TRUE(placed.ok());
+  for (const auto& section : {ObserverSection(system.value(), both, kalman.value().gain, lqr.value().gain, arm + pendulum), ObserverSection(system.value(), one, placed.value().gain, lqr.value().gain, arm)}) {
+    SCOPED_TRACE(section);
+    // The arm alone shows the pendulum only through its push: it starts nearer upright.
+    const double tilt = section.find("alpha") == std::string::npos ? 0.01 : 0.1;
+    Load(section, kPi + tilt, 4);
+    const auto result = Run();
+    ASSERT_TRUE(result.ok()) << result.error().Text();
+    const auto& log = result.value().result.logs[0];
+    ASSERT_EQ(log.outcome, Outcome::kCompleted);
+    for (std::size_t k = log.signals[1].predicted.size() / 2; k < log.signals[1].predicted.size(); ++k) ASSERT_NEAR(log.signals[1].predicted[k], kPi, 0.05) << k;
+  }
+}
+
+TEST_F(ClosedLoopTest, ObserverFollowsTheLinearSystemExactly) {
+  // x'' = 4 u - x, angle read: with readings of the true motion from the same start the estimate is that motion.
+  ObserverSpec spec{.a = (Eigen::MatrixXd(2, 2) << 0, 1, -1, 0).finished(), .c = (Eigen::MatrixXd(1, 2) << 1, 0).finished(), .gain = (Eigen::MatrixXd(2, 1) << 1e-12, 1e-12).finished(),
+                    .b = Eigen::Vector2d(0, 4), .feedback = Eigen::Vector2d(3, 0.5)};
+  Observer observer(spec);
+  const double start[] = {0.2}, reference[] = {0.5};
+  // At rest at the first reading; K (x - x_r) with x_r the least-norm state that reads the reference.
+  EXPECT_NEAR(observer.Step(start, reference, 0, 0.01), 3 * 0.3, 1e-12);
+  for (int k = 1; k <= 300; ++k) {
+    const double t = 0.01 * k, angle[] = {2 + (0.2 - 2) * std::cos(t)};  // u = 0.5 holds the equilibrium at 2
+    observer.Step(angle, reference, 0.5, 0.01);
+    ASSERT_NEAR(observer.state()[0], angle[0], 1e-9) << k;
+    ASSERT_NEAR(observer.state()[1], (2 - 0.2) * std::sin(t), 1e-9) << k;
+  }
+}
+
+TEST_F(ClosedLoopTest, AnObserverOfTheWrongSizeIsRefused) {
+  for (const auto& [section, says] : std::vector<std::pair<std::string, std::string>>{
+           {"observer: {a: [[0, 1], [0, 0]], b: [0, 1], c: [[1, 0]], gain: [[1, 2]], feedback: [1, 1]}", "'gain' is not a matrix"},
+           {"observer: {a: [[0, 1]], b: [1], c: [[1]], gain: [[1]], feedback: [1]}", "'a' is not a matrix"},
+           {"observer: {a: [[0]], c: [[1]], gain: [[1]], feedback: [1]}", "an observer needs"},
+           {"observer: {a: [[0]], b: [1, 2], c: [[1]], gain: [[1]], feedback: [1]}", "'b' of 'observer'"}}) {
+    Load("\ncontroller:\n  actuator: motor\n  inputs: [{name: theta, signal: arm_rad}]\n  " + section + "\n", 0, 0.02);
+    const auto spec = LoadController(experiment_);
+    ASSERT_FALSE(spec.ok()) << section;
+    EXPECT_NE(spec.error().Text().find(says), std::string::npos) << spec.error().Text();
+    EXPECT_NE(spec.error().Text().find("experiment.yaml:"), std::string::npos);
+  }
+}
 
 TEST_F(ClosedLoopTest, LawIsTheBackwardDifferenceFormula) {
   Load(R"(

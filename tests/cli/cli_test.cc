@@ -18,18 +18,10 @@ const std::string kModels = std::string(GAPSCOPE_SOURCE_DIR) + "/models/";
 
 class CliTest : public ::testing::Test {
  protected:
-  struct Answer {
-    int status = -1;
-    std::string out, err;
-  };
   // Runs `gapscope ARGUMENTS` (a shell line) in the scratch folder's own sub-folder "cwd".
   Answer Run(const std::string& arguments) {
     std::filesystem::create_directories(scratch_.Path("cwd"));
-    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
-    const int raw = std::system(("cd '" + scratch_.Path("cwd") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments +
-                                 " > '" + out + "' 2> '" + err + "' < /dev/null")
-                                    .c_str());
-    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
+    return scratch_.Shell("cd '" + scratch_.Path("cwd") + "' && '" GAPSCOPE_PROGRAM "' " + arguments);
   }
   // Status 2, one line on stderr that says all of this, nothing on stdout.
   void ExpectRefused(const std::string& arguments, const std::vector<std::string>& says) {

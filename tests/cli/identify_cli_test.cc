@@ -13,15 +13,7 @@ namespace {
 
 class IdentifyCliTest : public ::testing::Test {
  protected:
-  struct Answer {
-    int status = -1;
-    std::string out, err;
-  };
-  Answer Run(const std::string& arguments) {
-    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
-    const int raw = std::system(("'" GAPSCOPE_PROGRAM "' identify " + arguments + " > '" + out + "' 2> '" + err + "' < /dev/null").c_str());
-    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
-  }
+  Answer Run(const std::string& arguments) const { return scratch_.Shell("'" GAPSCOPE_PROGRAM "' identify " + arguments); }
   std::string Rig(const std::string& name) { return "'" + std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + name + "/experiment.yaml'"; }
   // A joint that follows a sweep: angle and torque as formulas.
   std::string ServoLog(double seconds) {

@@ -34,17 +34,7 @@ constexpr const char* kArm = R"(<mujoco model="two_link">
 
 class InitTest : public ::testing::Test {
  protected:
-  struct Answer {
-    int status = -1;
-    std::string out, err;
-  };
-  Answer Run(const std::string& arguments) {
-    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
-    const int raw = std::system(("cd '" + scratch_.Path("") + "' && '" + GAPSCOPE_PROGRAM + "' " + arguments + " > '" +
-                                 out + "' 2> '" + err + "'")
-                                    .c_str());
-    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, ReadAll(out), ReadAll(err)};
-  }
+  Answer Run(const std::string& arguments) const { return scratch_.Shell("cd '" + scratch_.Path("") + "' && '" GAPSCOPE_PROGRAM "' " + arguments); }
   // Shoulder follows its target late, elbow and wrist swing on their own; `names` are the columns' in this order:
   // time [ms], shoulder angle, elbow angle, wrist travel, shoulder target, elbow torque command, elbow speed.
   std::string Log(const std::vector<std::string>& names, const std::string& file = "log.csv") {

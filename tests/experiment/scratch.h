@@ -4,6 +4,7 @@
 #define GAPSCOPE_TESTS_EXPERIMENT_SCRATCH_H_
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -14,6 +15,12 @@
 #include <string_view>
 
 namespace gapscope::testing {
+
+// What a program said. status: exit status, or minus the signal that ended it.
+struct Answer {
+  int status = -1;
+  std::string out, err;
+};
 
 class Scratch {
  public:
@@ -41,6 +48,8 @@ class Scratch {
     std::ofstream(path, std::ios::binary) << bytes;
     return path;
   }
+  // Runs a line of the shell.
+  Answer Shell(const std::string& line) const;
 
  private:
   std::filesystem::path folder_;
@@ -51,6 +60,12 @@ inline std::string ReadAll(const std::string& path) {
   std::stringstream text;
   text << file.rdbuf();
   return text.str();
+}
+
+inline Answer Scratch::Shell(const std::string& line) const {
+  const std::string out = Path("stdout"), err = Path("stderr");
+  const int raw = std::system(("( " + line + " ) > '" + out + "' 2> '" + err + "' < /dev/null").c_str());
+  return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
 }
 
 // `text` with the first `from` replaced; fails the test when there is none.

@@ -261,7 +261,7 @@ TEST_F(ClosedLoopTest, BrokenSectionsAreRefused) {
       {"controller: {actuator: brake, terms: []}\n", "without a command"},
       {"controller: {actuator: motor, inputs: [{name: a, signal: arm}], terms: []}\n", "not measured"},
       {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}], terms: [{input: b}]}\n", "input that is not there"},
-      {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}]}\n", "no 'terms'"},
+      {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}]}\n", "neither 'terms'"},
       {"controller: {actuator: motor, limt: 3, inputs: [{name: a, signal: arm_rad}], terms: [{input: a}]}\n", "unknown key in 'controller'"},
       {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}], references: {a: nowhere}, terms: [{input: a}]}\n", "neither a column"},
   };

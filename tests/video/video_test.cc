@@ -18,15 +18,7 @@ const std::string kQube = "'" + kSource + "/models/qube/experiment.yaml' '" + kS
 
 class VideoTest : public ::testing::Test {
  protected:
-  struct Answer {
-    int status = -1;
-    std::string out, err;
-  };
-  Answer Shell(const std::string& line) {
-    const std::string out = scratch_.Path("stdout"), err = scratch_.Path("stderr");
-    const int raw = std::system(("( " + line + " ) > '" + out + "' 2> '" + err + "' < /dev/null").c_str());
-    return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -WTERMSIG(raw), ReadAll(out), ReadAll(err)};
-  }
+  Answer Shell(const std::string& line) const { return scratch_.Shell(line); }
   std::string Render(const std::string& arguments) const { return std::string("'") + GAPSCOPE_PROGRAM + "' render " + kQube + " --size 480x360 " + arguments; }
   std::string Out(const std::string& name) const {
     std::filesystem::create_directories(scratch_.Path("out"));
@@ -134,11 +126,15 @@ TEST_F(VideoTest, GifAndSeveralModelsAndViews) {
   EXPECT_EQ(Shell(Render("--view tracking --out '" + Out("t.png") + "'")).status, 0);
 }
 
+// The library or a driver without a screen is not installed: what the program says then. Any other failure is ours.
+bool NoEglHere(const Answer& answer) { return answer.err.find("libEGL") != std::string::npos || answer.err.find("EGL has no display") != std::string::npos; }
+
 TEST_F(VideoTest, EglDrawsWhatOsmesaDraws) {
   const std::string osmesa = Out("o.png"), egl = Out("e.png");
   ASSERT_EQ(Shell(Render("--at 9 --gl osmesa --out '" + osmesa + "'")).status, 0);
   const Answer made = Shell(Render("--at 9 --gl egl --out '" + egl + "'"));
-  if (made.status != 0) GTEST_SKIP() << "no EGL without a screen here: " << made.err;
+  if (made.status != 0 && NoEglHere(made)) GTEST_SKIP() << "no EGL without a screen here: " << made.err;
+  ASSERT_EQ(made.status, 0) << made.err;
   EXPECT_LT(MeanDifference(Pixels(osmesa, 0), Pixels(egl, 0)), 0.5);
 }
 
@@ -176,7 +172,9 @@ TEST_F(VideoTest, WithoutOpenGlItSaysWhatToInstall) {
 
 TEST_F(VideoTest, FallsBackToEglAndSaysSo) {
   for (const char* name : {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"}) scratch_.Write(std::string("gl/") + name, "not a library");
-  if (Shell(Render("--gl egl --out '" + Out("e.png") + "'")).status != 0) GTEST_SKIP() << "no EGL without a screen here";
+  const Answer made = Shell(Render("--gl egl --out '" + Out("e.png") + "'"));
+  if (made.status != 0 && NoEglHere(made)) GTEST_SKIP() << "no EGL without a screen here: " << made.err;
+  ASSERT_EQ(made.status, 0) << made.err;
   const Answer answer = Shell("LD_LIBRARY_PATH='" + scratch_.Path("gl") + "' " + Render("--out '" + Out("f.png") + "'"));
   EXPECT_EQ(answer.status, 0) << answer.err;
   EXPECT_NE(answer.err.find("rendering with EGL"), std::string::npos) << answer.err;

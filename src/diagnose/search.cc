@@ -15,6 +15,7 @@ namespace {
 constexpr int kFirstIterations = 14, kFinalIterations = 20;
 constexpr double kFirstTolerance = 2e-3, kFinalTolerance = 2e-4;
 constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4;  // leaders of the screen that are refitted, beside the partners of the first two
+constexpr double kFirstShare = 0.5, kSecondShare = 0.8;  // of the time left, for the refits of a first and of a second effect
 constexpr double kNearly = 0.6;                        // of the best one's gain
 constexpr double kWorthImitating = 0.8;                // a leader that leaves less than this share of its parent's cost
 
@@ -72,6 +73,16 @@ void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& 
   TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations, kFirstTolerance);
 }
 
+// The bench with less time: what is left of the budget is for what comes later.
+Workbench Hurried(const Workbench& bench, double share) {
+  Workbench hurried = bench;
+  if (bench.deadline) {
+    const auto now = std::chrono::steady_clock::now();
+    hurried.deadline = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(share * (*bench.deadline - now));
+  }
+  return hurried;
+}
+
 // Rivals start anew where they best imitate the leader: an unconverged rival looks exactly like a rejected one.
 void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   constexpr std::size_t kMost = 3;
@@ -103,7 +114,7 @@ void StartFromCoulomb(const Workbench& bench, Layer* layer) {
     const std::string on = simple->effects.back().on;
     const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
     for (const auto& rich : layer->children) {
-      if (!Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost || Late(bench)) continue;
+      if (rich->effects.back().on != on || !Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost || Late(bench)) continue;
       const auto placed = rich->model->EffectParameters(rich->effects.back(), bench.scales);
       if (!placed.ok()) continue;
       const bool hump = rich->effects.back().effect == "stribeck_friction";
@@ -117,7 +128,23 @@ void StartFromCoulomb(const Workbench& bench, Layer* layer) {
   }
 }
 
-void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::size_t refits, const Say& say, Layer* layer) {
+// Refits the leaders that have not been, in their order, as far as the time goes.
+void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Layer* layer) {
+  for (; layer->refitted < layer->leaders.size() && !Late(bench); ++layer->refitted) {
+    Screened& entry = layer->screen[layer->leaders[layer->refitted]];
+    say("fitting " + entry.use.Text());
+    auto child = std::make_unique<Candidate>(std::move(entry.child));
+    double best_cost = parent.train_cost;
+    for (const auto& other : layer->children) best_cost = std::min(best_cost, other->train_cost);
+    FitChild(bench, parent, entry.use, entry.trial, best_cost, child.get());
+    ScoreCandidate(bench, child.get());
+    layer->children.push_back(std::move(child));
+  }
+}
+
+// `share` of the time that is left goes to finding the leader; its own last fit may take more.
+void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::size_t refits, double share, const Say& say, Layer* layer) {
+  const Workbench hurried = Hurried(bench, share);
   const auto possible = parent.model->PossibleEffects();
   if (!possible.ok()) return;
   std::vector<EffectUse> uses;
@@ -125,26 +152,17 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
     if (IsFinding(use, base)) uses.push_back(use);
   }
   layer->screen = Screen(bench, parent, uses);
-  double best_cost = parent.train_cost;
-  for (const std::size_t index : Leaders(*layer, *parent.model, refits)) {
-    if (Late(bench)) break;
-    Screened& entry = layer->screen[index];
-    say("fitting " + entry.use.Text());
-    auto child = std::make_unique<Candidate>(std::move(entry.child));
-    FitChild(bench, parent, entry.use, entry.trial, best_cost, child.get());
-    best_cost = std::min(best_cost, child->train_cost);
-    ScoreCandidate(bench, child.get());
-    layer->children.push_back(std::move(child));
-  }
+  layer->leaders = Leaders(*layer, *parent.model, refits);
+  Refit(hurried, parent, say, layer);
   if (layer->children.empty()) return;
   SortByMisfit(parent, &layer->children);
-  ImitateLeader(bench, parent, layer);
-  StartFromCoulomb(bench, layer);
+  ImitateLeader(hurried, parent, layer);
+  StartFromCoulomb(hurried, layer);
   SortByMisfit(parent, &layer->children);
   // The leaders once more to the end.
   for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !Late(bench); ++i) {
     Candidate& leader = *layer->children[i];
-    if (i > 0 && leader.train_cost > 1.5 * layer->children.front()->train_cost) break;
+    if (i > 0 && (leader.train_cost > 1.5 * layer->children.front()->train_cost || Late(hurried))) break;
     FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
     ScoreCandidate(bench, &leader);
   }
@@ -205,14 +223,20 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
 
   say("screening");
   // Where the base model is at the noise already, fewer refits show that nothing is missing.
-  Explore(bench, *base.model, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, say, &result.first);
+  Explore(bench, *base.model, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, kFirstShare, say, &result.first);
   Candidate* single = Simplest(result.first, base);
+  if (!single || single->held_out_floors <= kRemains) {
+    // No second effect will be sought: the time is for rivals.
+    Refit(bench, base, say, &result.first);
+    SortByMisfit(base, &result.first.children);
+    single = Simplest(result.first, base);
+  }
   if (single && Convincing(Compare(base, *single), kFirst)) result.single = result.chosen = single;
 
   if (single && result.single == single && single->held_out_floors > kRemains && !Late(bench)) {
     say("looking for a second effect");
     result.second_parent = single;
-    Explore(bench, *base.model, *single, kSecondRefits, say, &result.second);
+    Explore(bench, *base.model, *single, kSecondRefits, kSecondShare, say, &result.second);
     if (const Candidate* pair = Simplest(result.second, *single)) {
       const Evidence more = Compare(*single, *pair);
       const double removed = RemovedExcess(single->held_out_floors, pair->held_out_floors), typically = RemovedExcess(TypicalFloors(*single), TypicalFloors(*pair));

@@ -14,9 +14,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The log's own initial state counts as much as this many samples at the window's start.
 constexpr double kStatePriorSamples = 5;
-// How far the log's own initial speed is trusted: position over this time. The slope of a parabola through 40 ms of a swing of 5 Hz is 4 % off, more than
-// its standard error: kInitialFitHalfWidth_s here made fitted inertias 0.3 % wrong with intervals half as wide.
-constexpr double kSpeedPrior_s = 0.25 * kInitialFitHalfWidth_s;
 constexpr double kOffsetBound_rad = 0.3;
 // Of the sum of squares, per residual and squared range of a coordinate.
 constexpr double kAnchor = 1e-8;

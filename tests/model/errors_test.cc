@@ -48,7 +48,7 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
       {"joint: hinge, unit: rad",
        "actuator: moter, kind: torque",
        {"actuator that the MJCF lacks", "did you mean 'motor'?"}},
-      {"unit: rad", "unit: rad, filter: {cutoff_rad_per_s: hinge.offset, damping_ratio: hinge.ofset}", {"no such parameter", "filter of signal", "'hinge.ofset'"}},
+      {"unit: rad", "unit: rad, filter: {cutoff_rad_per_s: hinge.damping, damping_ratio: hinge.ofset}", {"no such parameter", "filter of signal", "'hinge.ofset'"}},
       {"unit: rad", "unit: rad, offset: hinge.ofset", {"no such parameter", "'hinge.ofset'"}},
       {"joint/hinge/damping:", "joint/hinge/dampin:", {"experiment.yaml:9:3:", "did you mean 'damping'?"}},
       {"joint/hinge/damping:", "joint/hnge/damping:", {"experiment.yaml:9:3:", "did you mean 'hinge'?"}},

@@ -70,7 +70,7 @@ Dense DenseProblem(const Rig& rig, const Recording& recording, double lead_in_s)
     }
     for (int j = 0; j < 2; ++j) {
       std::vector<double> row(columns, 0.0);
-      row[2 + 2 * w + static_cast<std::size_t>(j)] = prior * (j == 0 ? 1 : kInitialFitHalfWidth_s);
+      row[2 + 2 * w + static_cast<std::size_t>(j)] = prior * (j == 0 ? 1 : kSpeedPrior_s);
       rows.push_back(row);
       residual.push_back(0);
     }

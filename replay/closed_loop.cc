@@ -94,6 +94,12 @@ MotionStatistics StatisticsOf(const std::vector<double>& time_s, const std::vect
 
 Result<ClosedLoopResult> ReplayClosedLoop(const Model& model, const std::vector<Recording>& recordings, const ControllerSpec& spec, const ReplayOptions& options, ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
+  for (const SignalSource& source : model.sources()) {
+    if (source.delay < 0 && source.cutoff < 0) continue;
+    const std::string& signal = model.experiment().measured[static_cast<std::size_t>(&source - model.sources().data())].signal;
+    return Error{.what = "a late or filtered sensor cannot be replayed in closed loop: the controller would see the joint itself", .where = model.experiment().path, .actual = "'" + signal + "'",
+                 .cure = "replay in free_run or windows, or leave sensor_delay and 'filter:' out"};
+  }
   ClosedLoopResult closed;
   closed.result.mode = ReplayMode::kClosedLoop;
   closed.result.time_step_s = options.time_step_s > 0 ? options.time_step_s : model.compiled().opt.timestep;

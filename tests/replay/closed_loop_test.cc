@@ -123,6 +123,16 @@ TEST_F(ClosedLoopTest, ObserverFollowsTheLinearSystemExactly) {
   }
 }
 
+TEST_F(ClosedLoopTest, ALateSensorIsRefused) {
+  Load(kBalance, kPi, 0.02);
+  const auto late = Model::Build(experiment_, {{"sensor_delay", "arm_rad"}});
+  ASSERT_TRUE(late.ok()) << late.error().Text();
+  model_ = late.value();
+  const auto result = Run();
+  ASSERT_FALSE(result.ok());
+  EXPECT_NE(result.error().Text().find("'arm_rad'"), std::string::npos) << result.error().Text();
+}
+
 TEST_F(ClosedLoopTest, AnObserverOfTheWrongSizeIsRefused) {
   for (const auto& [section, says] : std::vector<std::pair<std::string, std::string>>{
            {"observer: {a: [[0, 1], [0, 0]], b: [0, 1], c: [[1, 0]], gain: [[1, 2]], feedback: [1, 1]}", "'gain' is not a matrix"},

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <set>
+
 #include "src/report/json.h"
 
 namespace gapscope {
@@ -39,7 +41,10 @@ std::string TuneTable(const TuneSummary& summary, const Model& model, const Cons
     text += fmt::format("{:<44} {:>11.4g} {:>11.4g}   {:<24} {}{}\n", p.name, p.nominal, t.value, t.identifiable ? fmt::format("{:.4g} .. {:.4g}", t.low, t.high) : "not known", p.unit,
                         t.at_bound ? console.Warn("  at its bound") : "");
   }
-  for (const auto& flat : summary.flat) text += "flat: " + FlatText(flat, model) + "\n";
+  std::set<std::string> said;  // two directions may lead with the same parameter
+  for (const auto& flat : summary.flat) {
+    if (const std::string line = FlatText(flat, model); said.insert(line).second) text += "flat: " + line + "\n";
+  }
   for (const auto& [a, b, r] : summary.correlated) text += fmt::format("{} and {} go together (correlation {:.3f})\n", model.parameters()[a].name, model.parameters()[b].name, r);
   text.append("\n").append(console.Bold(fmt::format("{:<44} {:<18} {:>10} {:>10} {:>8}", "held-out log", "signal", "RMSE", "MAE", "nRMSE"))).append("\n");
   for (const auto& log : summary.held_out) {

@@ -60,12 +60,12 @@ function writeParameters(result, declared) {
   const all = parametersOf(result, declared).filter((p) => known(p.value) && (!p.frozen || p.fitted));
   if (!all.length) return;
   const rows = all.map((p) => {
-    const notes = [p.open ? element("span", {class: "tag warn"}, "not known from these logs") : null, p.at_bound ? element("span", {class: "tag warn"}, "at its bound") : null];
+    const notes = [p.open ? element("span", {class: "tag warn"}, "not known alone") : null, p.at_bound ? element("span", {class: "tag warn"}, "at its bound") : null];
     const interval = p.open || !known(p.from) ? "–" : `${number(p.from)} to ${number(p.to)}`;
     return [element("code", {title: p.doc ?? ""}, p.name), {number: number(p.nominal)}, {number: number(p.value)}, interval, p.unit, rangePicture(p), element("span", {}, ...notes)];
   });
   document.getElementById("parameter-table").append(table("Parameters", ["parameter", {number: "nominal"}, {number: "value"}, "95 % interval", "unit", "dot: value; mark: nominal; line: bounds", ""], rows));
-  const notes = [...(result.flat ?? []).map((f) => f.text), ...(result.correlated ?? []).map((c) => `${listed(c.parameters)} go together (correlation ${number(c.correlation, 3)})`)];
+  const notes = [...new Set((result.flat ?? []).map((f) => f.text)), ...(result.correlated ?? []).map((c) => `${listed(c.parameters)} go together (correlation ${number(c.correlation, 3)})`)];
   document.getElementById("parameter-notes").append(...notes.map((note) => element("li", {}, note)));
   show("parameters");
 }

@@ -103,8 +103,13 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     windows_ = std::move(kept);
   }
   if (options_.fit_shift && model.command_delay() < 0) {
-    // In samples.
-    low.push_back(-1);
+    // In samples. A torque is read at a stamp under the command before: it jumps to the next command as soon as commands come early, and no descent gets past
+    // that. Where one is scored commands are late or on time.
+    bool torque = false;
+    for (std::size_t l = 0; l < recordings.size(); ++l) {
+      for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) torque = torque || (recordings[l].measured[s].spec.kind == SignalKind::kTorque && scaling_[l][s].weight > 0);
+    }
+    low.push_back(torque ? 0 : -1);
     high.push_back(1);
     shift_scale_s_ = options_.shift_range_s > 0 ? options_.shift_range_s : step;
   }

@@ -52,6 +52,22 @@ double MeanHeld(const std::vector<double>& time, const std::vector<double>& valu
   return sum / (to - from);
 }
 
+// What the log says `later_s` after a row: a late sensor shows the row's own state only then.
+LocalFit FitLater(const Recording& recording, const Recording::Measured& measured, std::size_t row, double later_s) {
+  if (later_s == 0) return FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+  const auto& time = recording.time_s;
+  const double at = time[row] + later_s;
+  while (row + 2 < time.size() && time[row + 1] <= at) ++row;
+  const LocalFit a = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+  if (row + 1 >= time.size()) return a;
+  const LocalFit b = FitLocally(recording, measured, row + 1, kInitialFitHalfWidth_s);
+  const double share = std::clamp((at - time[row]) / (time[row + 1] - time[row]), 0.0, 1.0);
+  LocalFit between = a;
+  between.value = (1 - share) * (a.value + a.slope * (at - time[row])) + share * (b.value + b.slope * (at - time[row + 1]));
+  between.slope = (1 - share) * a.slope + share * b.slope;
+  return between;
+}
+
 }  // namespace
 
 InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values) {
@@ -63,7 +79,7 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
     if (source.kind != SignalKind::kPosition) continue;
-    const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+    const LocalFit fit = FitLater(recording, measured, row, source.delay >= 0 ? values[source.delay] : 0);
     state.qpos[source.qpos] = fit.value - (source.offset >= 0 ? values[source.offset] : 0);
     state.qvel[source.dof] = fit.slope;
     known[source.dof] = true;
@@ -71,7 +87,7 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
     if (source.kind != SignalKind::kVelocity || known[source.dof]) continue;
-    state.qvel[source.dof] = FitLocally(recording, measured, row, kInitialFitHalfWidth_s).value;
+    state.qvel[source.dof] = FitLater(recording, measured, row, source.delay >= 0 ? values[source.delay] : 0).value;
   }
   for (const auto& [joint, from] : model.mirrored_joints()) {
     state.qpos[m.jnt_qposadr[joint]] = state.qpos[m.jnt_qposadr[from]];

@@ -37,7 +37,7 @@ std::string Candidate::Name() const {
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
-                     .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated), .huber = 0};
+                     .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated), .linear_terms = true, .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
@@ -78,6 +78,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
 void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   constexpr double kPriorLevel = 0.2;  // of the cost, in which the prior counts one half per squared standard deviation
   FitOptions fit = bench.Options(*candidate->model, true);
+  fit.linear_terms = false;
   fit.logarithmic_effects = true;
   auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
   // The prior's centre is nominal; a model that leaves more than the noise has residuals that lie, and count for less.

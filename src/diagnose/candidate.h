@@ -46,6 +46,7 @@ struct Workbench {
   bool by_windows = false;       // train and held-out logs are the same: every third window is held out
 
   FitOptions Options(const Model& model, bool train) const;
+  bool Late() const { return deadline && std::chrono::steady_clock::now() >= *deadline; }
 };
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.

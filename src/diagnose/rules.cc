@@ -60,6 +60,12 @@ bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
   return false;
 }
 
+bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model) {
+  const auto any = [](const std::string& effect, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), effect) != names.end(); };
+  return any(first.effect, {"coulomb_friction", "stribeck_friction", "load_friction", "direction_asymmetry"}) && any(second.effect, {"joint_compliance", "backlash"}) &&
+         JointOf(first.on, model) == JointOf(second.on, model);
+}
+
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
   if (richer.effects.size() != simpler.effects.size() || richer.effects.empty()) return false;
   for (std::size_t i = 0; i + 1 < richer.effects.size(); ++i) {
@@ -70,11 +76,22 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
   return std::any_of(std::begin(kContainments), std::end(kContainments), [&](const Containment& c) { return a.effect == c.richer && b.effect == c.simpler && (c.exact || !exactly); });
 }
 
+namespace {
+
+std::size_t LateSensors(const Candidate& candidate) {
+  return static_cast<std::size_t>(std::count_if(candidate.effects.begin(), candidate.effects.end(), [](const EffectUse& use) { return use.effect == "sensor_delay"; }));
+}
+
+}  // namespace
+
 bool MayBeRivals(const Candidate& a, const Candidate& b) {
-  return !Contains(a, b, true) && !Contains(b, a, true) && !a.at_bound && !b.at_bound;
+  // Two sensors late are one late command and what one of them is late beyond it: the same motion, told in a less likely way.
+  const bool same = a.effects.size() == 2 && b.effects.size() == 2 && LateSensors(a) + LateSensors(b) == 3;
+  return !same && !Contains(a, b, true) && !Contains(b, a, true) && !a.at_bound && !b.at_bound;
 }
 
 bool IsLessLikely(const Candidate& a, const Candidate& b) {
+  if (LateSensors(a) == 2 && LateSensors(b) == 1 && b.effects.size() == 2 && (b.effects.front().effect == "command_delay" || b.effects.back().effect == "command_delay")) return true;
   if (a.effects.empty() || b.effects.size() != a.effects.size() || a.effects.back().effect != "gravity_offset" || b.effects.back().effect != "cable_spring" || a.effects.back().on != b.effects.back().on) return false;
   const mjModel& m = a.model->compiled();
   const int joint = mj_name2id(&m, mjOBJ_JOINT, a.effects.back().on.c_str());

@@ -10,9 +10,12 @@ namespace gapscope {
 inline constexpr Limits kFirst{.share = 0.01, .z = 2.5};       // the first effect over the refitted base model
 inline constexpr double kRemains = 1.25;                       // residual over noise below which nothing more is sought
 inline constexpr Limits kSecond{.share = 0.06, .z = 3.0};      // a second effect over the first
-inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise
+inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise,
+inline constexpr double kSecondOfGap = 0.025;                  // and of the base model's residual: the first effect's shape is never quite the real one;
+inline constexpr double kUntoldOfGap = 0.15;                   // this much where unlike effects would do as well, or where it may be the first one's shape
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains
-inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains
+inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains,
+inline constexpr double kNestedExcess = 0.25;                  // or of what the simpler one leaves above the noise
 inline constexpr Limits kTold{.share = 0.03, .z = 2.5};        // the winner over a rival; below, the two are ambiguous
 inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.8;   // left above the noise, and share of the excess removed (in windows, or of a free run)
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
@@ -21,13 +24,15 @@ inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted b
 bool IsFinding(const EffectUse& use, const Model& base);
 // Whether the effects are known to be confused with each other, at places that are one.
 bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
+// Whether `second` may stand for what the model of `first` leaves out of the real effect: dry friction gives way elastically before it slides.
+bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model);
 // Whether `richer` can do all that `simpler` does (same other effects); `exactly`: not only nearly, as far as its bounds go.
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = false);
 // Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.
 bool MayBeRivals(const Candidate& a, const Candidate& b);
 
 // Whether `a` is the less likely of two that explain the logs equally well: gravity on a joint whose axis stands upright, where only a tilted rig would
-// feel it, beside a cable.
+// feel it, beside a cable; two late sensors beside a late command and one.
 bool IsLessLikely(const Candidate& a, const Candidate& b);
 
 }  // namespace gapscope

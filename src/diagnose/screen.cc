@@ -31,13 +31,30 @@ double StepTo(const PlacedParameter& p, double trial, double scale) {
   return std::clamp(p.neutral + std::clamp(scale, kLeastScale, kMostScale) * (trial - p.neutral), p.low, p.high);
 }
 
+constexpr std::size_t kScan = 8;    // trial values that make a scan
+constexpr std::size_t kOthers = 3;
+
+// The best of `trials` (one per value of the scanned parameter `scanned`), with the next best that are no neighbours of it or each other.
+Trial BestOfScan(std::vector<Trial> trials, int scanned) {
+  std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.drop > b.drop; });
+  constexpr double kNeighbour = 1.5, kFarBehind = 0.4;
+  Trial best = trials.front();
+  for (std::size_t i = 1; i < trials.size() && best.others.size() < kOthers && trials[i].drop > kFarBehind * best.drop; ++i) {
+    const auto near = [&](const Trial& t) { return std::abs(t.values[scanned] - trials[i].values[scanned]) < kNeighbour; };
+    if (!near(best) && std::none_of(best.others.begin(), best.others.end(), near)) best.others.push_back(trials[i]);
+  }
+  return best;
+}
+
 }  // namespace
 
 Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, const FitProblem& parent, const FitPoint& point, const Snapshot& base) {
-  Trial best;
+  std::vector<Trial> best;
+  bool visible = false;
+  int scan = -1;
   const Model& model = *child.model;
   const auto placed = model.EffectParameters(use, bench.scales);
-  if (!placed.ok()) return best;
+  if (!placed.ok()) return {};
   const std::vector<double> nominal = model.Nominal();
   for (const auto& trial : Trials(placed.value())) {
     std::vector<double> tried = nominal;
@@ -45,16 +62,27 @@ Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, 
     const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
     if (!test.valid) continue;
     constexpr double kAllAbsorbed = 0.999;
-    best.visible = best.visible || test.absorbed < kAllAbsorbed;
-    if (best.valid && test.drop <= best.drop * base.cost) continue;
-    best.valid = true;
-    best.drop = test.drop / base.cost;
-    best.absorbed = test.absorbed;
-    best.dy = test.dy;
-    for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = StepTo(placed.value()[i], trial[i], test.scale);
-    best.values = std::move(tried);
+    visible = visible || test.absorbed < kAllAbsorbed;
+    int scanned = -1;
+    for (std::size_t i = 0; i < trial.size(); ++i) {
+      const PlacedParameter& p = placed.value()[i];
+      tried[model.IndexOf(p.name)] = StepTo(p, trial[i], test.scale);
+      if (p.trials.size() >= kScan) scanned = model.IndexOf(p.name);
+    }
+    Trial found{.drop = test.drop / base.cost, .absorbed = test.absorbed, .values = std::move(tried), .dy = test.dy, .valid = true, .others = {}};
+    // One per scanned value; without a scan, one.
+    const auto same = std::find_if(best.begin(), best.end(), [&](const Trial& t) { return scanned < 0 || t.values[scanned] == found.values[scanned]; });
+    if (same == best.end()) {
+      best.push_back(std::move(found));
+    } else if (found.drop > same->drop) {
+      *same = std::move(found);
+    }
+    scan = scanned;
   }
-  return best;
+  if (best.empty()) return {};
+  Trial result = scan < 0 ? std::move(best.front()) : BestOfScan(std::move(best), scan);
+  result.visible = visible;
+  return result;
 }
 
 std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses) {

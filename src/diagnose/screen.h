@@ -14,6 +14,7 @@ struct Trial {
   Eigen::VectorXd dy;           // and how the parent's own coordinates answer
   bool visible = false;         // some trial value leaves a column that the parent cannot imitate
   bool valid = false;           // false: no trial value can be simulated
+  std::vector<Trial> others;    // the next best at other values of a scanned parameter (the number of periods): valleys of their own
 };
 
 // Tries the values of `use`, the last effect of `child`, against `base`: a snapshot of `parent` at `point`, whose parameters are `values`.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "src/diagnose/refit.h"
 #include "src/diagnose/rules.h"
 
 namespace gapscope {
@@ -12,14 +13,11 @@ bool AreRivals(const Candidate& a, const Candidate& b) { return !Convincing(Comp
 
 namespace {
 
-constexpr int kFirstIterations = 14, kFinalIterations = 20;
-constexpr double kFirstTolerance = 2e-3, kFinalTolerance = 2e-4;
-constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4;  // leaders of the screen that are refitted, beside the partners of the first two
+constexpr int kFinalIterations = 20;
+constexpr double kFinalTolerance = 2e-4;
+constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4, kExchangeRefits = 2;  // leaders of the screen that are refitted, beside the partners of the first two
 constexpr double kFirstShare = 0.5, kSecondShare = 0.8;  // of the time left, for the refits of a first and of a second effect
 constexpr double kNearly = 0.6;                        // of the best one's gain
-constexpr double kWorthImitating = 0.8;                // a leader that leaves less than this share of its parent's cost
-
-bool Late(const Workbench& bench) { return bench.deadline && std::chrono::steady_clock::now() >= *bench.deadline; }
 
 // The best first. An effect with a parameter on its bound is stretched into something it is not: it comes after one that gains nearly as much.
 void SortByMisfit(const Candidate& parent, Candidates* children) {
@@ -28,21 +26,6 @@ void SortByMisfit(const Candidate& parent, Candidates* children) {
   const double most = Compare(parent, *children->front()).gain;
   const auto sound = std::find_if(children->begin(), children->end(), [&](const auto& c) { return !c->at_bound && Compare(parent, *c).gain > kNearly * most; });
   if (sound != children->end()) std::rotate(children->begin(), sound, sound + 1);
-}
-
-// A fit from a start of its own, kept if it ends below the candidate's.
-void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance) {
-  if (!std::isfinite(candidate->problem->Cost(start))) return;
-  const FitPoint before = candidate->point;
-  const double cost = candidate->train_cost;
-  const bool converged = candidate->converged;
-  FitCandidate(bench, candidate, start, iterations, tolerance);
-  if (candidate->train_cost < cost) return;
-  candidate->point = before;
-  candidate->train_cost = cost;
-  candidate->converged = converged;
-  candidate->values = candidate->problem->Values(before);
-  candidate->shift_s = candidate->problem->Shift(before);
 }
 
 // Indices into the screen: the leaders by the score test, then the partners of the first two wherever they act.
@@ -60,19 +43,6 @@ std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::si
   return order;
 }
 
-// From the screen's own step, and where that ends above the parent from hardly any effect.
-void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child) {
-  FitPoint start = child->problem->FromParent(*parent.problem, parent.point, trial.values, trial.dy);
-  if (!std::isfinite(child->problem->Cost(start))) start = child->problem->FromParent(*parent.problem, parent.point, trial.values, {});
-  FitCandidate(bench, child, start, kFirstIterations, kFirstTolerance, rival_cost);
-  if (child->train_cost <= parent.train_cost * 1.0005 || Late(bench)) return;
-  const auto placed = child->model->EffectParameters(use, bench.scales);
-  if (!placed.ok()) return;
-  std::vector<double> neutral = trial.values;
-  for (const auto& p : placed.value()) neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
-  TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations, kFirstTolerance);
-}
-
 // The bench with less time: what is left of the budget is for what comes later.
 Workbench Hurried(const Workbench& bench, double share) {
   Workbench hurried = bench;
@@ -83,54 +53,9 @@ Workbench Hurried(const Workbench& bench, double share) {
   return hurried;
 }
 
-// Rivals start anew where they best imitate the leader: an unconverged rival looks exactly like a rejected one.
-void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
-  constexpr std::size_t kMost = 3;
-  Candidate& leader = *layer->children.front();
-  if (!(leader.train_cost < kWorthImitating * parent.train_cost) || Late(bench)) return;
-  const FitPoint at = parent.problem->FromParent(*leader.problem, leader.point, leader.model->Nominal(), {});
-  const Snapshot snapshot = parent.problem->Capture(at, 0.01);
-  if (!snapshot.valid) return;
-  std::size_t tried = 0;
-  for (std::size_t i = 1; i < layer->children.size() && tried < kMost && !Late(bench); ++i) {
-    Candidate& rival = *layer->children[i];
-    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) || (rival.train_cost < 1.02 * leader.train_cost && !Contains(rival, leader))) continue;
-    const Trial trial = TryEffect(bench, rival, rival.effects.back(), *parent.problem, at, snapshot);
-    if (!trial.valid) continue;
-    ++tried;
-    FitPoint start = rival.problem->FromParent(*parent.problem, at, trial.values, trial.dy);
-    if (!std::isfinite(rival.problem->Cost(start))) start = rival.problem->FromParent(*parent.problem, at, trial.values, {});
-    TryStart(bench, &rival, start, kFirstIterations, kFirstTolerance);
-    ScoreCandidate(bench, &rival);
-  }
-}
-
-// What contains Coulomb friction starts from where that ended: both directions alike, or a hump a little above the sliding level, below which a hump has no
-// gradient and its fit would stay Coulomb's.
-void StartFromCoulomb(const Workbench& bench, Layer* layer) {
-  constexpr double kSliding = 0.9, kHump = 1.5, kClearlyBetter = 0.9;
-  for (const auto& simple : layer->children) {
-    if (simple->effects.back().effect != "coulomb_friction" || simple->held_out_floors < kRemains) continue;
-    const std::string on = simple->effects.back().on;
-    const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
-    for (const auto& rich : layer->children) {
-      if (rich->effects.back().on != on || !Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost || Late(bench)) continue;
-      const auto placed = rich->model->EffectParameters(rich->effects.back(), bench.scales);
-      if (!placed.ok()) continue;
-      const bool hump = rich->effects.back().effect == "stribeck_friction";
-      std::vector<double> values = rich->model->Nominal();
-      for (const auto& p : placed.value()) {
-        values[rich->model->IndexOf(p.name)] = p.unit != "N m" ? p.start : !hump ? level : p.key == "breakaway_n_m" ? kHump * level : kSliding * level;
-      }
-      TryStart(bench, rich.get(), rich->problem->FromParent(*simple->problem, simple->point, values, {}), kFirstIterations, kFirstTolerance);
-      ScoreCandidate(bench, rich.get());
-    }
-  }
-}
-
 // Refits the leaders that have not been, in their order, as far as the time goes.
 void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Layer* layer) {
-  for (; layer->refitted < layer->leaders.size() && !Late(bench); ++layer->refitted) {
+  for (; layer->refitted < layer->leaders.size() && !bench.Late(); ++layer->refitted) {
     Screened& entry = layer->screen[layer->leaders[layer->refitted]];
     say("fitting " + entry.use.Text());
     auto child = std::make_unique<Candidate>(std::move(entry.child));
@@ -160,9 +85,9 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
   StartFromCoulomb(hurried, layer);
   SortByMisfit(parent, &layer->children);
   // The leaders once more to the end.
-  for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !Late(bench); ++i) {
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !bench.Late(); ++i) {
     Candidate& leader = *layer->children[i];
-    if (i > 0 && (leader.train_cost > 1.5 * layer->children.front()->train_cost || Late(hurried))) break;
+    if (i > 0 && (leader.train_cost > 1.5 * layer->children.front()->train_cost || hurried.Late())) break;
     FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
     ScoreCandidate(bench, &leader);
   }
@@ -183,7 +108,7 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent) {
     if (child.get() == best || child->held_out_blocks.empty()) continue;
     const Evidence more = Compare(*child, *best);
     if (Contains(*best, *child)) {
-      const bool much = more.gain > kNestedShare * Compare(parent, *best).gain;
+      const bool much = more.gain > kNestedShare * Compare(parent, *best).gain || RemovedExcess(child->held_out_floors, best->held_out_floors) > kNestedExcess;
       if (!much || !Convincing(more, kNested)) best = child.get();
     } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
@@ -192,6 +117,33 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent) {
     }
   }
   return best;
+}
+
+// A second effect worth naming: more than chance, more than a share of what the first left, and more than the first one's own shape, which is never quite the
+// real one: what is small and unlike effects explain equally well is that.
+bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
+  if (!Convincing(Compare(single, pair), kSecond)) return false;
+  const double removed = RemovedExcess(single.held_out_floors, pair.held_out_floors), typically = RemovedExcess(TypicalFloors(single), TypicalFloors(pair));
+  if (std::max(removed, typically) < kSecondExcess) return false;
+  const double size = std::sqrt(std::max(0.0, std::pow(single.held_out_floors, 2) - std::pow(pair.held_out_floors, 2))) / found.base->held_out_floors;
+  const bool told = std::none_of(found.second.children.begin(), found.second.children.end(), [&](const auto& rival) {
+    return rival.get() != &pair && !rival->held_out_blocks.empty() && !Contains(*rival, pair) && !Contains(pair, *rival) && !ArePartners(rival->effects.back(), pair.effects.back(), *single.model) &&
+           AreRivals(pair, *rival);
+  });
+  const bool shape = IsShape(pair.effects.back(), single.effects.back(), *single.model);
+  return size > (told && !shape ? kSecondOfGap : kUntoldOfGap);
+}
+
+// The other way round: what goes best with the pair's second effect? The first one was chosen while the second was missing, and may stand for another.
+void Exchange(const Workbench& bench, const Model& base, Candidate* second, const Say& say, SearchResult* result) {
+  say("looking for a better partner of " + second->Name());
+  Layer layer;
+  Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer);
+  const Candidate* other = Simplest(layer, *second);
+  if (!other || other->effects.back() == result->single->effects.front() || LogMisfit(*other) > LogMisfit(*result->chosen)) return;
+  result->single = result->second_parent = second;
+  result->chosen = other;
+  result->second = std::move(layer);
 }
 
 }  // namespace
@@ -233,17 +185,15 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   }
   if (single && Convincing(Compare(base, *single), kFirst)) result.single = result.chosen = single;
 
-  if (single && result.single == single && single->held_out_floors > kRemains && !Late(bench)) {
+  if (single && result.single == single && single->held_out_floors > kRemains && !bench.Late()) {
     say("looking for a second effect");
     result.second_parent = single;
     Explore(bench, *base.model, *single, kSecondRefits, kSecondShare, say, &result.second);
     if (const Candidate* pair = Simplest(result.second, *single)) {
-      const Evidence more = Compare(*single, *pair);
-      const double removed = RemovedExcess(single->held_out_floors, pair->held_out_floors), typically = RemovedExcess(TypicalFloors(*single), TypicalFloors(*pair));
-      if (Convincing(more, kSecond) && std::max(removed, typically) > kSecondExcess) result.chosen = pair;
+      if (IsSecond(result, *single, *pair)) result.chosen = pair;
     }
     // Backward: does the first one still matter?
-    if (result.chosen != single && !Late(bench)) {
+    if (result.chosen != single && !bench.Late()) {
       GS_ASSIGN(Candidate other, MakeCandidate(bench, {result.chosen->effects[1]}));
       std::vector<double> values = other.model->Nominal();
       for (std::size_t i = 0; i < values.size(); ++i) {
@@ -256,17 +206,21 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
       auto place = std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects == other.effects; });
       if (place == singles.end()) place = singles.insert(singles.end(), nullptr);
       *place = std::make_unique<Candidate>(std::move(other));
-      const Candidate* alone = place->get();
-      if (!Convincing(Compare(*alone, *result.chosen), kSecond)) result.single = result.chosen = alone;
+      Candidate* alone = place->get();
+      if (!Convincing(Compare(*alone, *result.chosen), kSecond)) {
+        result.single = result.chosen = alone;
+      } else if (!bench.Late()) {
+        Exchange(bench, *base.model, alone, say, &result);
+      }
     }
   }
   // What the logs leave open goes to where the base model's nominal values pull it: undamped steps, as damping holds it where the search left it.
-  if (!Late(bench) && result.chosen != &base) {
+  if (!bench.Late() && result.chosen != &base) {
     auto* chosen = const_cast<Candidate*>(result.chosen);
     PolishCandidate(bench, chosen);
     ScoreCandidate(bench, chosen);
   }
-  result.budget_spent = Late(bench);
+  result.budget_spent = bench.Late();
   result.free_run_before = FreeRunError(bench, base);
   result.free_run_left = result.chosen == &base ? result.free_run_before : FreeRunError(bench, *result.chosen);
   return result;

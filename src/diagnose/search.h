@@ -3,19 +3,9 @@
 #define GAPSCOPE_DIAGNOSE_SEARCH_H_
 
 #include "src/diagnose/evidence.h"
-#include "src/diagnose/screen.h"
+#include "src/diagnose/refit.h"
 
 namespace gapscope {
-
-using Candidates = std::vector<std::unique_ptr<Candidate>>;
-
-// What was found on top of one parent.
-struct Layer {
-  std::vector<Screened> screen;  // all effects, the most promising first; their candidates are spent where they were refitted
-  std::vector<std::size_t> leaders;  // of the screen, in the order of refits
-  std::size_t refitted = 0;          // of them
-  Candidates children;           // refitted, the best first
-};
 
 struct SearchResult {
   std::unique_ptr<Candidate> nominal, base;  // base: refitted

@@ -60,6 +60,9 @@ struct Parameter {
   std::string name, unit, doc;
   double nominal = 0, low = 0, high = 0;
   bool frozen = false;  // not tuned unless freed by name
+  // Another parameter, a size, with which this one acts linearly though not alone: kAngle: size * (cos, sin) of this; kRest: size * this. Empty: none.
+  enum class With { kNone, kAngle, kRest } with = With::kNone;
+  std::string size;
 };
 
 // A field of the compiled model and the expressions of parameters and log values that give its components.

@@ -152,7 +152,9 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
   std::vector<std::string> names;
   for (const auto& p : PlacedParameters(use, structure, table)) {
     names.push_back(p.name);
-    structure.AddParameter({.name = p.name, .unit = p.unit, .doc = effect.meaning, .nominal = p.neutral, .low = p.low, .high = p.high, .frozen = false});
+    const Parameter::With with = effect.parameters[names.size() - 1].with;
+    structure.AddParameter({.name = p.name, .unit = p.unit, .doc = effect.meaning, .nominal = p.neutral, .low = p.low, .high = p.high, .frozen = false, .with = with,
+                            .size = with == Parameter::With::kNone ? "" : names.front()});
   }
   for (const auto& [suffix, value, unit] : {std::tuple{".torque_n_m", scales.torque_n_m, "N m"}, std::tuple{".inertia_kg_m2", scales.inertia_kg_m2, "kg m^2"}}) {
     const std::string name = "scale@" + use.on + suffix;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "src/core/result.h"
+#include "src/experiment/experiment.h"
 
 namespace gapscope {
 
@@ -45,7 +46,7 @@ struct EffectParameter {
   double low = 0, high = 0;
   std::vector<double> trials; // values to screen with; empty: a shape parameter that stays at `start`
   double start = 0;           // where a fit starts when nothing better is known
-
+  Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
 };
 
 struct Effect {

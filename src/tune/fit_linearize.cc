@@ -78,17 +78,17 @@ bool FitProblem::DifferentiateWindow(Worker& worker, const FitWindow& window, co
     // Towards the inside, so that the step does not leave the bounds; the other way when that cannot be simulated.
     double h = point.y[i] + step <= c.high ? step : -step;
     for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
-      worker.values[c.parameter] = c.ToValue(point.y[i] + h);
+      SetCoordinate(point.y, i, point.y[i] + h, &worker.values);
       if (difference(i, h, Simulate(worker, window, point, worker.values, state, shift, worker.perturbed))) break;
     }
     if (columns == Columns::kCentral && point.y[i] - h >= c.low && point.y[i] - h <= c.high) {
-      worker.values[c.parameter] = c.ToValue(point.y[i] - h);
+      SetCoordinate(point.y, i, point.y[i] - h, &worker.values);
       if (Simulate(worker, window, point, worker.values, state, shift, worker.perturbed)) {
         Residuals(window, point, worker.perturbed, worker.other);
         jacobian.col(i) = 0.5 * (jacobian.col(i) - (worker.other - residual) / h);
       }
     }
-    worker.values[c.parameter] = values[c.parameter];
+    SetCoordinate(point.y, i, point.y[i], &worker.values);
   }
   if (all && shift_scale_s_ > 0) {
     constexpr double kShiftStep = 0.2;  // samples
@@ -235,6 +235,30 @@ void FitProblem::UpdateSecant(Snapshot& snapshot, const FitPoint& from, const Fi
     if (length > 0) jacobian += (residuals[w] - snapshot.residuals[w] - jacobian * moved) * (weighted / length).transpose();
     snapshot.residuals[w] = std::move(residuals[w]);
   });
+}
+
+Linearization FitProblem::Bend(const Linearization& at, const Snapshot& snapshot, const FitPoint& from, const FitPoint& to, double share, const std::vector<Eigen::VectorXd>& probe) {
+  const Eigen::Index n = low_.size();
+  const Eigen::VectorXd dy = to.y - from.y;
+  std::vector<Eigen::VectorXd> gradients(windows_.size());
+  Linearization bend{.cost = at.cost, .hessian = at.hessian, .gradient = Eigen::VectorXd::Zero(n), .block_gradients = {}, .block_logs = {}, .state_gain = at.state_gain, .state_step = at.state_step, .valid = true};
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int) {
+    const Eigen::MatrixXd& jacobian = snapshot.jacobians[w];
+    Eigen::VectorXd moved(jacobian.cols());
+    moved << dy, to.states[w] - from.states[w];
+    // r(x + s v) = r + s J v + s^2/2 r_vv; of r_vv, the half that a step takes.
+    const Eigen::VectorXd half = ((probe[w] - snapshot.residuals[w]) / share - jacobian * moved) / share;
+    const Eigen::VectorXd slope = jacobian.transpose() * half;
+    gradients[w] = slope.head(n);
+    if (const Eigen::Index m = jacobian.cols() - n; m > 0) {
+      Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
+      own.diagonal() += windows_[w].prior.cwiseAbs2();
+      bend.state_step[w] = -own.ldlt().solve(slope.tail(m));
+      gradients[w] -= at.state_gain[w].transpose() * slope.tail(m);
+    }
+  });
+  for (const auto& gradient : gradients) bend.gradient += gradient;
+  return bend;
 }
 
 Snapshot FitProblem::Capture(const FitPoint& point, double step) {

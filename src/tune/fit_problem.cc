@@ -115,6 +115,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
   }
   low_ = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
   high_ = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));
+  if (options_.linear_terms) CoupleTerms();
   anchor_ = Start().y;
   double scale = 1;
   if (!options_.weights.empty()) {
@@ -140,6 +141,68 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     }
   }
   anchor_weight_ += prior_weight_;
+}
+
+void FitProblem::CoupleTerms() {
+  for (std::size_t i = 0; i < coordinates_.size(); ++i) {
+    const Parameter& p = model_.parameters()[coordinates_[i].parameter];
+    const auto size = std::find_if(coordinates_.begin(), coordinates_.end(), [&](const Coordinate& c) { return model_.parameters()[c.parameter].name == p.size; });
+    if (p.with == Parameter::With::kNone || size == coordinates_.end() || size->logarithmic || coordinates_[i].logarithmic) continue;
+    const Couple couple{.size = size - coordinates_.begin(), .other = static_cast<Eigen::Index>(i), .with = p.with};
+    Coordinate& other = coordinates_[i];
+    if (p.with == Parameter::With::kAngle) {
+      other.scale = size->scale;
+      size->low = -size->high;
+      other.low = size->low, other.high = size->high;
+    } else {
+      const double most = size->high * std::max(-other.low, other.high);
+      other.scale *= size->scale;
+      other.low = -most, other.high = most;
+    }
+    for (const Eigen::Index k : {couple.size, couple.other}) {
+      low_[k] = coordinates_[static_cast<std::size_t>(k)].low;
+      high_[k] = coordinates_[static_cast<std::size_t>(k)].high;
+    }
+    couples_.push_back(couple);
+  }
+}
+
+void FitProblem::SetCouple(const Couple& couple, double size, double other, std::vector<double>* values) const {
+  const Coordinate &a = coordinates_[static_cast<std::size_t>(couple.size)], &b = coordinates_[static_cast<std::size_t>(couple.other)];
+  const Parameter& p = model_.parameters()[b.parameter];
+  size *= a.scale, other *= b.scale;
+  if (couple.with == Parameter::With::kAngle) {
+    (*values)[a.parameter] = std::min(std::hypot(size, other), model_.parameters()[a.parameter].high);
+    (*values)[b.parameter] = std::atan2(other, size);
+  } else {
+    (*values)[a.parameter] = size;
+    (*values)[b.parameter] = other == 0 ? 0 : std::clamp(other / size, p.low, p.high);
+  }
+}
+
+void FitProblem::SetCoordinate(const Eigen::VectorXd& y, Eigen::Index i, double moved, std::vector<double>* values) const {
+  const Coordinate& c = coordinates_[static_cast<std::size_t>(i)];
+  (*values)[c.parameter] = c.ToValue(moved);
+  for (const Couple& couple : couples_) {
+    if (couple.size == i || couple.other == i) SetCouple(couple, couple.size == i ? moved : y[couple.size], couple.other == i ? moved : y[couple.other], values);
+  }
+}
+
+Eigen::VectorXd FitProblem::ToSearch(const std::vector<double>& values) const {
+  const auto n = static_cast<Eigen::Index>(coordinates_.size());
+  Eigen::VectorXd y(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Coordinate& c = coordinates_[static_cast<std::size_t>(k)];
+    y[k] = c.ToSearch(values[c.parameter]);
+  }
+  for (const Couple& couple : couples_) {
+    const Coordinate &a = coordinates_[static_cast<std::size_t>(couple.size)], &b = coordinates_[static_cast<std::size_t>(couple.other)];
+    const double size = values[a.parameter], other = values[b.parameter];
+    const bool angle = couple.with == Parameter::With::kAngle;
+    y[couple.size] = (angle ? size * std::cos(other) : size) / a.scale;
+    y[couple.other] = (angle ? size * std::sin(other) : size * other) / b.scale;
+  }
+  return y.cwiseMax(low_.head(n)).cwiseMin(high_.head(n));
 }
 
 void FitProblem::CentrePrior(const std::vector<double>& values) {
@@ -171,11 +234,7 @@ std::size_t FitProblem::residuals() const {
 FitPoint FitProblem::Start() const {
   FitPoint point;
   point.y = Eigen::VectorXd::Zero(low_.size());
-  for (std::size_t i = 0; i < coordinates_.size(); ++i) {
-    const Coordinate& c = coordinates_[i];
-    const double value = values_[c.parameter];
-    point.y[i] = std::clamp(c.ToSearch(value), c.low, c.high);
-  }
+  point.y.head(static_cast<Eigen::Index>(coordinates_.size())) = ToSearch(values_);
   for (const auto& window : windows_) point.states.push_back(Eigen::VectorXd::Zero(window.prior.size()));
   return point;
 }
@@ -183,6 +242,7 @@ FitPoint FitProblem::Start() const {
 std::vector<double> FitProblem::Values(const FitPoint& point) const {
   std::vector<double> values = values_;
   for (std::size_t i = 0; i < coordinates_.size(); ++i) values[coordinates_[i].parameter] = coordinates_[i].ToValue(point.y[static_cast<Eigen::Index>(i)]);
+  for (const Couple& couple : couples_) SetCouple(couple, point.y[couple.size], point.y[couple.other], &values);
   return values;
 }
 
@@ -205,13 +265,14 @@ bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoin
   predicted.resize(window.rows.rows() * signals);
   worker.simulator.set_shift_s(shift);
   if (!worker.simulator.SetParameters(values, recording)) return false;
-  worker.start = window.start;
+  // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
+  const bool late = std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) { return source.delay >= 0 && values[source.delay] != values_[source.delay]; });
+  worker.start = late ? InitialStateAt(model_, recording, window.rows.begin, values) : window.start;
   for (std::size_t s = 0; s < signals; ++s) {
     const Scaling& scaling = scaling_[window.log][s];
     const SignalSource& source = model_.source(recording.measured[s].index);
     if (source.kind != SignalKind::kPosition) continue;
-    // The fixed start was made with the starting values' offset parameter.
-    if (source.offset >= 0) worker.start.qpos[source.qpos] += values_[source.offset] - values[source.offset];
+    if (source.offset >= 0 && !late) worker.start.qpos[source.qpos] += values_[source.offset] - values[source.offset];
     worker.start.qpos[source.qpos] -= Offset(point, window.log, s);
     if (scaling.joint_state >= 0) {
       worker.start.qpos[source.qpos] += state[scaling.joint_state];
@@ -275,6 +336,20 @@ double FitProblem::CostAndResiduals(const FitPoint& point, std::vector<Eigen::Ve
   return CostNow(point, nullptr, residuals);
 }
 
+double FitProblem::TakeBetterStates(FitPoint& point, std::vector<Eigen::VectorXd>& residuals, const FitPoint& other, std::vector<Eigen::VectorXd>& others) const {
+  double total = AnchorCost(point);
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    const auto cost = [&](const FitPoint& at, const std::vector<Eigen::VectorXd>& of) { return of[w].size() > 0 ? WindowCost(of[w], windows_[w], at.states[w]) : kInfinity; };
+    const double here = cost(point, residuals), there = cost(other, others);
+    if (there < here) {
+      point.states[w] = other.states[w];
+      residuals[w] = std::move(others[w]);
+    }
+    total += std::min(here, there);
+  }
+  return total;
+}
+
 std::vector<Eigen::VectorXd> FitProblem::ResidualsAgain(const FitPoint& point) {
   std::vector<Eigen::VectorXd> residuals;
   CostNow(point, nullptr, &residuals);
@@ -285,7 +360,7 @@ double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<double> costs(windows_.size());
-  if (residuals) residuals->resize(windows_.size());
+  if (residuals) residuals->assign(windows_.size(), {});
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
@@ -359,16 +434,14 @@ FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent
   FitPoint point = Start();
   Eigen::VectorXd y = parent_point.y;
   if (parent_dy.size() == y.size()) y = (y + parent_dy).cwiseMax(parent.low_).cwiseMin(parent.high_);
-  for (std::size_t i = 0; i < coordinates_.size(); ++i) {
-    const Coordinate& c = coordinates_[i];
-    const auto k = static_cast<Eigen::Index>(i);
-    point.y[k] = std::clamp(c.ToSearch(values[c.parameter]), c.low, c.high);
-    const std::string& name = model_.parameters()[c.parameter].name;
-    for (std::size_t j = 0; j < parent.coordinates_.size(); ++j) {
-      const Coordinate& other = parent.coordinates_[j];
-      if (parent.model_.parameters()[other.parameter].name == name) point.y[k] = std::clamp(c.ToSearch(other.ToValue(y[static_cast<Eigen::Index>(j)])), c.low, c.high);
+  const std::vector<double> known = parent.Values({.y = y, .states = {}});
+  std::vector<double> mine = values;
+  for (const Coordinate& c : coordinates_) {
+    for (const Coordinate& other : parent.coordinates_) {
+      if (parent.model_.parameters()[other.parameter].name == model_.parameters()[c.parameter].name) mine[c.parameter] = known[other.parameter];
     }
   }
+  point.y.head(static_cast<Eigen::Index>(coordinates_.size())) = ToSearch(mine);
   for (std::size_t l = 0; l < scaling_.size(); ++l) {
     for (std::size_t s = 0; s < scaling_[l].size(); ++s) {
       if (scaling_[l][s].offset >= 0 && parent.scaling_[l][s].offset >= 0) point.y[scaling_[l][s].offset] = y[parent.scaling_[l][s].offset];

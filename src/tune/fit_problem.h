@@ -45,6 +45,7 @@ struct FitOptions {
   double prior_share = 0;           // standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing
   double prior_offset_rad = 0;      // likewise of zero offsets, around zero; 0: nothing
   bool logarithmic_effects = false; // torques and stiffnesses of effects as logarithms, those of zero excepted: a factor common to all torques is then a straight line
+  bool linear_terms = false;        // an effect's size and angle (or rest) as the two terms that act linearly (Parameter::with): as size and angle they make curved valleys
   double huber = 0;                 // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 
@@ -127,6 +128,8 @@ class FitProblem {
   double Cost(const FitPoint& point, std::vector<double>* log_costs = nullptr, std::vector<Eigen::VectorXd>* residuals = nullptr);
   // The same, unknown to the journal.
   double CostAndResiduals(const FitPoint& point, std::vector<Eigen::VectorXd>* residuals);
+  // Gives each window of `point` the state of `other` (of the same y) where that costs less; `residuals` and `others` are the residuals there. The cost.
+  double TakeBetterStates(FitPoint& point, std::vector<Eigen::VectorXd>& residuals, const FitPoint& other, std::vector<Eigen::VectorXd>& others) const;
   // What the journal did not keep; not counted as a replay.
   std::vector<Eigen::VectorXd> ResidualsAgain(const FitPoint& point);
   // `step`: finite difference in search coordinates. Columns of parameters, offsets and shift may be left out: the gradient and hessian are zero then.
@@ -140,6 +143,9 @@ class FitProblem {
   // Moves a snapshot of `from` to `to`, whose residuals are known, without a replay: Broyden's rank-one update of each window's Jacobian
   // (Broyden, Mathematics of Computation 19, 1965).
   void UpdateSecant(Snapshot& snapshot, const FitPoint& from, const FitPoint& to, std::vector<Eigen::VectorXd> residuals);
+  // What bends the way from `from` to `to` (a step of `at`): half the residuals' second derivative along it, answered as Reduce answers residuals.
+  // `probe`: residuals at `from` + share (to - from).
+  Linearization Bend(const Linearization& at, const Snapshot& snapshot, const FitPoint& from, const FitPoint& to, double share, const std::vector<Eigen::VectorXd>& probe);
   // Moves y by dy and each window's state by its own best answer to that.
   FitPoint Move(const FitPoint& point, const Linearization& at, const Eigen::VectorXd& dy) const;
 
@@ -175,6 +181,17 @@ class FitProblem {
   struct Worker;
   struct Scaling;
 
+  // Two coordinates that give two parameters together (FitOptions::linear_terms).
+  struct Couple {
+    Eigen::Index size, other;
+    Parameter::With with;
+  };
+  void CoupleTerms();
+  void SetCouple(const Couple& couple, double size, double other, std::vector<double>* values) const;
+  // The values of coordinate i and of the one that it is coupled with, at y with `moved` in the place of y[i].
+  void SetCoordinate(const Eigen::VectorXd& y, Eigen::Index i, double moved, std::vector<double>* values) const;
+  Eigen::VectorXd ToSearch(const std::vector<double>& values) const;  // of the parameters
+
   void CountDifferences(Columns columns, bool base_known);
   bool DifferentiateWindow(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double step, Columns columns,
                            Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const;
@@ -191,6 +208,7 @@ class FitProblem {
   std::vector<double> values_;
   ThreadPool& pool_;
   std::vector<Coordinate> coordinates_;
+  std::vector<Couple> couples_;
   Eigen::VectorXd low_, high_;
   std::vector<FitWindow> windows_;
   std::vector<std::vector<Scaling>> scaling_;   // per log, per signal

@@ -108,6 +108,24 @@ void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& op
   }
 }
 
+// The step, bent along a curved valley by the residuals' second derivative along it (geodesic acceleration: Transtrum and Sethna, "Improvements to the
+// Levenberg-Marquardt algorithm for nonlinear least-squares minimization", arXiv:1201.5885, 2012): one replay, where straight steps down such a valley take many Jacobians.
+FitPoint BentStep(FitProblem& problem, const Snapshot& snapshot, const Linearization& at, const LmState& s, const Eigen::VectorXd& step) {
+  constexpr double kShare = 0.1;    // of the step, at which the bend is measured
+  constexpr double kMostBend = 0.75;  // |acceleration| / |velocity|, beyond which the second derivative tells nothing about the whole step
+  const FitPoint straight = problem.Move(s.point, at, step);
+  FitPoint probe = s.point;
+  probe.y += kShare * (straight.y - s.point.y);
+  for (std::size_t w = 0; w < probe.states.size(); ++w) probe.states[w] += kShare * (straight.states[w] - s.point.states[w]);
+  std::vector<Eigen::VectorXd> residuals;
+  if (!std::isfinite(problem.CostAndResiduals(probe, &residuals))) return straight;
+  const Linearization bend = problem.Bend(at, snapshot, s.point, straight, kShare, residuals);
+  const Eigen::VectorXd correction = BoundedStep(bend, straight, problem.low(), problem.high(), s.damping);
+  const auto length = [&](const Eigen::VectorXd& v) { return std::sqrt(std::max(0.0, v.dot(at.hessian * v) + s.damping * v.cwiseAbs2().dot(at.hessian.diagonal()))); };
+  if (2 * length(correction) > kMostBend * length(step)) return straight;
+  return problem.Move(straight, bend, correction);
+}
+
 // One Jacobian, and the steps made with it.
 void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
   constexpr double kMostDamping = 1e8, kWorthwhile = 0.1, kWorthwhileCoarse = 10;  // shares of the tolerance
@@ -124,9 +142,16 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
     // What little is left is for the finer difference to find.
     const bool coarse = s->difference > options.fine_step;
     if (rejected >= (coarse ? 1 : 2) && promised < (coarse ? kWorthwhileCoarse : kWorthwhile) * options.tolerance * s->cost) break;
-    const FitPoint trial = problem.Move(s->point, at, step);
+    FitPoint trial = BentStep(problem, snapshot, at, *s, step);
     std::vector<Eigen::VectorXd> residuals;
-    const double cost = problem.CostAndResiduals(trial, &residuals);
+    double cost = problem.CostAndResiduals(trial, &residuals);
+    if (!(cost < s->cost)) {
+      // States take whole steps, however damped y is: where a window's motion tips over at the least touch, better none.
+      std::vector<Eigen::VectorXd> others;
+      const FitPoint still{.y = trial.y, .states = s->point.states};
+      problem.CostAndResiduals(still, &others);
+      cost = problem.TakeBetterStates(trial, residuals, still, others);
+    }
     if (cost < s->cost) {
       small = s->cost - cost < options.tolerance * s->cost;
       undamped = s->damping <= kSmallDamping;

@@ -8,7 +8,7 @@ Effect Effect_cable_spring() {
       .place = EffectPlace::kJoint,
       .parameters = {
           {.key = "stiffness_n_m_per_rad", .unit = "N m/rad", .scale = ScaleKind::kStiffness, .neutral = 0, .low = 0, .high = 3, .trials = {0.05, 0.2, 0.6}, .start = 0.1},
-          {.key = "rest_rad", .unit = "rad", .scale = ScaleKind::kAngle, .neutral = 0, .low = -4, .high = 4, .trials = {-1, 0, 1}, .start = 0},
+          {.key = "rest_rad", .unit = "rad", .scale = ScaleKind::kAngle, .neutral = 0, .low = -4, .high = 4, .trials = {-1, 0, 1}, .start = 0, .with = Parameter::With::kRest},
       },
       .meaning = "a cable pulls to a rest angle",
       .signature = "linear in angle about a rest angle",

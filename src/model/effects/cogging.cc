@@ -9,7 +9,7 @@ Effect Effect_cogging() {
       .parameters = {
           {.key = "amplitude_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1, .trials = {0.05}, .start = 0.03},
           {.key = "periods_per_rev", .unit = "1", .scale = ScaleKind::kOne, .neutral = 12, .low = 1, .high = 100, .trials = {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 42, 44, 48, 56, 64, 72, 84}, .start = 12},
-          {.key = "phase_rad", .unit = "rad", .scale = ScaleKind::kOne, .neutral = 0, .low = -3.2, .high = 3.2, .trials = {0, 1.57, 3.14, -1.57}, .start = 0},
+          {.key = "phase_rad", .unit = "rad", .scale = ScaleKind::kOne, .neutral = 0, .low = -3.2, .high = 3.2, .trials = {0, 1.57, 3.14, -1.57}, .start = 0, .with = Parameter::With::kAngle},
       },
       .meaning = "torque ripple over the angle",
       .signature = "periodic in angle",

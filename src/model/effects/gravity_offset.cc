@@ -8,7 +8,7 @@ Effect Effect_gravity_offset() {
       .place = EffectPlace::kJoint,
       .parameters = {
           {.key = "torque_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 2, .trials = {0.1, 0.3}, .start = 0.1},
-          {.key = "rest_rad", .unit = "rad", .scale = ScaleKind::kOne, .neutral = 0, .low = -3.2, .high = 3.2, .trials = {0, 1.57, 3.14, -1.57}, .start = 0},
+          {.key = "rest_rad", .unit = "rad", .scale = ScaleKind::kOne, .neutral = 0, .low = -3.2, .high = 3.2, .trials = {0, 1.57, 3.14, -1.57}, .start = 0, .with = Parameter::With::kAngle},
       },
       .meaning = "an unbalanced mass",
       .signature = "sine of the angle",

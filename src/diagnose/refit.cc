@@ -1,0 +1,107 @@
+#include "src/diagnose/refit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "src/diagnose/rules.h"
+
+namespace gapscope {
+namespace {
+
+constexpr int kFirstIterations = 14, kTasteIterations = 4;
+constexpr double kFirstTolerance = 2e-3;
+constexpr double kWorthImitating = 0.8;  // a leader that leaves less than this share of its parent's cost
+
+// A fit from a start of its own, kept if it ends below the candidate's.
+void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance) {
+  if (!std::isfinite(candidate->problem->Cost(start))) return;
+  const FitPoint before = candidate->point;
+  const double cost = candidate->train_cost;
+  const bool converged = candidate->converged;
+  FitCandidate(bench, candidate, start, iterations, tolerance);
+  if (candidate->train_cost < cost) return;
+  candidate->point = before;
+  candidate->train_cost = cost;
+  candidate->converged = converged;
+  candidate->values = candidate->problem->Values(before);
+  candidate->shift_s = candidate->problem->Shift(before);
+}
+
+// The trial's values with as much of the parent's answer as pays: far outside of where it was linear it leads along valleys that take many Jacobians back.
+FitPoint StartFrom(const FitProblem& parent, const FitPoint& at, const Trial& trial, FitProblem* child) {
+  FitPoint best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double share : {1.0, 0.3, 0.0}) {
+    FitPoint start = child->FromParent(parent, at, trial.values, share * trial.dy);
+    const double cost = child->Cost(start);
+    if (best.y.size() > 0 && !(cost < least)) continue;
+    least = cost;
+    best = std::move(start);
+  }
+  return best;
+}
+
+}  // namespace
+
+void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child) {
+  FitPoint start = StartFrom(*parent.problem, parent.point, trial, child->problem.get());
+  if (!trial.others.empty()) {
+    // Valleys side by side: a taste of each.
+    FitCandidate(bench, child, start, kTasteIterations, kFirstTolerance);
+    for (const Trial& other : trial.others) {
+      if (!bench.Late()) TryStart(bench, child, StartFrom(*parent.problem, parent.point, other, child->problem.get()), kTasteIterations, kFirstTolerance);
+    }
+    start = child->point;
+  }
+  FitCandidate(bench, child, start, kFirstIterations, kFirstTolerance, rival_cost);
+  if (child->train_cost <= parent.train_cost * 1.0005 || bench.Late()) return;
+  const auto placed = child->model->EffectParameters(use, bench.scales);
+  if (!placed.ok()) return;
+  std::vector<double> neutral = trial.values;
+  for (const auto& p : placed.value()) neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
+  TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations, kFirstTolerance);
+}
+
+void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
+  constexpr std::size_t kMost = 3;
+  Candidate& leader = *layer->children.front();
+  if (!(leader.train_cost < kWorthImitating * parent.train_cost) || bench.Late()) return;
+  const FitPoint at = parent.problem->FromParent(*leader.problem, leader.point, leader.model->Nominal(), {});
+  const Snapshot snapshot = parent.problem->Capture(at, 0.01);
+  if (!snapshot.valid) return;
+  std::size_t tried = 0;
+  for (std::size_t i = 1; i < layer->children.size() && tried < kMost && !bench.Late(); ++i) {
+    Candidate& rival = *layer->children[i];
+    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) || (rival.train_cost < 1.02 * leader.train_cost && !Contains(rival, leader))) continue;
+    const Trial trial = TryEffect(bench, rival, rival.effects.back(), *parent.problem, at, snapshot);
+    if (!trial.valid) continue;
+    ++tried;
+    const FitPoint start = StartFrom(*parent.problem, at, trial, rival.problem.get());
+    TryStart(bench, &rival, start, kFirstIterations, kFirstTolerance);
+    ScoreCandidate(bench, &rival);
+  }
+}
+
+void StartFromCoulomb(const Workbench& bench, Layer* layer) {
+  constexpr double kSliding = 0.9, kHump = 1.5, kClearlyBetter = 0.9;
+  for (const auto& simple : layer->children) {
+    if (simple->effects.back().effect != "coulomb_friction" || simple->held_out_floors < kRemains) continue;
+    const std::string on = simple->effects.back().on;
+    const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
+    for (const auto& rich : layer->children) {
+      if (rich->effects.back().on != on || !Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost || bench.Late()) continue;
+      const auto placed = rich->model->EffectParameters(rich->effects.back(), bench.scales);
+      if (!placed.ok()) continue;
+      const bool hump = rich->effects.back().effect == "stribeck_friction";
+      std::vector<double> values = rich->model->Nominal();
+      for (const auto& p : placed.value()) {
+        values[rich->model->IndexOf(p.name)] = p.unit != "N m" ? p.start : !hump ? level : p.key == "breakaway_n_m" ? kHump * level : kSliding * level;
+      }
+      TryStart(bench, rich.get(), rich->problem->FromParent(*simple->problem, simple->point, values, {}), kFirstIterations, kFirstTolerance);
+      ScoreCandidate(bench, rich.get());
+    }
+  }
+}
+
+}  // namespace gapscope

@@ -1,0 +1,32 @@
+// Fits of candidates from good starts: an unconverged rival looks exactly like a rejected one.
+#ifndef GAPSCOPE_DIAGNOSE_REFIT_H_
+#define GAPSCOPE_DIAGNOSE_REFIT_H_
+
+#include <memory>
+
+#include "src/diagnose/screen.h"
+
+namespace gapscope {
+
+using Candidates = std::vector<std::unique_ptr<Candidate>>;
+
+// What was found on top of one parent.
+struct Layer {
+  std::vector<Screened> screen;  // all effects, the most promising first; their candidates are spent where they were refitted
+  std::vector<std::size_t> leaders;  // of the screen, in the order of refits
+  std::size_t refitted = 0;          // of them
+  Candidates children;           // refitted, the best first
+};
+
+// Fits `child`, a parent's model and one effect more, from the screen's own steps, and where that ends above the parent from hardly any effect.
+// `rival_cost`: see FitCandidate.
+void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child);
+// Rivals of the layer's first start anew where they best imitate it, and are scored.
+void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer);
+// What contains Coulomb friction starts from where that ended: both directions alike, or a hump a little above the sliding level, below which a hump has no
+// gradient and its fit would stay Coulomb's.
+void StartFromCoulomb(const Workbench& bench, Layer* layer);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_REFIT_H_

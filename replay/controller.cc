@@ -28,30 +28,41 @@ Status ReadInputs(YamlMap& map, const std::string& path, const Experiment& exper
   return Ok();
 }
 
-Status ReadTerms(YamlMap& map, const std::string& path, ControllerSpec* spec) {
+Result<std::vector<ControllerTerm>> ReadTerms(YamlMap& map, const std::string& path, const std::vector<ControllerInput>& inputs) {
+  std::vector<ControllerTerm> terms;
   for (const YAML::Node& item : map.List("terms")) {
     YamlMap one(item, path, "a term of the controller");
     ControllerTerm term{.input = one.Text("input"), .proportional = one.Number("proportional", 0), .integral = one.Number("integral", 0), .derivative = one.Number("derivative", 0),
                         .filter_rad_per_s = one.Number("filter_rad_per_s", 100), .integral_limit = one.Number("integral_limit", 0), .to = one.Text("to", "")};
     for (const std::string& name : {term.input, term.to}) {
-      if (!name.empty() && IndexOf(spec->inputs, name) == spec->inputs.size()) one.Fail(item, {.what = "a term of an input that is not there", .actual = "'" + name + "'"});
+      if (!name.empty() && IndexOf(inputs, name) == inputs.size()) one.Fail(item, {.what = "a term of an input that is not there", .actual = "'" + name + "'"});
     }
     if (!(term.filter_rad_per_s > 0) || term.integral_limit < 0) one.Fail(item, {.what = "'filter_rad_per_s' must be above zero, 'integral_limit' not below"});
     GS_RETURN_IF_ERROR(one.Finish());
-    spec->terms.push_back(std::move(term));
+    terms.push_back(std::move(term));
   }
-  return Ok();
+  return terms;
 }
 
 Status ReadSwingUp(const YAML::Node& node, const std::string& path, ControllerSpec* spec) {
   if (!node.IsDefined()) return Ok();
   YamlMap one(node, path, "'swing_up'");
-  SwingUp swing{.input = one.Text("input"), .catch_rad = one.Number("catch_rad"), .drop_rad = one.Number("drop_rad", 0), .gain = one.Number("gain"), .inertia_kg_m2 = one.Number("inertia_kg_m2"),
-                .torque_n_m = one.Number("torque_n_m"), .filter_rad_per_s = one.Number("filter_rad_per_s", 100), .limit = one.Number("limit", 0)};
-  if (IndexOf(spec->inputs, swing.input) == spec->inputs.size()) one.Fail(node, {.what = "a swing-up of an input that is not there", .actual = "'" + swing.input + "'"});
+  SwingUp swing{.input = one.Text("input"), .arm = one.Text("arm", ""), .catch_rad = one.Number("catch_rad"), .drop_rad = one.Number("drop_rad", 0), .gain = 0, .inertia_kg_m2 = 0, .torque_n_m = 0,
+                .filter_rad_per_s = one.Number("filter_rad_per_s", 100), .limit = one.Number("limit", 0), .arm_speed = one.Number("arm_speed", 0), .terms = {}};
+  GS_ASSIGN(swing.terms, ReadTerms(one, path, spec->inputs));
+  if (swing.terms.empty() || one.Child("gain").IsDefined()) {
+    swing.gain = one.Number("gain");
+    swing.inertia_kg_m2 = one.Number("inertia_kg_m2");
+    swing.torque_n_m = one.Number("torque_n_m");
+    if (!(swing.inertia_kg_m2 > 0 && swing.torque_n_m > 0)) one.Fail(node, {.what = "'inertia_kg_m2' and 'torque_n_m' are above zero"});
+  }
+  for (const std::string& name : {swing.input, swing.arm}) {
+    if (!name.empty() && IndexOf(spec->inputs, name) == spec->inputs.size()) one.Fail(node, {.what = "a swing-up of an input that is not there", .actual = "'" + name + "'"});
+  }
+  if (swing.arm.empty() && swing.arm_speed != 0) one.Fail(node, {.what = "'arm_speed' needs the input 'arm' whose speed it multiplies"});
   if (swing.drop_rad == 0) swing.drop_rad = 2 * swing.catch_rad;
-  if (!(swing.catch_rad > 0 && swing.drop_rad >= swing.catch_rad && swing.inertia_kg_m2 > 0 && swing.torque_n_m > 0 && swing.filter_rad_per_s > 0 && swing.limit >= 0)) {
-    one.Fail(node, {.what = "'catch_rad', 'inertia_kg_m2', 'torque_n_m' and 'filter_rad_per_s' are above zero, 'drop_rad' is not below 'catch_rad'"});
+  if (!(swing.catch_rad > 0 && swing.drop_rad >= swing.catch_rad && swing.filter_rad_per_s > 0 && swing.limit >= 0)) {
+    one.Fail(node, {.what = "'catch_rad' and 'filter_rad_per_s' are above zero, 'drop_rad' is not below 'catch_rad'"});
   }
   GS_RETURN_IF_ERROR(one.Finish());
   spec->swing_up = std::move(swing);
@@ -120,7 +131,7 @@ Result<ControllerSpec> LoadController(const Experiment& experiment) {
     }
     GS_RETURN_IF_ERROR(names.Finish());
   }
-  GS_RETURN_IF_ERROR(ReadTerms(map, path, &spec));
+  GS_ASSIGN(spec.terms, ReadTerms(map, path, spec.inputs));
   GS_RETURN_IF_ERROR(ReadSwingUp(map.Child("swing_up"), path, &spec));
   GS_RETURN_IF_ERROR(ReadObserver(map.Child("observer"), path, &spec));
   if (spec.terms.empty() && !spec.observer) map.Fail(node, {.what = "the controller has neither 'terms' nor 'observer'"});
@@ -157,11 +168,16 @@ Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment
     }
     controller.inputs_.push_back(std::move(bound));
   }
-  for (const auto& term : spec.terms) controller.terms_.push_back({.spec = term, .input = IndexOf(spec.inputs, term.input), .to = term.to.empty() ? -1 : static_cast<int>(IndexOf(spec.inputs, term.to))});
+  const auto bound = [&](const ControllerTerm& term) { return Term{.spec = term, .input = IndexOf(spec.inputs, term.input), .to = term.to.empty() ? -1 : static_cast<int>(IndexOf(spec.inputs, term.to))}; };
+  for (const auto& term : spec.terms) controller.terms_.push_back(bound(term));
   if (!spec.feedforward.empty()) {
     GS_ASSIGN(controller.feedforward_, bind(spec.feedforward, "the feedforward"));
   }
-  if (spec.swing_up) controller.swing_input_ = IndexOf(spec.inputs, spec.swing_up->input);
+  if (spec.swing_up) {
+    controller.swing_input_ = IndexOf(spec.inputs, spec.swing_up->input);
+    controller.arm_input_ = spec.swing_up->arm.empty() ? controller.swing_input_ : IndexOf(spec.inputs, spec.swing_up->arm);
+    for (const auto& term : spec.swing_up->terms) controller.swing_terms_.push_back(bound(term));
+  }
   if (spec.observer) controller.observer_.emplace(*spec.observer);
   controller.errors_.resize(controller.inputs_.size());
   controller.inputs_now_.resize(controller.inputs_.size());
@@ -171,9 +187,11 @@ Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment
 }
 
 void Controller::Reset(Start start) {
-  for (auto& term : terms_) term.last_error = term.derivative = term.integral = 0;
+  for (auto* terms : {&terms_, &swing_terms_}) {
+    for (auto& term : *terms) term.last_error = term.derivative = term.integral = 0;
+  }
   if (observer_) observer_->Reset();
-  law_ = sent_ = swing_angle_ = swing_speed_ = last_s_ = 0;
+  law_ = sent_ = swing_angle_ = swing_speed_ = arm_angle_ = arm_speed_ = last_s_ = 0;
   next_s_ = -std::numeric_limits<double>::infinity();
   first_ = true, start_ = start, caught_ = !spec_.swing_up.has_value();
 }
@@ -188,16 +206,31 @@ double Controller::Evaluate(Term& term, double error, double period_s) const {
   return term.spec.proportional * error + term.integral + term.spec.derivative * term.derivative;
 }
 
-double Controller::Swing(double reading, double period_s) {
+double Controller::Sum(std::vector<Term>& terms, double period_s) {
+  double sum = 0;
+  for (auto& term : terms) {
+    if (term.to >= 0) errors_[static_cast<std::size_t>(term.to)] += Evaluate(term, errors_[term.input], period_s);
+  }
+  for (auto& term : terms) {
+    if (term.to < 0) sum += Evaluate(term, errors_[term.input], period_s);
+  }
+  return sum;
+}
+
+double Controller::Swing(double angle, double period_s) {
   const SwingUp& swing = *spec_.swing_up;
-  const double angle = std::remainder(reading, 2 * std::numbers::pi), turned = first_ ? 0 : std::remainder(angle - swing_angle_, 2 * std::numbers::pi);
+  const double turned = first_ ? 0 : std::remainder(angle - swing_angle_, 2 * std::numbers::pi);
   swing_speed_ = (swing.filter_rad_per_s * turned + swing_speed_) / (1 + swing.filter_rad_per_s * period_s);
   swing_angle_ = angle;
+  const double arm = inputs_now_[arm_input_];
+  arm_speed_ = (swing.filter_rad_per_s * (first_ ? 0 : arm - arm_angle_) + arm_speed_) / (1 + swing.filter_rad_per_s * period_s);
+  arm_angle_ = arm;
   caught_ = std::abs(angle) < (caught_ ? swing.drop_rad : swing.catch_rad);
   const double energy = 0.5 * swing.inertia_kg_m2 * swing_speed_ * swing_speed_ + swing.torque_n_m * (std::cos(angle) - 1);
   const double direction = swing_speed_ * std::cos(angle);
   // Hanging at rest no direction is better: a push.
-  return swing.gain * -energy * (direction < 0 ? -1 : 1);
+  const double torque = swing.gain * -energy * (direction < 0 ? -1 : 1);
+  return (swing.limit > 0 ? std::clamp(torque, -swing.limit, swing.limit) : torque) + swing.arm_speed * arm_speed_;
 }
 
 double Controller::Step(std::size_t row, std::span<const double> readings) {
@@ -207,23 +240,22 @@ double Controller::Step(std::size_t row, std::span<const double> readings) {
   next_s_ = spec_.sample_s > 0 ? (first_ ? now : next_s_) + spec_.sample_s : now;
   for (std::size_t i = 0; i < inputs_.size(); ++i) {
     inputs_now_[i] = inputs_[i].scale * readings[inputs_[i].signal] + inputs_[i].offset;
+    // An angle that goes round: the nearest way up, on either side.
+    if (spec_.swing_up && i == swing_input_) inputs_now_[i] = std::remainder(inputs_now_[i], 2 * std::numbers::pi);
     references_now_[i] = inputs_[i].reference.At(row);
     errors_[i] = references_now_[i] - inputs_now_[i];
   }
   double limit = spec_.limit, pumped = 0;
   if (spec_.swing_up) pumped = Swing(inputs_now_[swing_input_], period);
-  // Outer loops first: what they ask for moves the inner references.
-  for (auto& term : terms_) {
-    if (term.to >= 0) errors_[static_cast<std::size_t>(term.to)] += Evaluate(term, errors_[term.input], period);
-  }
-  // The observer hears what was really sent, saturation included.
-  law_ = observer_ ? observer_->Step(inputs_now_, references_now_, sent_, period) : 0;
-  for (auto& term : terms_) {
-    if (term.to < 0) law_ += Evaluate(term, errors_[term.input], period);
+  asked_ = errors_;
+  // The observer hears what was really sent, saturation included. All laws run on, so that their filters are where the motion is when they take over.
+  law_ = (observer_ ? observer_->Step(inputs_now_, references_now_, sent_, period) : 0) + Sum(terms_, period);
+  if (!swing_terms_.empty()) {
+    errors_ = asked_;
+    pumped += Sum(swing_terms_, period);
   }
   if (!caught_) {
     law_ = pumped;
-    if (spec_.swing_up->limit > 0) limit = limit > 0 ? std::min(limit, spec_.swing_up->limit) : spec_.swing_up->limit;
     for (auto& term : terms_) term.integral = 0;
   }
   first_ = false;

@@ -26,10 +26,12 @@ struct ControllerTerm {
   std::string to;             // an outer loop: its output is added to this input's reference; empty: to the command
 };
 // Until |angle| (an input, zero upright) is below `catch_rad` the command is gain (-E) sign(da cos a), E = inertia da^2 / 2 + torque (cos a - 1): zero at rest upright. Then the terms act, until |angle|
-// passes `drop_rad`. Astrom and Furuta, "Swinging up a pendulum by energy control", Automatica 36, 2000.
+// passes `drop_rad`. Astrom and Furuta, "Swinging up a pendulum by energy control", Automatica 36, 2000. The law asks for a torque: on a voltage drive `arm_speed` times the speed of the input `arm`
+// makes up for the back-EMF. `terms` of its own are added, to keep the arm about its middle, or do it alone: swing-up by state feedback, as an arm's loop whose reference moves with the pendulum.
 struct SwingUp {
-  std::string input;
-  double catch_rad = 0, drop_rad = 0, gain = 0, inertia_kg_m2 = 0, torque_n_m = 0, filter_rad_per_s = 100, limit = 0;
+  std::string input, arm;  // arm: empty where `arm_speed` is zero
+  double catch_rad = 0, drop_rad = 0, gain = 0, inertia_kg_m2 = 0, torque_n_m = 0, filter_rad_per_s = 100, limit = 0, arm_speed = 0;
+  std::vector<ControllerTerm> terms;
 };
 struct ControllerSpec {
   std::string actuator;
@@ -80,17 +82,19 @@ class Controller {
   };
   Controller() = default;
   double Evaluate(Term& term, double error, double period_s) const;
+  // Outer loops first: what they ask for moves the inner references.
+  double Sum(std::vector<Term>& terms, double period_s);
   double Swing(double angle, double period_s);
 
   ControllerSpec spec_;
   const Recording* recording_ = nullptr;
   std::vector<Input> inputs_;
-  std::vector<Term> terms_;
+  std::vector<Term> terms_, swing_terms_;
   Source feedforward_;
-  std::size_t command_ = 0, swing_input_ = 0;
+  std::size_t command_ = 0, swing_input_ = 0, arm_input_ = 0;
   std::optional<Observer> observer_;
-  std::vector<double> errors_, inputs_now_, references_now_;
-  double law_ = 0, sent_ = 0, next_s_ = 0, last_s_ = 0, swing_angle_ = 0, swing_speed_ = 0;
+  std::vector<double> errors_, asked_, inputs_now_, references_now_;
+  double law_ = 0, sent_ = 0, next_s_ = 0, last_s_ = 0, swing_angle_ = 0, swing_speed_ = 0, arm_angle_ = 0, arm_speed_ = 0;
   bool first_ = true, caught_ = false;
   Start start_ = Start::kZero;
 };

@@ -201,14 +201,45 @@ TEST_F(ClosedLoopTest, ThePendulumIsKeptUpright) {
   EXPECT_NEAR(s.mean, kPi, 0.02);
 }
 
-// From rest the energy law pumps the pendulum into reach of the catch; J = m (2 l)^2 / 3, m g l of the rig's data sheet.
-TEST_F(ClosedLoopTest, EnergyPumpingReachesTheCatch) {
-  Load(kBalance + "  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8, gain: -2000, inertia_kg_m2: 1.33e-4, torque_n_m: 0.01519, filter_rad_per_s: 400}\n", 0.0, 12);
-  const auto closed = Run(LightArm());
-  ASSERT_TRUE(closed.ok()) << closed.error().Text();
-  double highest = 0;
-  for (const double q : closed.value().result.logs[0].signals[1].predicted) highest = std::max(highest, std::abs(q));
-  EXPECT_GT(highest, kPi - 0.36);
+// From rest to upright and held there; J = m (2 l)^2 / 3, m g l and the back-EMF of the rig's data sheet, LQR gains of `design lqr --at pendulum=3.14159 --q 10,10,1,10`.
+const std::string kLqr = R"(
+controller:
+  actuator: motor
+  limit: 10
+  inputs: [{name: theta, signal: arm_rad}, {name: alpha, signal: pendulum_rad, scale: -1, add: 3.141592653589793}]
+  terms:
+    - {input: theta, proportional: -3.1623, derivative: -2.008, filter_rad_per_s: 50}
+    - {input: alpha, proportional: -59.4409, derivative: -6.0971, filter_rad_per_s: 50}
+)";
+
+class SwingUpTest : public ClosedLoopTest {
+ protected:
+  void ExpectHeldUpright(const std::string& swing_up) {
+    Load(kLqr + swing_up, 0.0, 8);
+    const auto closed = Run();
+    ASSERT_TRUE(closed.ok()) << closed.error().Text();
+    const LogReplay& log = closed.value().result.logs[0];
+    double off = 0, arm = 0;
+    for (std::size_t k = 0; k < log.time_s.size(); ++k) {
+      arm = std::max(arm, std::abs(log.signals[0].predicted[k]));
+      if (log.time_s[k] > 6) off = std::max(off, std::abs(std::remainder(log.signals[1].predicted[k] - kPi, 2 * kPi)));
+    }
+    EXPECT_LT(off, 0.02);
+    EXPECT_LT(arm, 3.14);
+    for (const double u : closed.value().sent[0]) ASSERT_LE(std::abs(u), 10);
+  }
+};
+
+TEST_F(SwingUpTest, EnergyLawIsCaughtAndHeld) {
+  ExpectHeldUpright(R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8, gain: -2000, inertia_kg_m2: 1.33e-4, torque_n_m: 0.01519, filter_rad_per_s: 200, limit: 6,
+    arm: theta, arm_speed: 0.042, terms: [{input: theta, proportional: 8, derivative: 0.2, filter_rad_per_s: 50}]}
+)");
+}
+
+TEST_F(SwingUpTest, StateFeedbackIsCaughtAndHeld) {
+  ExpectHeldUpright(R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8,
+    terms: [{input: alpha, derivative: -0.12, to: theta}, {input: theta, proportional: 6, derivative: 0.3, filter_rad_per_s: 50}]}
+)");
 }
 
 // Pumping while far from upright, the terms inside `catch_rad`, and on until `drop_rad` is passed.

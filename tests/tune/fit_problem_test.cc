@@ -200,6 +200,104 @@ TEST(FitProblemTest, SecantUpdateExplainsItsStep) {
   EXPECT_NEAR(problem.Reduce(to, snapshot, false).cost, cost, 1e-12 * cost);
 }
 
+// Size and angle as the terms that act linearly: the same parameters, and no curved valley on the way to them.
+TEST(LinearTermsTest, ParametersComeBack) {
+  ThreadPool pool(1);
+  const auto command = [](double t) { return std::sin(6 * t); };
+  for (const auto& [effect, size, other] : {std::tuple{"cable_spring@arm", "stiffness_n_m_per_rad", "rest_rad"}, std::tuple{"gravity_offset@arm", "torque_n_m", "rest_rad"},
+                                            std::tuple{"cogging@arm", "amplitude_n_m", "phase_rad"}}) {
+    const Rig rig = LoadRig("qube", {effect});
+    const std::string name = effect;
+    const auto values = rig.Values({{name + "." + size, 2e-3}, {name + "." + other, -0.7}});
+    const std::vector<Recording> logs = {MakeLog(rig, values, command, 1, 0.004, 0, 1)};
+    FitProblem problem(*rig.model, logs, {.free = {rig.Index(name + "." + size), rig.Index(name + "." + other)}, .time_step_s = 0.004, .linear_terms = true}, values, pool);
+    const FitPoint start = problem.Start();
+    const std::vector<double> back = problem.Values(start);
+    for (std::size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(back[i], values[i], 1e-12) << rig.model->parameters()[i].name;
+    // The torque is linear in both: twice both is twice the size at the same angle or rest.
+    FitPoint doubled = start;
+    doubled.y.head(2) *= 2;
+    const std::vector<double> twice = problem.Values(doubled);
+    EXPECT_NEAR(twice[rig.Index(name + "." + size)], 4e-3, 1e-12) << effect;
+    EXPECT_NEAR(twice[rig.Index(name + "." + other)], -0.7, 1e-12) << effect;
+  }
+}
+
+TEST(LinearTermsTest, GravityIsFoundFromTheWrongSideOfItsRest) {
+  const Rig rig = LoadRig("qube", {"gravity_offset@arm"});
+  const int torque = rig.Index("gravity_offset@arm.torque_n_m"), rest = rig.Index("gravity_offset@arm.rest_rad");
+  const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
+  const std::vector<Recording> logs = {MakeLog(rig, rig.Values({{"gravity_offset@arm.torque_n_m", 3e-3}, {"gravity_offset@arm.rest_rad", 0.2}}), command, 3, 0.004, 1e-4, 1)};
+  ThreadPool pool(2);
+  // From what is nearly a constant torque of the same size about zero.
+  FitProblem problem(*rig.model, logs, {.free = {torque, rest}, .time_step_s = 0.004, .fit_offsets = false, .linear_terms = true},  // an offset is a rest angle
+                     rig.Values({{"gravity_offset@arm.torque_n_m", 1e-3}, {"gravity_offset@arm.rest_rad", 1.57}}), pool);
+  const SolveResult solved = Solve(problem, problem.Start(), {.max_iterations = 6, .tolerance = 1e-4});
+  EXPECT_NEAR(problem.Values(solved.point)[torque], 3e-3, 3e-5);
+  EXPECT_NEAR(problem.Values(solved.point)[rest], 0.2, 0.01);
+}
+
+// A step of a linear problem does not bend; a product of two parameters does, as its second derivative says.
+TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
+  const Rig rig = LoadCart();
+  const std::vector<Recording> logs = {CartLog(rig, 501, 0.01)};
+  ThreadPool pool(1);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
+  const FitPoint from = problem.Start();
+  const Snapshot snapshot = problem.Differentiate(from, 0.05, FitProblem::Columns::kAll);
+  const Linearization at = problem.Reduce(from, snapshot, false);
+  FitPoint to = from, probe = from;
+  to.y[0] += 0.3;
+  probe.y[0] += 0.03;
+  std::vector<Eigen::VectorXd> residuals;
+  (void)problem.CostAndResiduals(probe, &residuals);
+  EXPECT_LT(problem.Bend(at, snapshot, from, to, 0.1, residuals).gradient.norm(), 1e-6 * at.gradient.norm());
+  // Residuals that are off by share^2 times their Jacobian's first column are what a bend of the unit vector's size makes.
+  for (std::size_t w = 0; w < residuals.size(); ++w) residuals[w] += 0.01 * snapshot.jacobians[w].col(0);
+  const Linearization bent = problem.Bend(at, snapshot, from, to, 0.1, residuals);
+  Eigen::MatrixXd hessian = at.hessian;
+  hessian.diagonal() -= problem.anchor_weight();
+  EXPECT_LT((bent.gradient - hessian.col(0)).norm(), 1e-5 * hessian.col(0).norm());
+}
+
+TEST(TakeBetterStatesTest, EveryWindowKeepsTheStateThatCostsLess) {
+  const Rig rig = LoadCart();
+  const std::vector<Recording> logs = {CartLog(rig, 501, 0.01)};
+  ThreadPool pool(1);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
+  ASSERT_GT(problem.windows(), 2u);
+  // One of the two is spoilt in even windows, the other in odd ones.
+  FitPoint a = problem.Start(), b = problem.Start();
+  for (std::size_t w = 0; w < problem.windows(); ++w) (w % 2 == 0 ? a : b).states[w][0] += 3;
+  std::vector<Eigen::VectorXd> of_a, of_b;
+  (void)problem.CostAndResiduals(a, &of_a);
+  (void)problem.CostAndResiduals(b, &of_b);
+  const double cost = problem.TakeBetterStates(a, of_a, b, of_b);
+  EXPECT_NEAR(cost, problem.Cost(problem.Start()), 1e-12 * cost);
+  EXPECT_NEAR(cost, problem.Cost(a), 1e-12 * cost);
+}
+
+// A late sensor shows a window's start only later: the window starts where the mechanism was, and the true delay leaves nothing.
+TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
+  const Rig rig = LoadRig("joint", {"sensor_delay@position_rad"});
+  const auto values = rig.Values({{"sensor_delay@position_rad.delay_s", 0.012}});
+  const auto command = [](double t) { return 0.4 * std::sin(8 * t); };
+  Recording log = MakeLog(rig, values, command, 3, 0.001, 0, 1);
+  const std::vector<Recording> logs = {log};
+  const InitialState start = InitialStateAt(*rig.model, log, 1000, values), late = InitialStateAt(*rig.model, log, 1000, rig.model->Nominal());
+  const double later = InitialStateAt(*rig.model, log, 1012, rig.model->Nominal()).qpos[0];
+  EXPECT_NEAR(start.qpos[0], later, 1e-9);
+  EXPECT_GT(std::abs(late.qpos[0] - later), 1e-3);
+  ThreadPool pool(1);
+  const FitOptions options{.free = {rig.Index("sensor_delay@position_rad.delay_s")}, .time_step_s = 0.001, .fit_offsets = false, .fit_shift = false, .fit_states = false};
+  FitProblem problem(*rig.model, logs, options, values, pool);
+  FitProblem from_nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
+  FitPoint point = from_nothing.Start();
+  const double before = from_nothing.Cost(point);
+  point.y = problem.Start().y;
+  EXPECT_LT(from_nothing.Cost(point), 1e-4 * before);
+}
+
 // A command later than one sample drives the nuisance shift onto its bound: the score test must still see what a delay would explain.
 TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
   const Rig truth = LoadRig("flexlink", {"command_delay@motor"}), rig = LoadRig("flexlink");

@@ -11,7 +11,8 @@
 namespace gapscope {
 namespace {
 
-constexpr double kPreRoll_s = 1.5, kHistory_s = 0.2;  // for lags and a sagging supply; for delays alone
+// How far back a window's past reaches: for delays alone; for states whose time constant is nobody's parameter; else so many time constants, at most the last.
+constexpr double kHistory_s = 0.2, kPreRoll_s = 1.5, kTimeConstants = 5, kLongest_s = 6;
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
 ModelPtr CopyForReplay(const mjModel& model) {
@@ -103,6 +104,9 @@ Simulator::Simulator(const Model& model, double max_step_s)
   for (int dof = 0; dof < mujoco_->nv; ++dof) {
     mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
     if (solref[0] == -1) solref[1] = -0.9999 / max_step_s_;
+  }
+  for (std::size_t i = 0; i < model.parameters().size(); ++i) {
+    if (model.parameters()[i].name.find("time_constant_s") != std::string::npos) time_constants_.push_back(i);
   }
   for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
 }
@@ -223,7 +227,9 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
   if (!remembers_ || window.begin == 0) return;
-  const double from = recording.time_s[window.begin] - (m->na > 0 ? kPreRoll_s : kHistory_s);
+  double past_s = m->na > 0 && time_constants_.empty() ? kPreRoll_s : kHistory_s;
+  for (const std::size_t i : time_constants_) past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
+  const double from = recording.time_s[window.begin] - past_s;
   std::size_t first = window.begin;
   while (first > 0 && recording.time_s[first - 1] >= from) --first;
   const int integrator = m->opt.integrator;

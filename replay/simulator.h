@@ -69,6 +69,7 @@ class Simulator {
   double max_step_s_;
   double shift_s_ = 0, command_delay_s_ = 0;
   bool reads_torque_ = false;
+  std::vector<std::size_t> time_constants_;  // parameters
   bool remembers_ = false;            // has states beside position and speed
   std::vector<double> values_;
   std::vector<double> column_, shaped_;  // scratch of ApplySensors

@@ -20,7 +20,9 @@ class Case:
         self.kind, self.rig = label["kind"], label["rig"]
         self.truth = [(e["name"], e["on"]) for e in label["effects"]]
         self.strength = min([e["effect_to_floor_refit"] for e in label["effects"]], default=label["effect_to_floor_refit"])
-        self.strong = self.kind in ("none", "ambiguous") or self.strength >= STRONG
+        # A delay below one sample is a nuisance of every model, by the contract: no severity makes it a finding.
+        below_a_sample = any(e["name"] == "command_delay" and e["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"]) for e in label["effects"])
+        self.strong = self.kind in ("none", "ambiguous") or (self.strength >= STRONG and not below_a_sample)
         self.named = [(e["name"], e["on"]) for e in verdict["effects"]]
         self.answer, self.probability = verdict["verdict"], verdict["probability"]
         self.groups = [set(g) for g in verdict["ambiguous"]]

@@ -83,10 +83,49 @@ void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   }
 }
 
-void StartFromCoulomb(const Workbench& bench, Layer* layer) {
+namespace {
+
+// A ceiling that falls starts from where a fixed one ended: a little higher, falling by a third, fast or slowly.
+void StartSagFromLimit(const Workbench& bench, const Candidate& limit, Layer* layer) {
+  constexpr double kHigher = 1.2, kFalls = 0.3;
+  const std::string on = limit.effects.back().on;
+  for (const auto& sag : layer->children) {
+    if (sag->effects.back() != EffectUse{"supply_sag", on}) continue;
+    for (const double time_constant_s : {0.15, 0.8}) {
+      if (bench.Late()) return;
+      std::vector<double> values = sag->model->Nominal();
+      const auto set = [&](const char* key, double value) { values[sag->model->IndexOf("supply_sag@" + on + "." + key)] = value; };
+      set("time_constant_s", time_constant_s);
+      set("sag_fraction", kFalls);
+      set("limit_n_m", kHigher * limit.values[limit.model->IndexOf("torque_limit@" + on + ".limit_n_m")]);
+      TryStart(bench, sag.get(), sag->problem->FromParent(*limit.problem, limit.point, values, {}), kFirstIterations, kFirstTolerance);
+    }
+    ScoreCandidate(bench, sag.get());
+  }
+}
+
+}  // namespace
+
+void VaryShape(const Workbench& bench, Candidate* candidate) {
+  const auto placed = candidate->model->EffectParameters(candidate->effects.back(), bench.scales);
+  if (!placed.ok()) return;
+  for (const auto& p : placed.value()) {
+    if (!p.trials.empty() || bench.Late()) continue;
+    const int index = candidate->model->IndexOf(p.name);
+    const double found = candidate->values[index], middle = p.low > 0 && p.high > 20 * p.low ? std::sqrt(p.low * p.high) : 0.5 * (p.low + p.high);
+    // On the other side of the middle.
+    std::vector<double> values = candidate->values;
+    values[index] = found > middle ? p.low + 0.4 * (middle - p.low) : middle + 0.4 * (p.high - middle);
+    TryStart(bench, candidate, candidate->problem->At(values, candidate->point), kFirstIterations, kFirstTolerance);
+  }
+}
+
+void StartFromSimpler(const Workbench& bench, Layer* layer) {
   constexpr double kSliding = 0.9, kHump = 1.5, kClearlyBetter = 0.9;
   for (const auto& simple : layer->children) {
-    if (simple->effects.back().effect != "coulomb_friction" || simple->held_out_floors < kRemains) continue;
+    if (simple->held_out_floors < kRemains) continue;
+    if (simple->effects.back().effect == "torque_limit") StartSagFromLimit(bench, *simple, layer);
+    if (simple->effects.back().effect != "coulomb_friction") continue;
     const std::string on = simple->effects.back().on;
     const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
     for (const auto& rich : layer->children) {

@@ -17,7 +17,7 @@ inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effec
 inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains,
 inline constexpr double kNestedExcess = 0.25;                  // or of what the simpler one leaves above the noise
 inline constexpr Limits kTold{.share = 0.03, .z = 2.5};        // the winner over a rival; below, the two are ambiguous
-inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.8;   // left above the noise, and share of the excess removed (in windows, or of a free run)
+inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.55;   // left above the noise, and share of the excess removed (in windows, or of a free run)
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 
 // Whether the effect can be a finding on a base model (without effects, which may turn a plain motor into a plugin): a bias on a servo equals a zero offset, viscous friction is a parameter.

@@ -239,6 +239,11 @@ FitPoint FitProblem::Start() const {
   return point;
 }
 
+FitPoint FitProblem::At(const std::vector<double>& values, FitPoint point) const {
+  point.y.head(static_cast<Eigen::Index>(coordinates_.size())) = ToSearch(values);
+  return point;
+}
+
 std::vector<double> FitProblem::Values(const FitPoint& point) const {
   std::vector<double> values = values_;
   for (std::size_t i = 0; i < coordinates_.size(); ++i) values[coordinates_[i].parameter] = coordinates_[i].ToValue(point.y[static_cast<Eigen::Index>(i)]);

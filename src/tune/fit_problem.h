@@ -119,6 +119,8 @@ class FitProblem {
   std::size_t residuals() const;           // scored rows x signals
 
   FitPoint Start() const;
+  // The point with these parameters' values, its offsets, shift and states as they are.
+  FitPoint At(const std::vector<double>& values, FitPoint point) const;
   // Parameter values at a point; offset of log l and signal s (0 where none is fitted).
   std::vector<double> Values(const FitPoint& point) const;
   double Offset(const FitPoint& point, std::size_t log, std::size_t signal) const;

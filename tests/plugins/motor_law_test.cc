@@ -173,6 +173,7 @@ INSTANTIATE_TEST_SUITE_P(
              1.8},
         Case{"torque limit", Torque({{"torque_limit_n_m", "0.8"}}), {-3}, 0, 0, -0.8},
         Case{"droop", Torque({{"droop_at_peak", "0.2"}, {"droop_reference_n_m", "4"}}), {-2}, 0, 0, -2 * 0.9},
+        Case{"droop that sets in late", Torque({{"droop_at_peak", "0.2"}, {"droop_reference_n_m", "4"}, {"droop_exponent", "3"}}), {-2}, 0, 0, -2 * 0.975},
         Case{"asymmetry up", Torque({{"asymmetry", "0.1"}}), {2}, 0, 0, 2.2},
         Case{"asymmetry down", Torque({{"asymmetry", "0.1"}}), {-2}, 0, 0, -1.8},
         Case{"driving", Torque({{"efficiency_drive", "0.7"}, {"efficiency_backdrive", "0.4"}}), {2}, 0, 3, 1.4},

@@ -8,6 +8,7 @@ Effect Effect_torque_constant_droop() {
       .place = EffectPlace::kMotor,
       .parameters = {
           {.key = "loss_at_peak", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.8, .trials = {0.1, 0.3, 0.5}, .start = 0.1},
+          {.key = "exponent", .unit = "1", .scale = ScaleKind::kOne, .neutral = 1, .low = 0.5, .high = 3, .start = 1},
       },
       .meaning = "less torque per ampere at high current",
       .signature = "torque falls short at high current",
@@ -15,6 +16,7 @@ Effect Effect_torque_constant_droop() {
       .partners = {"torque_limit"},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_at_peak", names[0]));
+        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_exponent", names[1]));
         return structure.AddMotorTerm(on, "droop_reference_n_m", "scale@" + on + ".torque_n_m");
       },
   };

@@ -213,7 +213,7 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   if (!later) slots[MotorState::kEstimate] = torque;
 
   // What it does not know.
-  if (droop_) torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference));
+  if (droop_) torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference), Parameter(m, kDroopExponent));
   if (asymmetry_) torque *= 1 + (torque > 0 ? 1 : -1) * Parameter(m, kAsymmetry);
   if (efficiency_) torque *= Parameter(m, torque * speed < 0 ? kEfficiencyBackdrive : kEfficiencyDrive);
   d->actuator_force[output_] = torque;

@@ -108,6 +108,7 @@ const std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"sag_time_constant_s", "s", 0.3, 0, 1e6},
     {"droop_at_peak", "1", 0, 0, 1},
     {"droop_reference_n_m", "N m", 1, 1e-12, 1e9},
+    {"droop_exponent", "1", 1, 0.1, 10},
     {"asymmetry", "1", 0, -1, 1},
 }};
 
@@ -152,6 +153,7 @@ const char* const kMotorAttributes[] = {"law",
                                         "sag_time_constant_s",
                                         "droop_at_peak",
                                         "droop_reference_n_m",
+                                        "droop_exponent",
                                         "asymmetry"};
 const int kMotorAttributeCount = static_cast<int>(std::size(kMotorAttributes));
 static_assert(std::size(kMotorAttributes) == kMotorParameters + 9);

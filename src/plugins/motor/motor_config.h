@@ -51,6 +51,7 @@ enum MotorParameter {
   kSagTimeConstant,
   kDroopAtPeak,
   kDroopReference,
+  kDroopExponent,
   kAsymmetry,
   kMotorParameters
 };

@@ -72,9 +72,10 @@ inline double PowerLimit(double speed, double power) {
   return speed > 0 ? power / speed : std::numeric_limits<double>::infinity();
 }
 
-// The torque constant falls linearly with the torque's size; at `reference` the loss is `droop`.
-inline double Droop(double torque, double droop, double reference) {
-  return torque * std::max(0.0, 1 - droop * std::abs(torque) / reference);
+// The torque constant falls with a power of the torque's size, 1 for a straight line; at `reference` the loss is `droop`.
+inline double Droop(double torque, double droop, double reference, double exponent) {
+  const double size = std::abs(torque) / reference;
+  return torque * std::max(0.0, 1 - droop * (exponent == 1 ? size : std::pow(size, exponent)));
 }
 
 // One lag that is exact for a held request and well behaved for any time constant: at least one step h is given to the

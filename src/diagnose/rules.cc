@@ -30,7 +30,7 @@ bool IsServoJoint(const std::string& joint, const Model& base) {
   return false;
 }
 
-// richer -> simpler effects that it contains, on the same joint. Exactly, or only as far as its bounds let it: a cable whose rest angle lies far away is
+// richer -> simpler effects that it contains, on the same place. Exactly, or only as far as its bounds let it: a cable whose rest angle lies far away is
 // nearly a bias, and where the travel is small the logs cannot tell the two.
 struct Containment {
   const char *richer, *simpler;
@@ -72,7 +72,8 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
     if (richer.effects[i] != simpler.effects[i]) return false;
   }
   const EffectUse &a = richer.effects.back(), &b = simpler.effects.back();
-  if (JointOf(a.on, *richer.model) != JointOf(b.on, *richer.model)) return false;
+  // On the same place: a motor's direction asymmetry is no joint's friction.
+  if (a.on != b.on) return false;
   return std::any_of(std::begin(kContainments), std::end(kContainments), [&](const Containment& c) { return a.effect == c.richer && b.effect == c.simpler && (c.exact || !exactly); });
 }
 

@@ -8,6 +8,7 @@ namespace gapscope {
 
 // Thresholds, set on the bank of twin cases of seed 900 (scripts/blind_check) and judged on others: docs/diagnosis.md.
 inline constexpr Limits kFirst{.share = 0.01, .z = 2.5};       // the first effect over the refitted base model
+inline constexpr Limits kFirstAtFloor{.share = 0.06, .z = 3.0};  // the same where the base model is at the noise already
 inline constexpr double kRemains = 1.25;                       // residual over noise below which nothing more is sought
 inline constexpr Limits kSecond{.share = 0.06, .z = 3.0};      // a second effect over the first
 inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise,
@@ -16,7 +17,7 @@ inline constexpr double kUntoldOfGap = 0.15;                   // this much wher
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains
 inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains,
 inline constexpr double kNestedExcess = 0.25;                  // or of what the simpler one leaves above the noise
-inline constexpr Limits kTold{.share = 0.03, .z = 2.5};        // the winner over a rival; below, the two are ambiguous
+inline constexpr Limits kTold{.share = 0.06, .z = 2.5};        // the winner over a rival; below (a quarter of the noise apart), the two are ambiguous
 inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.55;   // left above the noise, and share of the excess removed (in windows, or of a free run)
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 

@@ -21,6 +21,8 @@ inline constexpr Limits kTold{.share = 0.06, .z = 2.5};        // the winner ove
 inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.55;   // left above the noise, and share of the excess removed (in windows, or of a free run)
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 
+// What a first effect must gain over this base model.
+inline const Limits& FirstLimits(const Candidate& base) { return base.held_out_floors > kRemains ? kFirst : kFirstAtFloor; }
 // Whether the effect can be a finding on a base model (without effects, which may turn a plain motor into a plugin): a bias on a servo equals a zero offset, viscous friction is a parameter.
 bool IsFinding(const EffectUse& use, const Model& base);
 // Whether the effects are known to be confused with each other, at places that are one.

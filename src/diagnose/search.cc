@@ -184,7 +184,7 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
     SortByMisfit(base, &result.first.children);
     single = Simplest(result.first, base);
   }
-  if (single && Convincing(Compare(base, *single), base.held_out_floors > kRemains ? kFirst : kFirstAtFloor)) result.single = result.chosen = single;
+  if (single && Convincing(Compare(base, *single), FirstLimits(base))) result.single = result.chosen = single;
 
   if (single && result.single == single && single->held_out_floors > kRemains && !bench.Late()) {
     say("looking for a second effect");

@@ -1,0 +1,62 @@
+// What is known of effects beyond their equations: containment, rivals, what may stand for another effect's shape.
+#include "src/diagnose/rules.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/tune/fixture.h"
+
+namespace gapscope::testing {
+namespace {
+
+Candidate Of(const Rig& rig, const std::vector<EffectUse>& effects) {
+  Candidate candidate{.effects = effects};
+  candidate.model = rig.model;
+  return candidate;
+}
+
+TEST(RulesTest, OnlyEffectsOnOnePlaceContainEachOther) {
+  const Rig rig = LoadRig("qube");
+  const Candidate bias = Of(rig, {{"torque_bias", "arm"}}), of_joint = Of(rig, {{"direction_asymmetry", "arm"}}), of_motor = Of(rig, {{"direction_asymmetry", "motor"}});
+  EXPECT_TRUE(Contains(of_joint, bias));
+  EXPECT_FALSE(Contains(of_motor, bias));
+  EXPECT_FALSE(Contains(bias, of_joint));
+  // So the motor's asymmetry and a bias are rivals, the joint's is no rival of what it contains.
+  EXPECT_TRUE(MayBeRivals(of_motor, bias));
+  EXPECT_FALSE(MayBeRivals(of_joint, bias));
+  // Nearly: a cable that pulls from afar.
+  const Candidate cable = Of(rig, {{"cable_spring", "arm"}});
+  EXPECT_TRUE(Contains(cable, bias));
+  EXPECT_FALSE(Contains(cable, bias, true));
+  // Beside the same other effect, and not beside another.
+  EXPECT_TRUE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}), Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
+  EXPECT_FALSE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}), Of(rig, {{"torque_limit", "motor"}, {"coulomb_friction", "arm"}})));
+}
+
+TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {
+  const Rig rig = LoadRig("qube");
+  const Candidate sensors = Of(rig, {{"sensor_delay", "arm_rad"}, {"sensor_delay", "pendulum_rad"}}), command = Of(rig, {{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}});
+  EXPECT_TRUE(IsLessLikely(sensors, command));
+  EXPECT_FALSE(IsLessLikely(command, sensors));
+  EXPECT_FALSE(MayBeRivals(sensors, command));
+  // One of each cannot be told on a rig that logs one signal: rivals.
+  EXPECT_TRUE(MayBeRivals(Of(rig, {{"sensor_delay", "arm_rad"}}), Of(rig, {{"command_delay", "motor"}})));
+}
+
+TEST(RulesTest, ComplianceMayBeFrictionsElasticGive) {
+  const Rig rig = LoadRig("qube");
+  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "arm"}, *rig.model));
+  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "pendulum"}, *rig.model));
+  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"torque_bias", "arm"}, *rig.model));
+  EXPECT_FALSE(IsShape({"cable_spring", "arm"}, {"coulomb_friction", "arm"}, *rig.model));
+}
+
+TEST(RulesTest, AFirstEffectNeedsMoreWhereTheBaseModelIsAtTheNoise) {
+  Candidate base;
+  base.held_out_floors = 0.95;
+  EXPECT_GT(FirstLimits(base).share, 0.05);
+  base.held_out_floors = 2;
+  EXPECT_LT(FirstLimits(base).share, 0.02);
+}
+
+}  // namespace
+}  // namespace gapscope::testing

@@ -108,6 +108,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
   for (std::size_t i = 0; i < model.parameters().size(); ++i) {
     if (model.parameters()[i].name.find("time_constant_s") != std::string::npos) time_constants_.push_back(i);
   }
+  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nu, [](int plugin) { return plugin >= 0; });
   for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
 }
 

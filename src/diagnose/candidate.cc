@@ -15,7 +15,7 @@ bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
   constexpr double kEdge = 1e-3;  // of the range
   return std::any_of(placed.value().begin(), placed.value().end(), [&](const PlacedParameter& p) {
     const double value = candidate.values[candidate.model->IndexOf(p.name)], edge = kEdge * (p.high - p.low);
-    const bool share = p.key == "motor_share" || p.key == "damping_ratio" || p.key == "exponent";  // shapes that the logs hardly know
+    const bool share = p.trials.empty();  // what was not screened, the logs hardly know
     return !share && ((value <= p.low + edge && p.neutral != p.low) || (value >= p.high - edge && p.neutral != p.high));
   });
 }
@@ -57,7 +57,7 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train, bench.Options(*candidate.model, true), candidate.values, bench.pool);
   for (const auto& use : effects) {
     GS_ASSIGN(const auto placed, candidate.model->EffectParameters(use, bench.scales));
-    for (const auto& p : placed) candidate.parameters += p.key != "exponent";  // of a shape that simpler models have a fixed value for
+    for (const auto& p : placed) candidate.parameters += p.key != "exponent" && p.key != "second_pole_share";  // of a shape that simpler models have a fixed value for
   }
   return candidate;
 }

@@ -106,17 +106,29 @@ void StartSagFromLimit(const Workbench& bench, const Candidate& limit, Layer* la
 
 }  // namespace
 
-void VaryShape(const Workbench& bench, Candidate* candidate) {
+void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candidate) {
   const auto placed = candidate->model->EffectParameters(candidate->effects.back(), bench.scales);
   if (!placed.ok()) return;
+  constexpr double kFar = 4;  // times the value found
   for (const auto& p : placed.value()) {
-    if (!p.trials.empty() || bench.Late()) continue;
     const int index = candidate->model->IndexOf(p.name);
-    const double found = candidate->values[index], middle = p.low > 0 && p.high > 20 * p.low ? std::sqrt(p.low * p.high) : 0.5 * (p.low + p.high);
-    // On the other side of the middle.
     std::vector<double> values = candidate->values;
-    values[index] = found > middle ? p.low + 0.4 * (middle - p.low) : middle + 0.4 * (p.high - middle);
-    TryStart(bench, candidate, candidate->problem->At(values, candidate->point), kFirstIterations, kFirstTolerance);
+    if (p.trials.empty()) {
+      // On the other side of the middle.
+      const double found = values[index], middle = p.low > 0 && p.high > 20 * p.low ? std::sqrt(p.low * p.high) : 0.5 * (p.low + p.high);
+      values[index] = found > middle ? p.low + 0.4 * (middle - p.low) : middle + 0.4 * (p.high - middle);
+      if (!bench.Late()) TryStart(bench, candidate, candidate->problem->At(values, candidate->point), kFirstIterations, kFirstTolerance);
+    } else if (placed.value().front().name == p.name && p.trials.size() < kScan) {
+      // Of another order of size, from the parent: with this one the base parameters may have gone where no step leads back.
+      for (const double trial : p.trials) {
+        const double ratio = trial / candidate->values[index];
+        if (bench.Late() || (ratio > 1 / kFar && ratio < kFar)) continue;
+        values = candidate->model->Nominal();
+        for (const auto& q : placed.value()) values[candidate->model->IndexOf(q.name)] = q.start;
+        values[index] = trial;
+        TryStart(bench, candidate, candidate->problem->FromParent(*parent.problem, parent.point, values, {}), kTasteIterations, kFirstTolerance);
+      }
+    }
   }
 }
 

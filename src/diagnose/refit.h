@@ -23,8 +23,8 @@ struct Layer {
 void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child);
 // Rivals of the layer's first start anew where they best imitate it, and are scored.
 void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer);
-// Another start on the other side of each parameter that was not screened (how an inertia splits): a valley of its own.
-void VaryShape(const Workbench& bench, Candidate* candidate);
+// Other starts: on the other side of each parameter that was not screened (how an inertia splits), and at trial values of another order of size. Valleys of their own.
+void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candidate);
 // What contains a simpler effect starts from where that ended. Coulomb friction: both directions alike, or a hump a little above the sliding level, below which a
 // hump has no gradient and its fit would stay Coulomb's. A torque limit: a ceiling that sags.
 void StartFromSimpler(const Workbench& bench, Layer* layer);

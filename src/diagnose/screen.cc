@@ -31,7 +31,6 @@ double StepTo(const PlacedParameter& p, double trial, double scale) {
   return std::clamp(p.neutral + std::clamp(scale, kLeastScale, kMostScale) * (trial - p.neutral), p.low, p.high);
 }
 
-constexpr std::size_t kScan = 8;    // trial values that make a scan
 constexpr std::size_t kOthers = 3;
 
 // The best of `trials` (one per value of the scanned parameter `scanned`), with the next best that are no neighbours of it or each other.

@@ -6,6 +6,8 @@
 
 namespace gapscope {
 
+inline constexpr std::size_t kScan = 8;  // trial values that make a scan
+
 // The most promising of an effect's trial values.
 struct Trial {
   double drop = 0;              // share of the parent's cost that the best step promises

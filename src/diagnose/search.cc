@@ -87,7 +87,7 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
   // The leaders once more to the end.
   for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !bench.Late(); ++i) {
     Candidate& leader = *layer->children[i];
-    if (i == 0 && leader.held_out_floors > kRemains) VaryShape(hurried, &leader);
+    if (i == 0 && leader.held_out_floors > kRemains) VaryShape(hurried, parent, &leader);
     if (i > 0 && (leader.train_cost > 1.5 * layer->children.front()->train_cost || hurried.Late())) break;
     FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
     ScoreCandidate(bench, &leader);

@@ -277,6 +277,24 @@ TEST(TakeBetterStatesTest, EveryWindowKeepsTheStateThatCostsLess) {
   EXPECT_NEAR(cost, problem.Cost(a), 1e-12 * cost);
 }
 
+// What went before a window is in the drive's states when it starts: with the true effect nothing is left but the start's own small error.
+TEST(FitProblemTest, DrivesHoldTheirPastAtAWindowsStart) {
+  const auto command = [](double t) { return 2 * std::sin(9 * t + 1.5 * t * t); };
+  for (const auto& [rig_name, changed] : {std::pair<std::string, std::map<std::string, double>>{"flexjoint", {{"actuator_lag@motor.time_constant_s", 0.04}, {"actuator_lag@motor.second_pole_share", 0.2}}},
+                                          {"qube", {{"supply_sag@motor.time_constant_s", 0.5}, {"supply_sag@motor.sag_fraction", 0.5}, {"supply_sag@motor.limit_n_m", 0.008}}},
+                                          {"joint", {{"torque_delay@motor.delay_s", 0.02}}}}) {
+    const std::string effect = changed.begin()->first.substr(0, changed.begin()->first.find('.'));
+    const Rig rig = LoadRig(rig_name, {effect});
+    const auto values = rig.Values(changed);
+    const std::vector<Recording> logs = {MakeLog(rig, values, command, 5, 0.002, 0, 1)};
+    ThreadPool pool(1);
+    const FitOptions options{.time_step_s = 0.002, .fit_offsets = false, .fit_shift = false};
+    FitProblem truth(*rig.model, logs, options, values, pool), nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
+    const double left = truth.Cost(SolveStates(truth, truth.Start(), 3)), without = nothing.Cost(SolveStates(nothing, nothing.Start(), 3));
+    EXPECT_LT(left, 0.003 * without) << effect;
+  }
+}
+
 // A late sensor shows a window's start only later: the window starts where the mechanism was, and the true delay leaves nothing.
 TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   const Rig rig = LoadRig("joint", {"sensor_delay@position_rad"});

@@ -8,14 +8,15 @@ Effect Effect_actuator_lag() {
       .place = EffectPlace::kMotor,
       .parameters = {
           {.key = "time_constant_s", .unit = "s", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.15, .trials = {0.002, 0.006, 0.02, 0.06}, .start = 0.004},
+          {.key = "second_pole_share", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.5, .start = 0.1},
       },
-      .meaning = "torque follows its request with a first-order lag",
+      .meaning = "torque follows its request with a lag of two poles: the time constant is their sum",
       .signature = "phase saturates, gain rolls off",
       .told_apart = "steps, high frequency",
       .partners = {"command_delay", "torque_delay"},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
-        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "time_constant_s", names[0]));
-        return Ok();
+        GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "time_constant_s", names[0] + "*(1-" + names[1] + ")"));
+        return structure.AddMotorTerm(on, "second_time_constant_s", names[0] + "*" + names[1]);
       },
   };
 }

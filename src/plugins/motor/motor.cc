@@ -179,8 +179,24 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   }
   const double enable = enable_ ? mju_clip(inputs[config_.input_of[kEnable]], 0, 1) : 1;
 
-  // At rest after a reset: no load on the supply yet known, so the law comes first with a full one.
+  // A step of one lag: its output for `target`.
+  const auto lagged = [&](int act, MotorParameter constant, double target, double request, bool first) {
+    if (first) d->act[act] = target;
+    const Lag lag(Parameter(m, constant), step, staged);
+    d->act_dot[act] = lag.Derivative(d->act[act], target);
+    return lag.Output(d->act[act], request);
+  };
   const bool prime = slots[MotorState::kPrimed] == 0 && !later;
+  // On a voltage drive the second pole is the amplifier's, before the winding: the back-EMF does not pass it.
+  double filtered[kRoles];
+  const bool amplifier = second_lag_ >= 0 && (config_.law == MotorLaw::kVoltage || (config_.law == MotorLaw::kAffine && Parameter(m, kBias1) == 0));
+  if (amplifier) {
+    std::copy_n(inputs, config_.inputs, filtered);
+    filtered[config_.command] = lagged(second_lag_, kSecondTimeConstant, inputs[config_.command], inputs[config_.command], prime);
+    inputs = filtered;
+  }
+
+  // At rest after a reset: no load on the supply yet known, so the law comes first with a full one.
   if (sag_ >= 0 && prime) {
     const double wanted = enable * Request(m, inputs, seen, speed, supply_now);
     const double load = Load(m, wanted, LimitsAt(m, wanted, speed), supply_now);
@@ -191,12 +207,8 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   // Request, then its lags.
   double torque = Request(m, inputs, seen, speed, supply_now * ceiling);
   for (const auto& [act, constant] : {std::pair{lag_, kTimeConstant}, std::pair{second_lag_, kSecondTimeConstant}}) {
-    if (act < 0) continue;
-    const double target = enable * torque;
-    if (prime) d->act[act] = target;
-    const Lag lag(Parameter(m, constant), step, staged);
-    d->act_dot[act] = lag.Derivative(d->act[act], target);
-    torque = lag.Output(d->act[act], torque);
+    if (act < 0 || (act == second_lag_ && amplifier)) continue;
+    torque = lagged(act, constant, enable * torque, torque, prime);
   }
   torque *= enable;
 

@@ -1,6 +1,7 @@
 // The envelope of torque against speed: peak torque, the power that bounds it at speed, the speed without load. Source: "Motor System Identification", "TN curve".
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
@@ -17,6 +18,35 @@ double Quantile(std::vector<double> values, double share) {
   const std::size_t k = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
   return values[k];
+}
+
+using Envelope = std::vector<std::pair<double, double>>;  // speed, torque
+
+struct Curve {
+  double peak, power;
+};
+constexpr int kGrid = 60, kDraws = 200;
+constexpr double kGridStep = 0.6 / kGrid;
+
+// Peak and constant power by least absolute deviation of the envelope's logarithm over a grid from 0.4 of the largest torque and power to those: the corner is where they meet.
+Curve FitCurve(const Envelope& envelope, double strongest, double power) {
+  double best = INFINITY;
+  Curve curve{.peak = strongest, .power = power};
+  std::vector<double> logs, speeds;
+  for (const auto& [speed, torque] : envelope) {
+    logs.push_back(std::log(torque));
+    speeds.push_back(std::log(std::max(speed, 1e-9)));
+  }
+  for (int i = 0; i <= kGrid; ++i) {
+    const double peak = std::log(strongest * (0.4 + kGridStep * i));
+    for (int j = 0; j <= kGrid; ++j) {
+      const double watts = std::log(power * (0.4 + kGridStep * j));
+      double misfit = 0;
+      for (std::size_t k = 0; k < logs.size() && misfit < best; ++k) misfit += std::abs(std::min(peak, watts - speeds[k]) - logs[k]);
+      if (misfit < best) best = misfit, curve = {.peak = std::exp(peak), .power = std::exp(watts)};
+    }
+  }
+  return curve;
 }
 
 }  // namespace
@@ -58,7 +88,7 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   // The envelope: near the top of each bin of speed; of the rows where the drive was asked for more, where there are enough.
   constexpr int kBins = 16;
   PointTable table{.name = "envelope", .columns = {"speed_rad_per_s", "torque_n_m", "power_w", "rows", "limited_rows"}, .rows = {}};
-  std::vector<std::pair<double, double>> envelope;
+  Envelope envelope;
   for (int b = 0; b < kBins; ++b) {
     std::vector<double> torques, all;
     double speed = 0;
@@ -73,26 +103,28 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     table.rows.push_back({w, top, w * top, static_cast<double>(all.size()), reaches ? static_cast<double>(torques.size()) : 0.0});
   }
   Identification result{.method = "tn-curve", .relation = "|torque| <= min(peak, power / speed), envelope of the rows in which the drive pushes", .r2 = NAN, .rmse = NAN, .unit = "N m", .rows = samples.size()};
-  // Peak and constant power by least absolute deviation of the envelope's logarithm over a grid: the corner is where they meet.
-  double best = INFINITY, peak = strongest, bound = power;
+  Curve curve{.peak = strongest, .power = power};
+  std::vector<double> peaks, powers;
   if (envelope.size() >= 3) {
-    for (int i = 0; i <= 60; ++i) {
-      for (int j = 0; j <= 60; ++j) {
-        const double p = strongest * (0.4 + 0.6 * i / 60), w = power * (0.4 + 0.6 * j / 60);
-        double misfit = 0;
-        for (const auto& [speed, torque] : envelope) misfit += std::abs(std::log(std::min(p, w / std::max(speed, 1e-9)) / torque));
-        if (misfit < best) best = misfit, peak = p, bound = w;
-      }
+    curve = FitCurve(envelope, strongest, power);
+    // Intervals: the same over bins drawn again (bootstrap percentiles; Efron and Tibshirani, "An Introduction to the Bootstrap", 1993), and a step of the grid.
+    std::mt19937 random(1);
+    std::uniform_int_distribution<std::size_t> pick(0, envelope.size() - 1);
+    for (int draw = 0; draw < kDraws; ++draw) {
+      Envelope again;
+      for (std::size_t k = 0; k < envelope.size(); ++k) again.push_back(envelope[pick(random)]);
+      const Curve other = FitCurve(again, strongest, power);
+      peaks.push_back(other.peak);
+      powers.push_back(other.power);
     }
   }
-  double low_peak = INFINITY, high_peak = 0, low_power = INFINITY, high_power = 0;
-  for (const auto& [speed, torque] : envelope) {
-    if (speed * peak < 0.8 * bound) low_peak = std::min(low_peak, torque), high_peak = std::max(high_peak, torque);
-    if (speed * peak > 1.2 * bound) low_power = std::min(low_power, torque * speed), high_power = std::max(high_power, torque * speed);
-  }
-  const auto spread = [](double low, double high) { return high > 0 ? std::pair{low, high} : std::pair<double, double>{NAN, NAN}; };
-  const auto [pl, ph] = spread(low_peak, high_peak);
-  const auto [wl, wh] = spread(low_power, high_power);
+  const double peak = curve.peak, bound = curve.power;
+  const bool before = std::any_of(envelope.begin(), envelope.end(), [&](const auto& bin) { return bin.first * peak < 0.8 * bound; });
+  const bool beyond = std::any_of(envelope.begin(), envelope.end(), [&](const auto& bin) { return bin.first * peak > 1.2 * bound; });
+  const auto interval = [](const std::vector<double>& values, double step) { return std::pair{Quantile(values, 0.025) - step, Quantile(values, 0.975) + step}; };
+  const auto nothing = std::pair<double, double>{NAN, NAN};
+  const auto [pl, ph] = before && !peaks.empty() ? interval(peaks, kGridStep * strongest) : nothing;
+  const auto [wl, wh] = beyond && !powers.empty() ? interval(powers, kGridStep * power) : nothing;
   result.values.push_back({.name = "peak_torque", .unit = "N m", .value = peak, .low = pl, .high = ph});
   result.values.push_back({.name = "power", .unit = "W", .value = bound, .low = wl, .high = wh});
   result.values.push_back({.name = "corner_speed", .unit = "rad/s", .value = bound / peak, .low = NAN, .high = NAN});
@@ -104,7 +136,6 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   }
   if (!reaches) result.remarks.push_back("the drive was hardly ever asked for more than it gave: the envelope is how far the log went, not what the motor can do");
   if (std::isnan(wl)) result.remarks.push_back("no rows beyond the corner: the power is a lower bound");
-  result.remarks.push_back("intervals are the spread of the envelope's bins");
   result.tables.push_back(std::move(table));
   return result;
 }

@@ -1,4 +1,4 @@
-// What the two sources of FitProblem share.
+// What the sources of FitProblem share.
 #ifndef GAPSCOPE_TUNE_FIT_PROBLEM_PARTS_H_
 #define GAPSCOPE_TUNE_FIT_PROBLEM_PARTS_H_
 

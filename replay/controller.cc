@@ -16,6 +16,11 @@ std::size_t IndexOf(const List& inputs, const std::string& name) {
   return static_cast<std::size_t>(std::find_if(inputs.begin(), inputs.end(), [&](const auto& i) { return i.name == name; }) - inputs.begin());
 }
 
+// One step of D(e), N s / (s + N) by backward differences: what it was, and by how much e has changed.
+double FilteredDerivative(double derivative, double change, double filter_rad_per_s, double period_s) {
+  return (filter_rad_per_s * change + derivative) / (1 + filter_rad_per_s * period_s);
+}
+
 Status ReadInputs(YamlMap& map, const std::string& path, const Experiment& experiment, ControllerSpec* spec) {
   for (const YAML::Node& item : map.List("inputs")) {
     YamlMap one(item, path, "an input of the controller");
@@ -197,9 +202,8 @@ void Controller::Reset(Start start) {
 }
 
 double Controller::Evaluate(Term& term, double error, double period_s) const {
-  const double n = term.spec.filter_rad_per_s;
   if (first_ && start_ == Start::kSettled) term.last_error = error;
-  term.derivative = (n * (error - term.last_error) + term.derivative) / (1 + n * period_s);
+  term.derivative = FilteredDerivative(term.derivative, error - term.last_error, term.spec.filter_rad_per_s, period_s);
   term.last_error = error;
   term.integral += term.spec.integral * error * period_s;
   if (term.spec.integral_limit > 0) term.integral = std::clamp(term.integral, -term.spec.integral_limit, term.spec.integral_limit);
@@ -220,10 +224,10 @@ double Controller::Sum(std::vector<Term>& terms, double period_s) {
 double Controller::Swing(double angle, double period_s) {
   const SwingUp& swing = *spec_.swing_up;
   const double turned = first_ ? 0 : std::remainder(angle - swing_angle_, 2 * std::numbers::pi);
-  swing_speed_ = (swing.filter_rad_per_s * turned + swing_speed_) / (1 + swing.filter_rad_per_s * period_s);
+  swing_speed_ = FilteredDerivative(swing_speed_, turned, swing.filter_rad_per_s, period_s);
   swing_angle_ = angle;
   const double arm = inputs_now_[arm_input_];
-  arm_speed_ = (swing.filter_rad_per_s * (first_ ? 0 : arm - arm_angle_) + arm_speed_) / (1 + swing.filter_rad_per_s * period_s);
+  arm_speed_ = FilteredDerivative(arm_speed_, first_ ? 0 : arm - arm_angle_, swing.filter_rad_per_s, period_s);
   arm_angle_ = arm;
   caught_ = std::abs(angle) < (caught_ ? swing.drop_rad : swing.catch_rad);
   const double energy = 0.5 * swing.inertia_kg_m2 * swing_speed_ * swing_speed_ + swing.torque_n_m * (std::cos(angle) - 1);
@@ -245,7 +249,7 @@ double Controller::Step(std::size_t row, std::span<const double> readings) {
     references_now_[i] = inputs_[i].reference.At(row);
     errors_[i] = references_now_[i] - inputs_now_[i];
   }
-  double limit = spec_.limit, pumped = 0;
+  double pumped = 0;
   if (spec_.swing_up) pumped = Swing(inputs_now_[swing_input_], period);
   asked_ = errors_;
   // The observer hears what was really sent, saturation included. All laws run on, so that their filters are where the motion is when they take over.
@@ -260,7 +264,7 @@ double Controller::Step(std::size_t row, std::span<const double> readings) {
   }
   first_ = false;
   sent_ = law_ + feedforward_.At(row);
-  if (limit > 0) sent_ = std::clamp(sent_, -limit, limit);
+  if (spec_.limit > 0) sent_ = std::clamp(sent_, -spec_.limit, spec_.limit);
   return sent_;
 }
 

@@ -21,6 +21,14 @@ Eigen::VectorXd SolveFree(Eigen::MatrixXd hessian, Eigen::VectorXd right, const 
   return hessian.ldlt().solve(right);
 }
 
+// What the window's own states answer to a slope of all columns (the last ones are the states'): S^-1 times their part, S with what is known of them beforehand.
+Eigen::VectorXd StateAnswer(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& prior, const Eigen::VectorXd& slope) {
+  const Eigen::Index m = prior.size();
+  Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
+  own.diagonal() += prior.cwiseAbs2();
+  return own.ldlt().solve(slope.tail(m));
+}
+
 }  // namespace
 
 Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns columns) {
@@ -251,9 +259,7 @@ Linearization FitProblem::Bend(const Linearization& at, const Snapshot& snapshot
     const Eigen::VectorXd slope = jacobian.transpose() * half;
     gradients[w] = slope.head(n);
     if (const Eigen::Index m = jacobian.cols() - n; m > 0) {
-      Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
-      own.diagonal() += windows_[w].prior.cwiseAbs2();
-      bend.state_step[w] = -own.ldlt().solve(slope.tail(m));
+      bend.state_step[w] = -StateAnswer(jacobian, windows_[w].prior, slope);
       gradients[w] -= at.state_gain[w].transpose() * slope.tail(m);
     }
   });
@@ -295,9 +301,7 @@ ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& paren
     part.cross = all.head(n);
     if (m > 0) {
       // The states' own answer: with gain = S^-1 Jx' Jy and step = -S^-1 Jx' r, S^-1 Jx' c needs S once more.
-      Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
-      own.diagonal() += window.prior.cwiseAbs2();
-      const Eigen::VectorXd answer = own.ldlt().solve(all.tail(m));
+      const Eigen::VectorXd answer = StateAnswer(jacobian, window.prior, all);
       part.square -= all.tail(m).dot(answer);
       part.slope += all.tail(m).dot(base.linearization.state_step[w]);
       part.cross -= base.linearization.state_gain[w].transpose() * all.tail(m);

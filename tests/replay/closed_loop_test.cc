@@ -53,16 +53,20 @@ class ClosedLoopTest : public ::testing::Test {
   std::vector<Recording> recordings_;
 };
 
-// The law of the real balancing Qube: pi - pendulum is zero upright. Round the data sheet's arm (0.095 kg) it is unstable (poles 1.4 +- 14.9i); the rig's own arm is lighter.
-const std::string kBalance = R"(
+// State feedback about upright, where alpha = pi - pendulum is zero; gains as a term's keys.
+std::string Upright(const std::string& theta, const std::string& alpha) {
+  return R"(
 controller:
   actuator: motor
   limit: 10
   inputs: [{name: theta, signal: arm_rad}, {name: alpha, signal: pendulum_rad, scale: -1, add: 3.141592653589793}]
   terms:
-    - {input: theta, proportional: -6, derivative: -1.8, filter_rad_per_s: 50}
-    - {input: alpha, proportional: -30, derivative: -2.5, filter_rad_per_s: 50}
+    - {input: theta, )" + theta + R"(, filter_rad_per_s: 50}
+    - {input: alpha, )" + alpha + R"(, filter_rad_per_s: 50}
 )";
+}
+// The law of the real balancing Qube: pi - pendulum is zero upright. Round the data sheet's arm (0.095 kg) it is unstable (poles 1.4 +- 14.9i); the rig's own arm is lighter.
+const std::string kBalance = Upright("proportional: -6, derivative: -1.8", "proportional: -30, derivative: -2.5");
 
 std::string Rows(const Eigen::MatrixXd& m) {
   std::string text = "[";
@@ -202,15 +206,7 @@ TEST_F(ClosedLoopTest, ThePendulumIsKeptUpright) {
 }
 
 // From rest to upright and held there; J = m (2 l)^2 / 3, m g l and the back-EMF of the rig's data sheet, LQR gains of `design lqr --at pendulum=3.14159 --q 10,10,1,10`.
-const std::string kLqr = R"(
-controller:
-  actuator: motor
-  limit: 10
-  inputs: [{name: theta, signal: arm_rad}, {name: alpha, signal: pendulum_rad, scale: -1, add: 3.141592653589793}]
-  terms:
-    - {input: theta, proportional: -3.1623, derivative: -2.008, filter_rad_per_s: 50}
-    - {input: alpha, proportional: -59.4409, derivative: -6.0971, filter_rad_per_s: 50}
-)";
+const std::string kLqr = Upright("proportional: -3.1623, derivative: -2.008", "proportional: -59.4409, derivative: -6.0971");
 
 class SwingUpTest : public ClosedLoopTest {
  protected:

@@ -9,6 +9,7 @@ namespace {
 // Shares of the friction and slip distances over presliding_rad: the stiffest element slips first.
 constexpr std::array<double, Bristles::kElements> kShare = {0.4, 0.3, 0.2, 0.1};
 constexpr std::array<double, Bristles::kElements> kSlip = {0.3, 0.8, 1.6, 3.0};
+constexpr double kNearLimit = 0.05;  // of the limit
 constexpr double kCableSlipRad = 0.03;
 
 double Typical(const Dry& dry, double load_n_m) {
@@ -16,11 +17,14 @@ double Typical(const Dry& dry, double load_n_m) {
   return std::max(slide + dry.load_coefficient * std::abs(load_n_m), 1e-12);
 }
 
-// One Maxwell element after `distance`: stiffness is that at which the larger direction slips at `slip`.
+// Where a Maxwell element slips in that direction: its stiffness is that at which the larger direction slips at `slip`.
+double Limit(const Dry& dry, int i, double direction, double speed, double load_n_m) {
+  return kSlip[i] * dry.presliding_rad / Typical(dry, load_n_m) * SlipTorque(dry, direction, speed, load_n_m);
+}
+
+// One Maxwell element after `distance`.
 double Element(const Dry& dry, int i, double z, double distance, double speed, double load_n_m) {
-  const double limit = kSlip[i] * dry.presliding_rad / Typical(dry, load_n_m);
-  return std::clamp(z + distance, -limit * SlipTorque(dry, -1, speed, load_n_m),
-                    limit * SlipTorque(dry, 1, speed, load_n_m));
+  return std::clamp(z + distance, -Limit(dry, i, -1, speed, load_n_m), Limit(dry, i, 1, speed, load_n_m));
 }
 
 double LuGre(const Dry& dry, double z, double distance, double speed, double load_n_m) {
@@ -48,8 +52,10 @@ double Bristles::Torque(const Dry& dry, double distance_rad, double speed, doubl
     for (int i = 0; i < kElements; ++i) {
       const double z = Element(dry, i, deflection_rad_[i], distance_rad, speed, load_n_m);
       torque += kShare[i] * typical * z / (kSlip[i] * dry.presliding_rad);
-      // Stuck: it could be deflected further in the direction of motion.
-      if (Element(dry, i, z, std::copysign(dry.presliding_rad, speed), speed, load_n_m) != z) stuck += kShare[i];
+      // Stuck: well short of its limit in the direction of motion. Near it counts as sliding: the limit itself moves a
+      // little with load and speed, and an element that has only to follow it does not stick.
+      const double direction = std::copysign(1.0, speed), limit = Limit(dry, i, direction, speed, load_n_m);
+      if (limit > 0) stuck += kShare[i] * std::clamp((1 - direction * z / limit) / kNearLimit, 0.0, 1.0);
     }
     // Elements that stick lose a little to viscosity, or a stopped joint would tremble for ever.
     return torque + stuck * 0.5 * std::sqrt(typical / dry.presliding_rad * inertia) * speed;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "tests/twin/effects.h"
+#include "tests/twin/friction.h"
 #include "tests/twin/plants.h"
 
 namespace gapscope::twin {
@@ -79,6 +80,21 @@ TEST_P(DryTest, LoadFrictionGrowsWithTorque) {
     Simulator simulator(plant, kStep_s);
     RunFor(0.3, Constant(0, torque), &simulator);
     EXPECT_NEAR(simulator.w1(), 0.3 * 0.8 * torque / kInertia, 0.02 * torque);
+  }
+}
+
+// What has only to follow a limit that moves with the load does not stick, and loses nothing to the sticking elements' viscosity.
+TEST_P(DryTest, SlidingUnderAChangingLoadMeetsTheLevelAlone) {
+  Dry dry;
+  dry.load_coefficient = 0.385;
+  dry.presliding_rad = 1e-4;
+  dry.law = GetParam();
+  for (double before = 0.1; before < 1; before += 0.037) {
+    for (double now = 0.1; now < 1; now += 0.041) {
+      Bristles bristles;
+      bristles.Slide(dry, 5, before);
+      EXPECT_NEAR(bristles.Torque(dry, 0, 5, now, 0.002), 0.385 * now, 1e-9) << before << " " << now;
+    }
   }
 }
 

@@ -57,7 +57,7 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train, bench.Options(*candidate.model, true), candidate.values, bench.pool);
   for (const auto& use : effects) {
     GS_ASSIGN(const auto placed, candidate.model->EffectParameters(use, bench.scales));
-    for (const auto& p : placed) candidate.parameters += p.key != "exponent" && p.key != "second_pole_share";  // of a shape that simpler models have a fixed value for
+    for (const auto& p : placed) candidate.parameters += !p.shape;
   }
   return candidate;
 }

@@ -111,6 +111,7 @@ void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candi
   if (!placed.ok()) return;
   constexpr double kFar = 4;  // times the value found
   for (const auto& p : placed.value()) {
+    if (!(p.low < p.high)) continue;
     const int index = candidate->model->IndexOf(p.name);
     std::vector<double> values = candidate->values;
     if (p.trials.empty()) {

@@ -12,6 +12,7 @@ inline constexpr Limits kFirstAtFloor{.share = 0.06, .z = 3.0};  // the same whe
 inline constexpr double kRemains = 1.25;                       // residual over noise below which nothing more is sought
 inline constexpr Limits kSecond{.share = 0.06, .z = 3.0};      // a second effect over the first
 inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise,
+inline constexpr Limits kSureSecond{.share = 0.3, .z = 8.5};   // or beyond doubt: what else is missing need not be small;
 inline constexpr double kSecondOfGap = 0.025;                  // and of the base model's residual: the first effect's shape is never quite the real one;
 inline constexpr double kUntoldOfGap = 0.15;                   // this much where unlike effects would do as well, or where it may be the first one's shape
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains

@@ -60,8 +60,8 @@ Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, 
     for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = trial[i];
     const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
     if (!test.valid) continue;
-    constexpr double kAllAbsorbed = 0.999;
-    visible = visible || test.absorbed < kAllAbsorbed;
+    constexpr double kAllAbsorbed = 0.999, kPromises = 0.05;  // little of a column may be its own and yet be what is missing
+    visible = visible || test.absorbed < kAllAbsorbed || test.drop > kPromises * base.cost;
     int scanned = -1;
     for (std::size_t i = 0; i < trial.size(); ++i) {
       const PlacedParameter& p = placed.value()[i];

@@ -43,6 +43,32 @@ std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::si
   return order;
 }
 
+// What explained much alone beside the first effect is tried beside it too, from where it ended: where much is missing, a step of the score test says little.
+void AddStrongSingles(const SearchResult& found, const Candidate& parent, Layer* layer) {
+  constexpr Limits kStrong{.share = 0.3, .z = 3.0};
+  constexpr std::size_t kMost = 2, kPlace = 2;
+  std::size_t added = 0;
+  for (const auto& child : found.first.children) {
+    if (added == kMost || child->held_out_blocks.empty() || child->effects == parent.effects || Contains(*child, parent) || Contains(parent, *child) ||
+        ArePartners(child->effects.back(), parent.effects.back(), *parent.model) || !Convincing(Compare(*found.base, *child), kStrong)) {
+      continue;
+    }
+    const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back(); });
+    if (entry == layer->screen.end()) continue;
+    ++added;
+    Trial start{.drop = entry->trial.drop, .absorbed = entry->trial.absorbed, .values = entry->child.model->Nominal(), .dy = {}, .visible = true, .valid = true, .others = {}};
+    for (std::size_t i = 0; i < start.values.size(); ++i) {
+      const std::string& name = entry->child.model->parameters()[i].name;
+      if (name.starts_with(entry->use.Text() + ".")) start.values[i] = child->values[child->model->IndexOf(name)];
+    }
+    entry->trial.others.push_back(std::move(start));
+    const auto index = static_cast<std::size_t>(entry - layer->screen.begin());
+    if (std::find(layer->leaders.begin(), layer->leaders.end(), index) == layer->leaders.end()) {
+      layer->leaders.insert(layer->leaders.begin() + static_cast<std::ptrdiff_t>(std::min(kPlace, layer->leaders.size())), index);
+    }
+  }
+}
+
 // The bench with less time: what is left of the budget is for what comes later.
 Workbench Hurried(const Workbench& bench, double share) {
   Workbench hurried = bench;
@@ -67,8 +93,8 @@ void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Laye
   }
 }
 
-// `share` of the time that is left goes to finding the leader; its own last fit may take more.
-void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::size_t refits, double share, const Say& say, Layer* layer) {
+// `share` of the time that is left goes to finding the leader; its own last fit may take more. `found`: what singles did, for a second effect.
+void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::size_t refits, double share, const Say& say, Layer* layer, const SearchResult* found = nullptr) {
   const Workbench hurried = Hurried(bench, share);
   const auto possible = parent.model->PossibleEffects();
   if (!possible.ok()) return;
@@ -78,6 +104,7 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
   }
   layer->screen = Screen(bench, parent, uses);
   layer->leaders = Leaders(*layer, *parent.model, refits);
+  if (found) AddStrongSingles(*found, parent, layer);
   Refit(hurried, parent, say, layer);
   if (layer->children.empty()) return;
   SortByMisfit(parent, &layer->children);
@@ -124,14 +151,14 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent) {
 // real one: what is small and unlike effects explain equally well is that.
 bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
   if (!Convincing(Compare(single, pair), kSecond)) return false;
+  const bool shape = IsShape(pair.effects.back(), single.effects.back(), *single.model);
   const double removed = RemovedExcess(single.held_out_floors, pair.held_out_floors), typically = RemovedExcess(TypicalFloors(single), TypicalFloors(pair));
-  if (std::max(removed, typically) < kSecondExcess) return false;
+  if (std::max(removed, typically) < kSecondExcess && (shape || !Convincing(Compare(single, pair), kSureSecond))) return false;
   const double size = std::sqrt(std::max(0.0, std::pow(single.held_out_floors, 2) - std::pow(pair.held_out_floors, 2))) / found.base->held_out_floors;
   const bool told = std::none_of(found.second.children.begin(), found.second.children.end(), [&](const auto& rival) {
     return rival.get() != &pair && !rival->held_out_blocks.empty() && !Contains(*rival, pair) && !Contains(pair, *rival) && !ArePartners(rival->effects.back(), pair.effects.back(), *single.model) &&
            AreRivals(pair, *rival);
   });
-  const bool shape = IsShape(pair.effects.back(), single.effects.back(), *single.model);
   return size > (told && !shape ? kSecondOfGap : kUntoldOfGap);
 }
 
@@ -189,7 +216,7 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   if (single && result.single == single && single->held_out_floors > kRemains && !bench.Late()) {
     say("looking for a second effect");
     result.second_parent = single;
-    Explore(bench, *base.model, *single, kSecondRefits, kSecondShare, say, &result.second);
+    Explore(bench, *base.model, *single, kSecondRefits, kSecondShare, say, &result.second, &result);
     if (const Candidate* pair = Simplest(result.second, *single)) {
       if (IsSecond(result, *single, *pair)) result.chosen = pair;
     }

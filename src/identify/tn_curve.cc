@@ -71,9 +71,18 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
       const mjtNum *gain = m.actuator_gainprm + mjNGAIN * actuator, *bias = m.actuator_biasprm + mjNBIAS * actuator;
       for (std::size_t i = 0; i < smooth.size(); ++i) demand[i] += gain[0] * u[i] + bias[0] + bias[1] * q[i] + bias[2] * w[i];
     }
+    // The low pass mixes rows: a limit is seen where the drive was asked for more, one way, all across its reach.
+    const auto asked = [&](std::size_t i) { return std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0; };
+    std::size_t run = 0;  // rows in a row, up to here, that were asked for more in the direction of this one
+    std::vector<std::size_t> runs;
+    for (std::size_t i = 0; i < smooth.size(); ++i) {
+      run = !asked(i) ? 0 : i > 0 && run > 0 && t[i] * t[i - 1] < 0 ? 1 : run + 1;
+      runs.push_back(run);
+    }
     for (std::size_t i = 0; i < smooth.size(); ++i) {
       if (!std::isfinite(t[i]) || !std::isfinite(w[i]) || t[i] * w[i] < 0) continue;
-      samples.push_back({std::abs(w[i]), std::abs(t[i]), std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0});
+      const std::size_t last = std::min(i + smooth.reach(), smooth.size() - 1);
+      samples.push_back({std::abs(w[i]), std::abs(t[i]), runs[last] > last - i + std::min(i, smooth.reach())});
       limited += samples.back().limited ? 1 : 0;
     }
   }

@@ -139,7 +139,8 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Struct
       if (!electric) scale = scales.torque_n_m;
     }
     PlacedParameter out{.name = use.Text() + "." + key, .key = key, .unit = unit, .neutral = p.neutral * scale, .low = p.low * scale, .high = p.high * scale,
-                        .start = p.start * scale};
+                        .start = p.start * scale, .shape = p.shape};
+    if (p.voltage_only && structure.CommandUnit(use.on) != "V") out.low = out.high = out.start = out.neutral;
     for (const double trial : p.trials) out.trials.push_back(trial * scale);
     placed.push_back(std::move(out));
   }

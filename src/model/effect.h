@@ -46,6 +46,8 @@ struct EffectParameter {
   double low = 0, high = 0;
   std::vector<double> trials; // values to screen with; empty: a shape parameter that stays at `start`
   double start = 0;           // where a fit starts when nothing better is known
+  bool shape = false;         // simpler models have a fixed value for it: does not count as a parameter
+  bool voltage_only = false;  // acts on a voltage drive; else fixed at neutral
   Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
 };
 
@@ -85,6 +87,7 @@ const Effect& EffectOf(const EffectUse& use, const Structure& structure);
 struct PlacedParameter {
   std::string name, key, unit;  // name in the model, key in results
   double neutral, low, high, start;
+  bool shape = false;
   std::vector<double> trials;
 };
 std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure, const ScaleTable& scales);

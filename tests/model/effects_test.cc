@@ -157,6 +157,24 @@ TEST_P(PairsTest, CompileAndRun) {
 INSTANTIATE_TEST_SUITE_P(Rigs, PairsTest, ::testing::Values("joint", "xl330"),
                          [](const auto& test) { return std::string(test.param); });
 
+// A voltage amplifier with two gains is the base model on other voltages; a servo has no voltage to scale.
+TEST(DirectionAsymmetryTest, OfTheVoltageIsTheBaseModelOnScaledVoltages) {
+  const Rig rig("qube");
+  const EffectUse use{"direction_asymmetry", "motor"};
+  const auto model = MakeModel(rig.experiment, {use}, rig.scales);
+  Recording scaled = rig.recording;
+  for (double& u : scaled.commands[0].values) u *= u > 0 ? 1.25 : 0.75;
+  const auto expected = Predict(*rig.model, scaled);
+  const auto actual = Predict(*model, rig.recording, {{use.Text() + ".asymmetry", 0.25}, {use.Text() + ".command_share", 1}});
+  for (std::size_t s = 0; s < expected.size(); ++s) EXPECT_LT(LargestDifference(actual[s], expected[s]), 1e-9 * Largest(expected[s]));
+  const auto of_torque = Predict(*model, rig.recording, {{use.Text() + ".asymmetry", 0.25}});
+  EXPECT_GT(LargestDifference(of_torque[0], expected[0]), 1e-3 * Largest(expected[0]));
+  const Rig servo("xl330");
+  const auto placed = MakeModel(servo.experiment, {use}, servo.scales)->EffectParameters(use, servo.scales);
+  ASSERT_TRUE(placed.ok());
+  EXPECT_EQ(placed.value()[1].low, placed.value()[1].high);
+}
+
 TEST(CatalogueTest, EveryEffectFindsAPlaceSomewhere) {
   std::set<std::string> placed, all;
   for (const char* rig : {"joint", "qube", "flexjoint", "flexlink", "xl330"}) {

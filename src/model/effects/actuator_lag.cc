@@ -8,7 +8,7 @@ Effect Effect_actuator_lag() {
       .place = EffectPlace::kMotor,
       .parameters = {
           {.key = "time_constant_s", .unit = "s", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.15, .trials = {0.002, 0.006, 0.02, 0.06}, .start = 0.004},
-          {.key = "second_pole_share", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.5, .start = 0.1},
+          {.key = "second_pole_share", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.5, .start = 0.1, .shape = true},
       },
       .meaning = "torque follows its request with a lag of two poles: the time constant is their sum",
       .signature = "phase saturates, gain rolls off",

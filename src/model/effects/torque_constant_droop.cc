@@ -8,7 +8,7 @@ Effect Effect_torque_constant_droop() {
       .place = EffectPlace::kMotor,
       .parameters = {
           {.key = "loss_at_peak", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.8, .trials = {0.1, 0.3, 0.5}, .start = 0.1},
-          {.key = "exponent", .unit = "1", .scale = ScaleKind::kOne, .neutral = 1, .low = 0.5, .high = 3, .start = 1},
+          {.key = "exponent", .unit = "1", .scale = ScaleKind::kOne, .neutral = 1, .low = 1, .high = 3, .start = 1.3, .shape = true},
       },
       .meaning = "less torque per ampere at high current",
       .signature = "torque falls short at high current",

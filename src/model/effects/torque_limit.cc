@@ -8,14 +8,15 @@ Effect Effect_torque_limit() {
       .place = EffectPlace::kMotor,
       .parameters = {
           {.key = "limit_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 2, .low = 0.02, .high = 2, .trials = {0.85, 0.65, 0.45, 0.25}, .start = 0.7},
+          {.key = "softness", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.3, .start = 0.05, .shape = true},
       },
-      .meaning = "the torque cannot exceed a level",
+      .meaning = "the torque cannot exceed a level; its corner may be round",
       .signature = "flat top, at standstill too",
       .told_apart = "big steps at low speed",
       .partners = {"torque_speed_curve", "supply_sag"},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "torque_limit_n_m", names[0]));
-        return Ok();
+        return structure.AddMotorTerm(on, "limit_softness", names[1]);
       },
   };
 }

@@ -53,6 +53,8 @@ std::unique_ptr<Motor> Motor::Create(const mjModel* m, int instance, std::string
                    active({kTorqueLimit, kPower, kGeneratingPower}) || motor->sag_ >= 0;
   motor->droop_ = active({kDroopAtPeak});
   motor->asymmetry_ = active({kAsymmetry});
+  motor->command_asymmetry_ = active({kCommandAsymmetry});
+  motor->softness_ = active({kLimitSoftness});
   motor->efficiency_ = active({kEfficiencyDrive, kEfficiencyBackdrive});
   motor->supply_ = config.law == MotorLaw::kDuty || config.input_of[kSupply] >= 0 || active({kSupplyV});
   motor->enable_ = config.input_of[kEnable] >= 0;
@@ -78,6 +80,7 @@ double Motor::Winding(const mjModel* m, double voltage, double speed) const {
 double Motor::Request(const mjModel* m, const double* inputs, Motion seen, double speed, double supply) const {
   double command = inputs[config_.command];
   if (dead_zone_ && config_.dead_zone_on_command) command = DeadZone(command, Parameter(m, kDeadZone));
+  if (command_asymmetry_) command *= 1 + (command > 0 ? 1 : -1) * Parameter(m, kCommandAsymmetry);
   double torque = 0;
   switch (config_.law) {
     case MotorLaw::kPosition:
@@ -216,7 +219,7 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   if (dead_zone_ && !config_.dead_zone_on_command) torque = DeadZone(torque, Parameter(m, kDeadZone));
   if (limits_) {
     const Limits limits = LimitsAt(m, torque, speed);
-    torque = mju_clip(torque, limits.low * ceiling, limits.high * ceiling);
+    torque = softness_ ? SoftLimit(torque, ceiling * (torque > 0 ? limits.high : -limits.low), Parameter(m, kLimitSoftness)) : mju_clip(torque, limits.low * ceiling, limits.high * ceiling);
     if (sag_ >= 0) {
       const Lag lag(std::max(Parameter(m, kSagTimeConstant), step), step, staged);
       d->act_dot[sag_] = lag.Derivative(d->act[sag_], Load(m, torque, limits, supply_now));

@@ -110,6 +110,8 @@ const std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"droop_reference_n_m", "N m", 1, 1e-12, 1e9},
     {"droop_exponent", "1", 1, 0.1, 10},
     {"asymmetry", "1", 0, -1, 1},
+    {"command_asymmetry", "1", 0, -1, 1},
+    {"limit_softness", "1", 0, 0, 1},
 }};
 
 const char* const kMotorAttributes[] = {"law",
@@ -154,7 +156,9 @@ const char* const kMotorAttributes[] = {"law",
                                         "droop_at_peak",
                                         "droop_reference_n_m",
                                         "droop_exponent",
-                                        "asymmetry"};
+                                        "asymmetry",
+                                        "command_asymmetry",
+                                        "limit_softness"};
 const int kMotorAttributeCount = static_cast<int>(std::size(kMotorAttributes));
 static_assert(std::size(kMotorAttributes) == kMotorParameters + 9);
 

@@ -53,6 +53,8 @@ enum MotorParameter {
   kDroopReference,
   kDroopExponent,
   kAsymmetry,
+  kCommandAsymmetry,
+  kLimitSoftness,
   kMotorParameters
 };
 extern const std::array<ParameterSpec, kMotorParameters> kMotorSpecs;

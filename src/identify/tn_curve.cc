@@ -61,28 +61,20 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
     if (!torque || !angle) return Error{.what = "a torque-speed curve needs torque and angle", .where = recording.log_path, .cure = "a measured signal of 'kind: torque' in " + input.model.experiment().path};
     const SmoothLog smooth(recording, options);
-    const std::vector<double> t = smooth.Sampled(torque->values, 0), q = smooth.Sampled(angle->values, 0), w = smooth.Sampled(angle->values, 1);
+    // Only the speed needs the low pass: it would round off the corners of what is to be seen.
+    const std::vector<double> t = smooth.GridOf(torque->values, false), q = smooth.GridOf(angle->values, false), w = smooth.Sampled(angle->values, 1);
     // What the drive was asked for, by the nominal model's own law, linear in command, angle and speed.
     std::vector<double> demand(smooth.size(), 0.0);
     for (std::size_t c = 0; c < recording.commands.size(); ++c) {
       const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, recording.commands[c].actuator.c_str());
       if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint) continue;
-      const std::vector<double> u = smooth.Held(recording.commands[c].values);
+      const std::vector<double> u = smooth.GridOf(recording.commands[c].values, true);
       const mjtNum *gain = m.actuator_gainprm + mjNGAIN * actuator, *bias = m.actuator_biasprm + mjNBIAS * actuator;
       for (std::size_t i = 0; i < smooth.size(); ++i) demand[i] += gain[0] * u[i] + bias[0] + bias[1] * q[i] + bias[2] * w[i];
     }
-    // The low pass mixes rows: a limit is seen where the drive was asked for more, one way, all across its reach.
-    const auto asked = [&](std::size_t i) { return std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0; };
-    std::size_t run = 0;  // rows in a row, up to here, that were asked for more in the direction of this one
-    std::vector<std::size_t> runs;
-    for (std::size_t i = 0; i < smooth.size(); ++i) {
-      run = !asked(i) ? 0 : i > 0 && run > 0 && t[i] * t[i - 1] < 0 ? 1 : run + 1;
-      runs.push_back(run);
-    }
     for (std::size_t i = 0; i < smooth.size(); ++i) {
       if (!std::isfinite(t[i]) || !std::isfinite(w[i]) || t[i] * w[i] < 0) continue;
-      const std::size_t last = std::min(i + smooth.reach(), smooth.size() - 1);
-      samples.push_back({std::abs(w[i]), std::abs(t[i]), runs[last] > last - i + std::min(i, smooth.reach())});
+      samples.push_back({std::abs(w[i]), std::abs(t[i]), std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0});
       limited += samples.back().limited ? 1 : 0;
     }
   }
@@ -94,7 +86,7 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     power = std::max(power, s.speed * s.torque);
   }
   const bool reaches = limited > samples.size() / 100;
-  // The envelope: near the top of each bin of speed; of the rows where the drive was asked for more, where there are enough.
+  // The envelope: the middle, in each bin of speed, of the rows where the drive was asked for more; where there are too few of those, near the top of all rows.
   constexpr int kBins = 16;
   PointTable table{.name = "envelope", .columns = {"speed_rad_per_s", "torque_n_m", "power_w", "rows", "limited_rows"}, .rows = {}};
   Envelope envelope;
@@ -107,7 +99,7 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
       if (s.limited || !reaches) torques.push_back(s.torque), speed += s.speed;
     }
     if (torques.size() < 10) continue;
-    const double w = speed / static_cast<double>(torques.size()), top = Quantile(torques, reaches ? 0.9 : 0.99);
+    const double w = speed / static_cast<double>(torques.size()), top = Quantile(torques, reaches ? 0.5 : 0.99);
     envelope.emplace_back(w, top);
     table.rows.push_back({w, top, w * top, static_cast<double>(all.size()), reaches ? static_cast<double>(torques.size()) : 0.0});
   }

@@ -200,8 +200,8 @@ TEST_F(ClosedFormTest, TnCurveFindsPeakAndPower) {
                                 })});
   const auto result = IdentifyTnCurve(bench.input(), {.rated_torque_n_m = 47.84, .rated_speed_rad_per_s = 116 * 2 * kPi / 60});
   ASSERT_TRUE(result.ok()) << result.error().Text();
-  EXPECT_NEAR(result.value().Find("peak_torque")->value, 80, 0.05 * 80);
-  EXPECT_NEAR(result.value().Find("power")->value, 300, 0.05 * 300);
+  EXPECT_NEAR(result.value().Find("peak_torque")->value, 80, 0.02 * 80);
+  EXPECT_NEAR(result.value().Find("power")->value, 300, 0.02 * 300);
   // The data sheet's row read right: 47.84 N m at 116 rpm are 581 W.
   EXPECT_NEAR(result.value().Find("rated_power")->value, 581.1, 0.1);
 }

@@ -126,7 +126,9 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
     if (j != base && m.jnt_stiffness[j] > 0) link = j;
   }
   if (link < 0 || m.nv != 2) return Error{.what = "this state space is that of a flexible joint", .where = input.model.experiment().model_path, .allowed = "a driven joint and a joint with a spring, nothing else"};
-  options.cutoff_hz = std::min(QuietCutoff(input, base, 1, 0.003, asked), QuietCutoff(input, link, 1, 0.003, asked));
+  // Of a speed's variance, as noise: what noise in the regressors can take off a coefficient, and so part of its interval.
+  constexpr double kNoiseShare = 0.003;
+  options.cutoff_hz = std::min(QuietCutoff(input, base, 1, kNoiseShare, asked), QuietCutoff(input, link, 1, kNoiseShare, asked));
   // What is held out: the logs asked for, or the last of several, or the last 30 % of one.
   std::vector<std::pair<std::size_t, IdentifyOptions>> train, held_out;
   std::string how;
@@ -264,7 +266,7 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
   static constexpr const char* kUnits[] = {"1/s", "1/s^2", "1/s", "1/s^2", "1/s", "rad/s^2 per command"};
   std::string bound;
   for (int i = 0; i < kCoefficients; ++i) {
-    const double half = blocks.quantile * std::sqrt(std::max(0.0, blocks.covariance(i, i)));
+    const double half = blocks.quantile * std::sqrt(std::max(0.0, blocks.covariance(i, i))) + kNoiseShare * std::abs(solution[i]);
     result.values.push_back({.name = kNames[i], .unit = kUnits[i], .value = solution[i], .low = solution[i] - half, .high = solution[i] + half});
     const double z = solution[i] / scale[i];
     if (z < lower[static_cast<std::size_t>(i)] + 1e-6 || z > upper[static_cast<std::size_t>(i)] - 1e-6) bound += (bound.empty() ? "" : ", ") + std::string(kNames[i]);

@@ -23,7 +23,7 @@ double Quantile(std::vector<double> values, double share) {
 using Envelope = std::vector<std::pair<double, double>>;  // speed, torque
 
 struct Curve {
-  double peak, power;
+  double peak, power, no_load = NAN;
 };
 constexpr int kGrid = 60, kDraws = 200;
 constexpr double kGridStep = 0.6 / kGrid;
@@ -46,6 +46,29 @@ Curve FitCurve(const Envelope& envelope, double strongest, double power) {
       if (misfit < best) best = misfit, curve = {.peak = std::exp(peak), .power = std::exp(watts)};
     }
   }
+  return curve;
+}
+
+// The same, and the speed at which the torque is gone: where the fastest bins fall short of the constant power they are the drive running out of voltage, a line to zero, and no part of the power.
+Curve FitWithNoLoad(Envelope envelope, double strongest, double power) {
+  constexpr double kShort = 0.88;
+  constexpr std::size_t kLeast = 2;
+  std::sort(envelope.begin(), envelope.end());
+  Curve curve = FitCurve(envelope, strongest, power);
+  std::size_t kept = envelope.size();
+  for (int round = 0; round < 4; ++round) {
+    std::size_t first = envelope.size();
+    while (first > 0 && envelope[first - 1].second < kShort * std::min(curve.peak, curve.power / envelope[first - 1].first)) --first;
+    if (first == kept || envelope.size() - first < kLeast || first < kLeast) break;
+    kept = first;
+    curve = FitCurve({envelope.begin(), envelope.begin() + static_cast<std::ptrdiff_t>(kept)}, strongest, power);
+  }
+  if (envelope.size() - kept < kLeast) return curve;
+  double w = 0, t = 0, ww = 0, wt = 0;
+  const double n = static_cast<double>(envelope.size() - kept);
+  for (std::size_t k = kept; k < envelope.size(); ++k) w += envelope[k].first / n, t += envelope[k].second / n;
+  for (std::size_t k = kept; k < envelope.size(); ++k) ww += std::pow(envelope[k].first - w, 2), wt += (envelope[k].first - w) * (envelope[k].second - t);
+  if (ww > 0 && wt < 0) curve.no_load = w - t * ww / wt;
   return curve;
 }
 
@@ -105,18 +128,19 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   }
   Identification result{.method = "tn-curve", .relation = "|torque| <= min(peak, power / speed), envelope of the rows in which the drive pushes", .r2 = NAN, .rmse = NAN, .unit = "N m", .rows = samples.size()};
   Curve curve{.peak = strongest, .power = power};
-  std::vector<double> peaks, powers;
+  std::vector<double> peaks, powers, no_loads;
   if (envelope.size() >= 3) {
-    curve = FitCurve(envelope, strongest, power);
+    curve = FitWithNoLoad(envelope, strongest, power);
     // Intervals: the same over bins drawn again (bootstrap percentiles; Efron and Tibshirani, "An Introduction to the Bootstrap", 1993), and a step of the grid.
     std::mt19937 random(1);
     std::uniform_int_distribution<std::size_t> pick(0, envelope.size() - 1);
     for (int draw = 0; draw < kDraws; ++draw) {
       Envelope again;
       for (std::size_t k = 0; k < envelope.size(); ++k) again.push_back(envelope[pick(random)]);
-      const Curve other = FitCurve(again, strongest, power);
+      const Curve other = FitWithNoLoad(again, strongest, power);
       peaks.push_back(other.peak);
       powers.push_back(other.power);
+      if (std::isfinite(other.no_load)) no_loads.push_back(other.no_load);
     }
   }
   const double peak = curve.peak, bound = curve.power;
@@ -129,6 +153,8 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   result.values.push_back({.name = "peak_torque", .unit = "N m", .value = peak, .low = pl, .high = ph});
   result.values.push_back({.name = "power", .unit = "W", .value = bound, .low = wl, .high = wh});
   result.values.push_back({.name = "corner_speed", .unit = "rad/s", .value = bound / peak, .low = NAN, .high = NAN});
+  const auto [nl, nh] = std::isfinite(curve.no_load) && no_loads.size() > kDraws / 2 ? interval(no_loads, 0) : nothing;
+  if (std::isfinite(curve.no_load)) result.values.push_back({.name = "no_load_speed", .unit = "rad/s", .value = curve.no_load, .low = nl, .high = nh});
   result.values.push_back({.name = "fastest", .unit = "rad/s", .value = fastest, .low = NAN, .high = NAN});
   if (options.rated_torque_n_m > 0 && options.rated_speed_rad_per_s > 0) {
     const double rated = options.rated_torque_n_m * options.rated_speed_rad_per_s;
@@ -136,6 +162,7 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     if (bound < rated) result.remarks.push_back("these logs never reach the rated power");
   }
   if (!reaches) result.remarks.push_back("the drive was hardly ever asked for more than it gave: the envelope is how far the log went, not what the motor can do");
+  if (std::isnan(curve.no_load)) result.remarks.push_back("the torque never falls short of the constant power at high speed: the no-load speed lies beyond the fastest row");
   if (std::isnan(wl)) result.remarks.push_back("no rows beyond the corner: the power is a lower bound");
   result.tables.push_back(std::move(table));
   return result;

@@ -206,6 +206,24 @@ TEST_F(ClosedFormTest, TnCurveFindsPeakAndPower) {
   EXPECT_NEAR(result.value().Find("rated_power")->value, 581.1, 0.1);
 }
 
+// As above, and above 9 rad/s a line to nothing at 12 rad/s: the drive runs out of voltage.
+TEST_F(ClosedFormTest, TnCurveFindsTheSpeedWithoutLoad) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal(0, 0.1);
+  const double dt = 0.002, amplitude = 2.4, w = 2 * kPi * 0.75;
+  const Bench bench = LoadBench("joint", {Write("target_rad,position_rad,torque_n_m", 40, dt, [&](double t) {
+                                  const double q = amplitude * std::sin(w * t), v = amplitude * w * std::cos(w * t), size = std::max(std::abs(v), 1e-6);
+                                  const double demand = 157.1451 * 1.5 * (v > 0 ? 1 : -1), limit = std::min({80.0, 300 / size, 300 / 9.0 * (12 - size) / 3});
+                                  return Join({q + (demand + 7.0729 * v) / 157.1451, q, std::clamp(demand, -limit, limit) + normal(random)});
+                                })});
+  const auto result = IdentifyTnCurve(bench.input(), {});
+  ASSERT_TRUE(result.ok()) << result.error().Text();
+  EXPECT_NEAR(result.value().Find("peak_torque")->value, 80, 0.02 * 80);
+  EXPECT_NEAR(result.value().Find("power")->value, 300, 0.03 * 300);
+  ASSERT_NE(result.value().Find("no_load_speed"), nullptr);
+  EXPECT_NEAR(result.value().Find("no_load_speed")->value, 12, 0.2);
+}
+
 // A command that clips in firmware; the clipped rows must not pull the gain down.
 TEST_F(ClosedFormTest, PdLeavesClippedRowsOut) {
   const double kp = 60, kd = 3, limit = 12;

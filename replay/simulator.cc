@@ -12,7 +12,7 @@ namespace gapscope {
 namespace {
 
 // How far back a window's past reaches: for delays alone; for states whose time constant is nobody's parameter; else so many time constants, at most the last.
-constexpr double kHistory_s = 0.2, kPreRoll_s = 1.5, kTimeConstants = 5, kLongest_s = 6;
+constexpr double kHistory_s = 0.2, kTransmission_s = 0.5, kPreRoll_s = 1.5, kTimeConstants = 5, kLongest_s = 6;
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
 ModelPtr CopyForReplay(const mjModel& model) {
@@ -108,6 +108,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
   for (std::size_t i = 0; i < model.parameters().size(); ++i) {
     if (model.parameters()[i].name.find("time_constant_s") != std::string::npos) time_constants_.push_back(i);
   }
+  apart_.resize(model.mirrored_joints().size());
   remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nu, [](int plugin) { return plugin >= 0; });
   for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
 }
@@ -147,8 +148,18 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   mj_resetData(m, d);
   std::fill(held_.begin(), held_.end(), window.begin);
   PreRoll(recording, window);
+  // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
+  for (std::size_t i = 0; i < apart_.size(); ++i) {
+    const auto [joint, of] = model_.mirrored_joints()[i];
+    apart_[i] = {d->qpos[m->jnt_qposadr[joint]] - d->qpos[m->jnt_qposadr[of]], d->qvel[m->jnt_dofadr[joint]] - d->qvel[m->jnt_dofadr[of]]};
+  }
   std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
   std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
+  for (std::size_t i = 0; i < apart_.size(); ++i) {
+    const auto [joint, of] = model_.mirrored_joints()[i];
+    d->qpos[m->jnt_qposadr[joint]] += apart_[i].first;
+    d->qvel[m->jnt_dofadr[joint]] += apart_[i].second;
+  }
   d->time = recording.time_s[window.begin];
 
   // Torques cost a pass over the actuators at each stamp: only when this log has one.
@@ -227,14 +238,15 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
 void Simulator::PreRoll(const Recording& recording, Window window) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  if (!remembers_ || window.begin == 0) return;
+  if ((!remembers_ && apart_.empty()) || window.begin == 0) return;
   double past_s = m->na > 0 && time_constants_.empty() ? kPreRoll_s : kHistory_s;
+  if (!apart_.empty()) past_s = std::max(past_s, kTransmission_s);
   for (const std::size_t i : time_constants_) past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
   const double from = recording.time_s[window.begin] - past_s;
   std::size_t first = window.begin;
   while (first > 0 && recording.time_s[first - 1] >= from) --first;
   const int integrator = m->opt.integrator;
-  m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
+  if (apart_.empty()) m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
   for (std::size_t row = first; row < window.begin; ++row) {
     for (const auto& measured : recording.measured) {
       const SignalSource& source = model_.source(measured.index);
@@ -243,14 +255,18 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
       d->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
       d->qvel[source.dof] = fit.slope;
     }
+    // A transmission's motor side is free to move beside the load.
     for (const auto& [joint, of] : model_.mirrored_joints()) {
+      if (row > first) break;
       d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
       d->qvel[m->jnt_dofadr[joint]] = d->qvel[m->jnt_dofadr[of]];
     }
     d->time = recording.time_s[row];
-    m->opt.timestep = recording.time_s[row + 1] - recording.time_s[row];
+    const double interval = recording.time_s[row + 1] - recording.time_s[row];
+    const int steps = apart_.empty() ? 1 : std::max(1, static_cast<int>(std::ceil(interval / max_step_s_ - 1e-6)));
+    m->opt.timestep = interval / steps;
     SetCommands(recording, row, recording.time_s[row], recording.time_s[row + 1]);
-    mj_step(m, d);
+    for (int step = 0; step < steps; ++step) mj_step(m, d);
   }
   m->opt.integrator = integrator;
   for (auto& warning : d->warning) warning.number = 0;

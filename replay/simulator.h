@@ -71,6 +71,7 @@ class Simulator {
   bool reads_torque_ = false;
   std::vector<std::size_t> time_constants_;  // parameters
   bool remembers_ = false;            // has states beside position and speed
+  std::vector<std::pair<double, double>> apart_;  // per mirrored joint: angle and speed beside its load at the start of a run
   std::vector<double> values_;
   std::vector<double> column_, shaped_;  // scratch of ApplySensors
   std::vector<std::size_t> held_;     // per command: row held at the start of the step

@@ -10,6 +10,8 @@ namespace {
 constexpr double kNever = 10;     // standard errors, where one of two cannot be simulated
 constexpr double kLarge = 0.2;    // a gain of this share needs only kFewZ
 constexpr double kFewZ = 1.2;
+// Half of the held-out cost, which no fit has seen, is no chance even where few blocks show it and the logs that were fitted hardly do.
+constexpr double kHalf = 0.5, kHalfZ = 1.5;
 
 double Sum(const std::vector<double>& values) {
   double sum = 0;
@@ -61,6 +63,7 @@ double TypicalFloors(const Candidate& candidate) {
 
 bool Convincing(const Evidence& e, const Limits& limits) {
   if (std::min(e.train, e.held_out) > kLarge) return e.z > kFewZ;
+  if (e.train > 0 && e.held_out > kHalf) return e.z > kHalfZ;
   return e.train > 0 && e.held_out > limits.share && e.z > limits.z;
 }
 

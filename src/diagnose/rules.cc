@@ -60,10 +60,9 @@ bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
   return false;
 }
 
-bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model) {
+bool IsShape(const EffectUse& second, const EffectUse& first) {
   const auto any = [](const std::string& effect, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), effect) != names.end(); };
-  return any(first.effect, {"coulomb_friction", "stribeck_friction", "load_friction", "direction_asymmetry"}) && any(second.effect, {"joint_compliance", "backlash"}) &&
-         JointOf(first.on, model) == JointOf(second.on, model);
+  return any(first.effect, {"coulomb_friction", "stribeck_friction", "load_friction", "direction_asymmetry"}) && any(second.effect, {"joint_compliance", "backlash"});
 }
 
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {

@@ -14,7 +14,9 @@ inline constexpr Limits kSecond{.share = 0.06, .z = 3.0};      // a second effec
 inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise,
 inline constexpr Limits kSureSecond{.share = 0.3, .z = 8.5};   // or beyond doubt: what else is missing need not be small;
 inline constexpr double kSecondOfGap = 0.025;                  // and of the base model's residual: the first effect's shape is never quite the real one;
-inline constexpr double kUntoldOfGap = 0.15;                   // this much where unlike effects would do as well, or where it may be the first one's shape
+inline constexpr double kUntoldOfGap = 0.15;                   // this much where unlike effects would do as well,
+inline constexpr double kShapeOfGap = 0.25;                    // and this much where it may be the first one's shape
+inline constexpr double kAtNoise = 0.95;                       // residual over noise at which a model explains everything: of two such models neither is the better one
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains
 inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains,
 inline constexpr double kNestedExcess = 0.25;                  // or of what the simpler one leaves above the noise
@@ -29,7 +31,7 @@ bool IsFinding(const EffectUse& use, const Model& base);
 // Whether the effects are known to be confused with each other, at places that are one.
 bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
 // Whether `second` may stand for what the model of `first` leaves out of the real effect: dry friction gives way elastically before it slides.
-bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model);
+bool IsShape(const EffectUse& second, const EffectUse& first);
 // Whether `richer` can do all that `simpler` does (same other effects); `exactly`: not only nearly, as far as its bounds go.
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = false);
 // Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.

@@ -9,7 +9,7 @@
 
 namespace gapscope {
 
-bool AreRivals(const Candidate& a, const Candidate& b) { return !Convincing(Compare(b, a), kTold); }
+bool AreRivals(const Candidate& a, const Candidate& b) { return std::max(a.held_out_floors, b.held_out_floors) < kAtNoise || !Convincing(Compare(b, a), kTold); }
 
 namespace {
 
@@ -151,7 +151,7 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent) {
 // real one: what is small and unlike effects explain equally well is that.
 bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
   if (!Convincing(Compare(single, pair), kSecond)) return false;
-  const bool shape = IsShape(pair.effects.back(), single.effects.back(), *single.model);
+  const bool shape = IsShape(pair.effects.back(), single.effects.back());
   const double removed = RemovedExcess(single.held_out_floors, pair.held_out_floors), typically = RemovedExcess(TypicalFloors(single), TypicalFloors(pair));
   if (std::max(removed, typically) < kSecondExcess && (shape || !Convincing(Compare(single, pair), kSureSecond))) return false;
   const double size = std::sqrt(std::max(0.0, std::pow(single.held_out_floors, 2) - std::pow(pair.held_out_floors, 2))) / found.base->held_out_floors;
@@ -159,7 +159,7 @@ bool IsSecond(const SearchResult& found, const Candidate& single, const Candidat
     return rival.get() != &pair && !rival->held_out_blocks.empty() && !Contains(*rival, pair) && !Contains(pair, *rival) && !ArePartners(rival->effects.back(), pair.effects.back(), *single.model) &&
            AreRivals(pair, *rival);
   });
-  return size > (told && !shape ? kSecondOfGap : kUntoldOfGap);
+  return size > (shape ? kShapeOfGap : told ? kSecondOfGap : kUntoldOfGap);
 }
 
 // The other way round: what goes best with the pair's second effect? The first one was chosen while the second was missing, and may stand for another.
@@ -167,11 +167,44 @@ void Exchange(const Workbench& bench, const Model& base, Candidate* second, cons
   say("looking for a better partner of " + second->Name());
   Layer layer;
   Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer);
-  const Candidate* other = Simplest(layer, *second);
+  Candidate* other = Simplest(layer, *second);
   if (!other || other->effects.back() == result->single->effects.front() || LogMisfit(*other) > LogMisfit(*result->chosen)) return;
-  result->single = result->second_parent = second;
+  result->second_parent = result->single = second;
   result->chosen = other;
   result->second = std::move(layer);
+}
+
+// A second effect on the single one, if there is one worth naming. True when that one alone does as well: it then is the single one, and a second is to be sought on it.
+Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say& say, SearchResult* result) {
+  say("looking for a second effect");
+  const bool first_time = result->second_parent == nullptr;
+  result->second = {};
+  result->second_parent = result->single;
+  Explore(bench, *base.model, *result->single, kSecondRefits, kSecondShare, say, &result->second, result);
+  Candidate* pair = Simplest(result->second, *result->single);
+  if (!pair || !IsSecond(*result, *result->single, *pair)) return false;
+  result->chosen = pair;
+  if (bench.Late()) return false;
+  // Backward: does the first one still matter?
+  GS_ASSIGN(Candidate other, MakeCandidate(bench, {pair->effects[1]}));
+  std::vector<double> values = other.model->Nominal();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (const int index = pair->model->IndexOf(other.model->parameters()[i].name); index >= 0) values[i] = pair->values[index];
+  }
+  FitCandidate(bench, &other, other.problem->FromParent(*pair->problem, pair->point, values, {}), kFinalIterations, kFinalTolerance);
+  ScoreCandidate(bench, &other);
+  // In the place of an earlier fit of the same effect, if there is one.
+  auto& singles = result->first.children;
+  auto place = std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects == other.effects; });
+  if (place == singles.end()) place = singles.insert(singles.end(), nullptr);
+  *place = std::make_unique<Candidate>(std::move(other));
+  Candidate* alone = place->get();
+  if (!Convincing(Compare(*alone, *pair), kSecond)) {
+    result->single = result->chosen = alone;
+    return first_time;
+  }
+  if (!bench.Late()) Exchange(bench, *base.model, alone, say, result);
+  return false;
 }
 
 }  // namespace
@@ -213,40 +246,13 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   }
   if (single && Convincing(Compare(base, *single), FirstLimits(base))) result.single = result.chosen = single;
 
-  if (single && result.single == single && single->held_out_floors > kRemains && !bench.Late()) {
-    say("looking for a second effect");
-    result.second_parent = single;
-    Explore(bench, *base.model, *single, kSecondRefits, kSecondShare, say, &result.second, &result);
-    if (const Candidate* pair = Simplest(result.second, *single)) {
-      if (IsSecond(result, *single, *pair)) result.chosen = pair;
-    }
-    // Backward: does the first one still matter?
-    if (result.chosen != single && !bench.Late()) {
-      GS_ASSIGN(Candidate other, MakeCandidate(bench, {result.chosen->effects[1]}));
-      std::vector<double> values = other.model->Nominal();
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        if (const int index = result.chosen->model->IndexOf(other.model->parameters()[i].name); index >= 0) values[i] = result.chosen->values[index];
-      }
-      FitCandidate(bench, &other, other.problem->FromParent(*result.chosen->problem, result.chosen->point, values, {}), kFinalIterations, kFinalTolerance);
-      ScoreCandidate(bench, &other);
-      // In the place of an earlier fit of the same effect, if there is one.
-      auto& singles = result.first.children;
-      auto place = std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects == other.effects; });
-      if (place == singles.end()) place = singles.insert(singles.end(), nullptr);
-      *place = std::make_unique<Candidate>(std::move(other));
-      Candidate* alone = place->get();
-      if (!Convincing(Compare(*alone, *result.chosen), kSecond)) {
-        result.single = result.chosen = alone;
-      } else if (!bench.Late()) {
-        Exchange(bench, *base.model, alone, say, &result);
-      }
-    }
+  for (bool again = result.single == single; again && result.single->held_out_floors > kRemains && !bench.Late();) {
+    GS_ASSIGN(again, SeekSecond(bench, base, say, &result));
   }
   // What the logs leave open goes to where the base model's nominal values pull it: undamped steps, as damping holds it where the search left it.
   if (!bench.Late() && result.chosen != &base) {
-    auto* chosen = const_cast<Candidate*>(result.chosen);
-    PolishCandidate(bench, chosen);
-    ScoreCandidate(bench, chosen);
+    PolishCandidate(bench, result.chosen);
+    ScoreCandidate(bench, result.chosen);
   }
   result.budget_spent = bench.Late();
   result.free_run_before = FreeRunError(bench, base);

@@ -10,8 +10,8 @@ namespace gapscope {
 struct SearchResult {
   std::unique_ptr<Candidate> nominal, base;  // base: refitted
   Layer first, second;           // on top of the base; on top of `single`
-  const Candidate* single = nullptr;  // the accepted single effect, or the base
-  const Candidate* chosen = nullptr;  // single, or a pair
+  Candidate* single = nullptr;   // the accepted single effect, or the base
+  Candidate* chosen = nullptr;   // single, or a pair
   const Candidate* second_parent = nullptr;  // what `second` stands on; null where no second effect was sought
   double free_run_before = 0, free_run_left = 0;  // see FreeRunError: of the base, of the chosen one
   bool uneven = false;           // train and held-out logs show the gap very differently; then nothing else was searched unless asked to

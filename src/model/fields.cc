@@ -43,6 +43,7 @@ const std::map<std::string, ArrayField>& TendonFields() {
       {"damping", {GS_ARRAY(tendon_damping), 1, 1, false}},
       {"springlength", {GS_ARRAY(tendon_lengthspring), 2, 2, false}},
       {"range", {GS_ARRAY(tendon_range), 2, 2, false}},
+      {"solref_limit", {GS_ARRAY(tendon_solref_lim), mjNREF, mjNREF, false}},
   };
   return fields;
 }

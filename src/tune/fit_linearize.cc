@@ -301,7 +301,7 @@ ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& paren
     part.cross = all.head(n);
     if (m > 0) {
       // The states' own answer: with gain = S^-1 Jx' Jy and step = -S^-1 Jx' r, S^-1 Jx' c needs S once more.
-      const Eigen::VectorXd answer = StateAnswer(jacobian, window.prior, all);
+      const Eigen::VectorXd answer = StateAnswer(jacobian, parent.windows_[w].prior, all);
       part.square -= all.tail(m).dot(answer);
       part.slope += all.tail(m).dot(base.linearization.state_step[w]);
       part.cross -= base.linearization.state_gain[w].transpose() * all.tail(m);

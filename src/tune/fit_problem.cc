@@ -14,6 +14,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The log's own initial state counts as much as this many samples at the window's start.
 constexpr double kStatePriorSamples = 5;
+constexpr double kMotorSidePrior_rad = 0.02;  // how well the pre-roll knows where a transmission's motor side stands beside its load
 constexpr double kOffsetBound_rad = 0.3;
 // Of the sum of squares, per residual and squared range of a coordinate.
 constexpr double kAnchor = 1e-8;
@@ -74,6 +75,11 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       }
     }
     scaling_.push_back(std::move(scalings));
+    // What no sensor shows comes last: each motor side beside its load.
+    for (std::size_t i = 0; i < model.mirrored_joints().size() && options_.fit_states; ++i) {
+      prior.push_back(1 / kMotorSidePrior_rad);
+      prior.push_back(1 / kMotorSidePrior_rad * kSpeedPrior_s);
+    }
     prototype.prior = Eigen::Map<Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
     const auto add = [&](ReplayMode mode) {
       const auto rows = MakeWindows(recording, mode, options_.window_s);
@@ -219,10 +225,12 @@ bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoin
       worker.start.qvel[source.dof] += state[scaling.joint_state + 1];
     }
   }
+  Eigen::Index hidden = state.size() - (options_.fit_states ? 2 * static_cast<Eigen::Index>(model_.mirrored_joints().size()) : 0);
   for (const auto& [joint, from] : model_.mirrored_joints()) {
     const mjModel& m = model_.compiled();
-    worker.start.qpos[m.jnt_qposadr[joint]] = worker.start.qpos[m.jnt_qposadr[from]];
-    worker.start.qvel[m.jnt_dofadr[joint]] = worker.start.qvel[m.jnt_dofadr[from]];
+    worker.start.qpos[m.jnt_qposadr[joint]] = worker.start.qpos[m.jnt_qposadr[from]] + (options_.fit_states ? state[hidden] : 0);
+    worker.start.qvel[m.jnt_dofadr[joint]] = worker.start.qvel[m.jnt_dofadr[from]] + (options_.fit_states ? state[hidden + 1] : 0);
+    hidden += 2;
   }
   return worker.simulator.Run(recording, window.rows, worker.start, predicted).outcome == Outcome::kCompleted;
 }
@@ -389,7 +397,11 @@ FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent
   }
   if (shift_scale_s_ > 0 && parent.shift_scale_s_ > 0) point.y[point.y.size() - 1] = y[y.size() - 1];
   GS_CHECK(point.states.size() == parent_point.states.size());
-  point.states = parent_point.states;
+  // A motor side that only one of the two has is where the pre-roll leaves it.
+  for (std::size_t w = 0; w < point.states.size(); ++w) {
+    const Eigen::Index shared = std::min(point.states[w].size(), parent_point.states[w].size());
+    point.states[w].head(shared) = parent_point.states[w].head(shared);
+  }
   return point;
 }
 

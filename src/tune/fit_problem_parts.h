@@ -25,7 +25,7 @@ struct FitProblem::FitWindow {
   double weight = 1;
   InitialState start;            // from the log, without offsets
   std::vector<int> qpos, dof;    // per measured joint: its addresses in the state, in the order of the state vector
-  Eigen::VectorXd prior;         // weight of each state correction
+  Eigen::VectorXd prior;         // weight of each state correction: angle and speed of each measured joint, then of each hidden motor side
 };
 
 struct FitProblem::Worker {

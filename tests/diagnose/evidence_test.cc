@@ -57,6 +57,19 @@ TEST(EvidenceTest, FewBlocksWithALargeShareConvince) {
   EXPECT_TRUE(Convincing(Compare(WithBlocks(a, a), WithBlocks(b, b)), {.share = 0.01, .z = 2.5}));
 }
 
+// The same where the fitted logs hardly reach it; one block alone, however large, is chance.
+TEST(EvidenceTest, FewHeldOutBlocksWithMostOfTheCostConvince) {
+  std::vector<double> train_a(30, 1.0), train_b(30, 1.0), a(30, 1.0), b(30, 1.0);
+  train_a[0] = 1.5;
+  a[3] = a[4] = a[5] = 400;
+  const Evidence e = Compare(WithBlocks(train_a, a), WithBlocks(train_b, b));
+  EXPECT_LT(e.train, 0.05);
+  EXPECT_LT(e.z, 2.5);
+  EXPECT_TRUE(Convincing(e, {.share = 0.01, .z = 2.5}));
+  a[4] = a[5] = 1;
+  EXPECT_FALSE(Convincing(Compare(WithBlocks(train_a, a), WithBlocks(train_b, b)), {.share = 0.01, .z = 2.5}));
+}
+
 // A gain on the training logs that the held-out ones do not show is none.
 TEST(EvidenceTest, HeldOutMustGainToo) {
   EXPECT_FALSE(Convincing(Compare(WithBlocks(std::vector<double>(30, 9.0), std::vector<double>(10, 2.0)), WithBlocks(std::vector<double>(30, 1.0), std::vector<double>(10, 2.1))), {.share = 0.01, .z = 2.5}));

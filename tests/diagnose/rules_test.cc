@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "src/diagnose/search.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -43,11 +44,23 @@ TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {
 }
 
 TEST(RulesTest, ComplianceMayBeFrictionsElasticGive) {
-  const Rig rig = LoadRig("qube");
-  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "arm"}, *rig.model));
-  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "pendulum"}, *rig.model));
-  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"torque_bias", "arm"}, *rig.model));
-  EXPECT_FALSE(IsShape({"cable_spring", "arm"}, {"coulomb_friction", "arm"}, *rig.model));
+  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "arm"}));
+  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"stribeck_friction", "pendulum"}));
+  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"torque_bias", "arm"}));
+  EXPECT_FALSE(IsShape({"cable_spring", "arm"}, {"coulomb_friction", "arm"}));
+}
+
+// Below the noise there is nothing left to tell two explanations apart by.
+TEST(RulesTest, ExplanationsAtTheNoiseAreRivals) {
+  Candidate a, b;
+  a.block_floor = b.block_floor = 1;
+  a.train_blocks = a.held_out_blocks = std::vector<double>(40, 0.3);
+  b.train_blocks = b.held_out_blocks = std::vector<double>(40, 0.6);
+  a.held_out_floors = 0.55, b.held_out_floors = 0.77;
+  EXPECT_TRUE(AreRivals(a, b));
+  b.train_blocks = b.held_out_blocks = std::vector<double>(40, 4);
+  b.held_out_floors = 2;
+  EXPECT_FALSE(AreRivals(a, b));
 }
 
 TEST(RulesTest, AFirstEffectNeedsMoreWhereTheBaseModelIsAtTheNoise) {

@@ -21,16 +21,16 @@ const Candidate* NearestRival(const Candidates& field, const Candidate& chosen) 
   return nearest;
 }
 
-// Probability that the verdict is right as a whole: logistic in what the banks of twin cases of seeds 904 and 905 showed to matter (scripts/blind/calibrate.py;
-// 78 cases, so the weights are rounded).
+// Probability that the verdict is right as a whole: logistic in what the banks of twin cases of seeds 910, 911 and 912 showed to matter (scripts/blind/calibrate.py;
+// 179 cases, so the weights are rounded).
 double Confidence(Verdict verdict, const VerdictEvidence& e, std::size_t effects) {
   const double excess = std::log(std::max(e.floors_left, 1.0));
   switch (verdict) {
     case Verdict::kNone:
-    case Verdict::kParameters: return Sigmoid(2.2 - excess);
-    case Verdict::kEffects: return Sigmoid(2.2 + 1.5 * std::clamp(e.rival_lead, 0.0, 0.5) - 1.1 * excess - (effects > 1 ? 1.5 : 0));
-    case Verdict::kAmbiguous: return Sigmoid(1.2 - 1.2 * excess);
-    case Verdict::kUnknown: return Sigmoid(0.8 + 0.2 * excess - 2 * std::max(e.removed, 0.0));
+    case Verdict::kParameters: return Sigmoid(3.5);
+    case Verdict::kEffects: return Sigmoid(1.7 + 2.0 * std::clamp(e.rival_lead, 0.0, 0.5) - 1.2 * excess - (effects > 1 ? 1.0 : 0));
+    case Verdict::kAmbiguous: return Sigmoid(1.8 - 1.6 * excess);
+    case Verdict::kUnknown: return Sigmoid(0.7 * excess - std::max(e.removed, 0.0));
   }
   return 0;
 }

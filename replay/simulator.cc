@@ -15,6 +15,9 @@ namespace {
 constexpr double kHistory_s = 0.2, kTransmission_s = 0.5, kPreRoll_s = 1.5, kTimeConstants = 5, kLongest_s = 6;
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
+// Even steps of at most `max_step_s`.
+int StepsOver(double interval_s, double max_step_s) { return std::max(1, static_cast<int>(std::ceil(interval_s / max_step_s - 1e-6))); }
+
 ModelPtr CopyForReplay(const mjModel& model) {
   ModelPtr copy(mj_copyModel(nullptr, &model));
   // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this small.
@@ -183,7 +186,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     if (row + 1 == window.end) break;
 
     const double interval = recording.time_s[row + 1] - now;
-    const int steps = std::max(1, static_cast<int>(std::ceil(interval / max_step_s_ - 1e-6)));
+    const int steps = StepsOver(interval, max_step_s_);
     m->opt.timestep = interval / steps;
     if (command_delay_s_ == 0) SetCommands(recording, row, now, now);
     for (int step = 0; step < steps; ++step) {
@@ -263,7 +266,7 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
     }
     d->time = recording.time_s[row];
     const double interval = recording.time_s[row + 1] - recording.time_s[row];
-    const int steps = apart_.empty() ? 1 : std::max(1, static_cast<int>(std::ceil(interval / max_step_s_ - 1e-6)));
+    const int steps = apart_.empty() ? 1 : StepsOver(interval, max_step_s_);
     m->opt.timestep = interval / steps;
     SetCommands(recording, row, recording.time_s[row], recording.time_s[row + 1]);
     for (int step = 0; step < steps; ++step) mj_step(m, d);

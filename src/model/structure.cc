@@ -279,7 +279,7 @@ Status Structure::FinishSplits() {
       link->solref_limit[0] = kGapTimeConstant_s, link->solref_limit[1] = 1;
       const mjtNum solimp[] = {0.95, 0.99, 0.0001, 0.5, 2};
       std::copy_n(solimp, 5, link->solimp_limit);
-      if (!split.damping.empty()) Set("tendon/" + tendon + "/solref_limit", {std::to_string(kGapTimeConstant_s), split.damping});
+      Set("tendon/" + tendon + "/solref_limit", {std::to_string(kGapTimeConstant_s), split.damping});
       Set("tendon/" + tendon + "/range", {"-0.5*(" + split.gap + ")", "0.5*(" + split.gap + ")"});
     } else {
       link->stiffness[0] = 1;

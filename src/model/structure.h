@@ -24,7 +24,7 @@ class Structure {
   Status AddMotorTerm(const std::string& actuator, const std::string& key, const std::string& expression);
   Status AddFrictionTerm(const std::string& joint, const std::string& key, const std::string& expression);
   Status AddSpringTerm(const std::string& joint, const std::string& key, const std::string& expression);
-  // Splits the joint's driven inertia into a motor side (`share` of it) and a load side on a spring with a gap.
+  // Splits the joint's driven inertia into a motor side (`share` of it) and a load side: on a spring with `stiffness` and `damping`, or with a `gap` whose flanks have `damping` as their ratio.
   struct Split {
     std::string joint, share, stiffness, damping, gap;  // expressions
   };

@@ -66,9 +66,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
         high.push_back(kOffsetBound_rad / deviation);
       }
       if (options_.fit_states) {
-        scalings[s].joint_state = static_cast<int>(2 * prototype.qpos.size());
-        prototype.qpos.push_back(source.qpos);
-        prototype.dof.push_back(source.dof);
+        scalings[s].joint_state = static_cast<int>(prior.size());
         const double weight = std::sqrt(kStatePriorSamples) * (scalings[s].weight > 0 ? scalings[s].weight : 1 / deviation);
         prior.push_back(weight);
         prior.push_back(weight * kSpeedPrior_s);
@@ -225,12 +223,16 @@ bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoin
       worker.start.qvel[source.dof] += state[scaling.joint_state + 1];
     }
   }
-  Eigen::Index hidden = state.size() - (options_.fit_states ? 2 * static_cast<Eigen::Index>(model_.mirrored_joints().size()) : 0);
-  for (const auto& [joint, from] : model_.mirrored_joints()) {
+  const auto& motor_sides = model_.mirrored_joints();
+  for (std::size_t i = 0; i < motor_sides.size(); ++i) {
+    const auto [joint, from] = motor_sides[i];
     const mjModel& m = model_.compiled();
-    worker.start.qpos[m.jnt_qposadr[joint]] = worker.start.qpos[m.jnt_qposadr[from]] + (options_.fit_states ? state[hidden] : 0);
-    worker.start.qvel[m.jnt_dofadr[joint]] = worker.start.qvel[m.jnt_dofadr[from]] + (options_.fit_states ? state[hidden + 1] : 0);
-    hidden += 2;
+    worker.start.qpos[m.jnt_qposadr[joint]] = worker.start.qpos[m.jnt_qposadr[from]];
+    worker.start.qvel[m.jnt_dofadr[joint]] = worker.start.qvel[m.jnt_dofadr[from]];
+    if (!options_.fit_states) continue;
+    const auto beside = state.tail(2 * static_cast<Eigen::Index>(motor_sides.size() - i));
+    worker.start.qpos[m.jnt_qposadr[joint]] += beside[0];
+    worker.start.qvel[m.jnt_dofadr[joint]] += beside[1];
   }
   return worker.simulator.Run(recording, window.rows, worker.start, predicted).outcome == Outcome::kCompleted;
 }

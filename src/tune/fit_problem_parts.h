@@ -24,7 +24,6 @@ struct FitProblem::FitWindow {
   std::size_t first_scored = 0;  // row in the window
   double weight = 1;
   InitialState start;            // from the log, without offsets
-  std::vector<int> qpos, dof;    // per measured joint: its addresses in the state, in the order of the state vector
   Eigen::VectorXd prior;         // weight of each state correction: angle and speed of each measured joint, then of each hidden motor side
 };
 

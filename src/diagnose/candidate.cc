@@ -96,28 +96,37 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   candidate->shift_s = candidate->problem->Shift(solved.point);
 }
 
-void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
-  FitOptions options = bench.Options(*candidate->model, false);
+namespace {
+
+// The candidate on the held-out logs as `options` score them: its parameters held, initial states and zero offsets fitted. Null where it cannot be simulated there.
+std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& candidate, FitOptions options, FitPoint* point) {
   options.fit_shift = false;
-  options.shift_s = candidate->shift_s;
-  FitProblem problem(*candidate->model, bench.data.held_out, options, candidate->values, bench.pool);
-  FitPoint point = problem.Start();
-  candidate->held_out_cost = std::numeric_limits<double>::infinity();
+  options.shift_s = candidate.shift_s;
+  auto problem = std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
+  *point = problem->Start();
+  if (!std::isfinite(problem->Cost(*point))) return nullptr;
+  *point = Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
+  return problem;
+}
+
+}  // namespace
+
+void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
+  candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors = std::numeric_limits<double>::infinity();
   candidate->at_bound = LastEffectAtBound(bench, *candidate);
-  candidate->held_out_error = std::numeric_limits<double>::infinity();
-  candidate->held_out_floors = candidate->held_out_error;
   candidate->held_out_blocks.clear();
   candidate->train_blocks = candidate->problem->BlockCosts(candidate->point);
-  if (!std::isfinite(problem.Cost(point))) return;
-  point = Solve(problem, point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
-  candidate->held_out_blocks = problem.BlockCosts(point);
+  FitPoint point;
+  const auto problem = OnHeldOut(bench, *candidate, bench.Options(*candidate->model, false), &point);
+  if (!problem) return;
+  candidate->held_out_blocks = problem->BlockCosts(point);
   if (candidate->held_out_blocks.empty()) return;
   candidate->held_out_cost = 0;
   for (const double cost : candidate->held_out_blocks) candidate->held_out_cost += cost;
-  const double rows = static_cast<double>(std::max<std::size_t>(1, problem.residuals()));
+  const double rows = static_cast<double>(std::max<std::size_t>(1, problem->residuals()));
   candidate->block_floor = 0.5 * rows / static_cast<double>(candidate->held_out_blocks.size());
   candidate->held_out_floors = std::sqrt(2 * candidate->held_out_cost / rows);
-  candidate->held_out = problem.Predict(point);
+  candidate->held_out = problem->Predict(point);
   candidate->held_out_error = ReplayError(candidate->held_out);
 }
 
@@ -126,13 +135,9 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   options.objective = Objective::kFreeRun;
   options.fold = Fold::kAll;
   options.weights.clear();
-  options.fit_shift = false;
-  options.shift_s = candidate.shift_s;
-  FitProblem problem(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
-  FitPoint point = problem.Start();
-  if (!std::isfinite(problem.Cost(point))) return std::numeric_limits<double>::infinity();
-  point = Solve(problem, point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
-  return ReplayError(problem.Predict(point));
+  FitPoint point;
+  const auto problem = OnHeldOut(bench, candidate, options, &point);
+  return problem ? ReplayError(problem->Predict(point)) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace gapscope

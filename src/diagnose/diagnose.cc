@@ -57,12 +57,11 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
   return std::sqrt(sum / std::max(1.0, signals));
 }
 
-// Where the refitted base model's error lies, on the first held-out log, which stands for all
-// (shares of several logs do not add up).
-std::vector<ConditionShare> Locate(const Candidate& base, const std::vector<Recording>& held_out, std::uint64_t seed) {
+// Where a model's error lies, on the first held-out log, which stands for all (shares of several logs do not add up).
+std::vector<ConditionShare> Locate(const Candidate& candidate, const std::vector<Recording>& held_out, std::uint64_t seed) {
   std::vector<ConditionShare> where;
-  if (base.held_out.empty()) return where;
-  const LogReplay& log = base.held_out.front();
+  if (candidate.held_out.empty()) return where;
+  const LogReplay& log = candidate.held_out.front();
   const Recording& recording = held_out.front();
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
     const SignalTrace& trace = log.signals[s];
@@ -198,6 +197,7 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   result.seconds = DescribeSeconds(found);
   SuggestNext(found, bench.experiment.path, &result);
   result.where = Locate(base, bench.data.held_out, seed);
+  result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);
   result.budget_spent = found.budget_spent;
   result.model = chosen.model;
   result.values = chosen.values;

@@ -57,7 +57,8 @@ struct Diagnosis {
   // Held-out errors, normalised: see ReplayError; in windows.
   double nominal = 0, refit = 0, final = 0, floor = 0, closed = 0;
   VerdictEvidence evidence;
-  std::vector<ConditionShare> where;
+  std::vector<ConditionShare> where;         // the refitted base model's error, by condition
+  std::vector<ConditionShare> remains;       // the final model's
   std::vector<CandidateReport> candidates;
   std::vector<CandidateReport> seconds;  // tried beside the first effect, the most promising by the score test first; without probabilities
   std::string next_command;

@@ -30,6 +30,23 @@ std::string Reason(const Candidate& candidate, const SearchResult& found) {
                      behind.z, converged);
 }
 
+namespace {
+
+// What was accepted and how far it goes, without the last full stop.
+std::string ExplainEffects(const Diagnosis& d) {
+  std::string text;
+  for (const auto& found : d.effects) {
+    text += fmt::format("{} explains {:.0f} % of the gap that closes", found.use.Text(), 100 * found.share_of_gap);
+    const auto& all = Catalogue();
+    const auto effect = std::find_if(all.begin(), all.end(), [&](const Effect& e) { return e.name == found.use.effect; });
+    if (effect != all.end()) text += " (" + effect->meaning + "; signature: " + effect->signature + ")";
+    text += ". ";
+  }
+  return text + fmt::format("With {} the held-out error is {:.3g}, {:.1f} times the noise", d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);
+}
+
+}  // namespace
+
 std::string Explain(const Diagnosis& d) {
   std::string text = fmt::format("Held out, the nominal model misses by {:.3g} of the signals' standard deviation; retuning its parameters brings that to {:.3g} ({:.1f} times the sensors' noise). ",
                                  d.nominal, d.refit, d.evidence.floors_before);
@@ -38,17 +55,7 @@ std::string Explain(const Diagnosis& d) {
     case Verdict::kParameters: text += "Retuned parameters close the gap; no further effect improves the prediction of logs that the fit did not see."; break;
     case Verdict::kEffects:
     case Verdict::kAmbiguous: {
-      for (const auto& found : d.effects) {
-        text += fmt::format("{} explains {:.0f} % of the gap that closes", found.use.Text(), 100 * found.share_of_gap);
-        for (const auto& effect : Catalogue()) {
-          if (effect.name == found.use.effect) {
-            text += " (" + effect.meaning + "; signature: " + effect.signature + ")";
-            break;
-          }
-        }
-        text += ". ";
-      }
-      text += fmt::format("With it the held-out error is {:.3g}, {:.1f} times the noise.", d.final, d.evidence.floors_left);
+      text += ExplainEffects(d) + ".";
       if (d.verdict == Verdict::kAmbiguous) {
         text += " But these logs cannot tell it from";
         for (std::size_t i = 1; i < d.ambiguous.front().size(); ++i) text += (i > 1 ? ", " : " ") + d.ambiguous.front()[i];
@@ -57,8 +64,9 @@ std::string Explain(const Diagnosis& d) {
       break;
     }
     case Verdict::kUnknown:
-      text += fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise. ", d.evidence.floors_left);
-      if (!d.where.empty()) text += "It lies mostly at: " + d.where.front().signal + ", " + d.where.front().condition + ".";
+      text += d.effects.empty() ? fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise.", d.evidence.floors_left)
+                                : ExplainEffects(d) + ", and no known effect explains what remains.";
+      if (!d.remains.empty()) text += " It lies mostly at: " + d.remains.front().signal + ", " + d.remains.front().condition + ".";
       break;
   }
   const VerdictEvidence& e = d.evidence;

@@ -26,6 +26,13 @@ std::string Wrap(const std::string& text, std::size_t width) {
   return wrapped;
 }
 
+std::string ConditionTable(const char* title, const std::vector<ConditionShare>& shares) {
+  if (shares.empty()) return "";
+  std::string text = fmt::format("\n{:<18} {:<44} {:>9} {:>9}\n", title, "", "of error", "of time");
+  for (const auto& w : shares) text += fmt::format("{:<18} {:<44} {:>8.0f}% {:>8.0f}%\n", w.signal, w.condition, 100 * w.share_of_error, 100 * w.share_of_time);
+  return text;
+}
+
 }  // namespace
 
 std::string DiagnosisTable(const Diagnosis& d) {
@@ -41,10 +48,8 @@ std::string DiagnosisTable(const Diagnosis& d) {
   }
   text += fmt::format("\nheld-out error: nominal {:.4g} -> refit {:.4g} -> final {:.4g} -> floor {:.4g}; {:.0f} % of the gap closed\n", d.nominal, d.refit, d.final, d.floor, 100 * d.closed);
   text += "\n" + Wrap(d.explanation, 120) + "\n";
-  if (!d.where.empty()) {
-    text += fmt::format("\n{:<18} {:<44} {:>9} {:>9}\n", "where", "", "of error", "of time");
-    for (const auto& w : d.where) text += fmt::format("{:<18} {:<44} {:>8.0f}% {:>8.0f}%\n", w.signal, w.condition, 100 * w.share_of_error, 100 * w.share_of_time);
-  }
+  text += ConditionTable("where", d.where);
+  if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);
   text += fmt::format("\n{:<34} {:>11} {:>9}  {}\n", "candidate", "probability", "error", "why, or why not");
   std::size_t shown = 0;
   for (const auto& c : d.candidates) {
@@ -74,11 +79,8 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
   json["evidence"] = {{"floors_before", JsonNumber(e.floors_before)}, {"floors_left", JsonNumber(e.floors_left)}, {"removed", JsonNumber(e.removed)}, {"free_run_before", JsonNumber(e.free_run_before)}, {"free_run_left", JsonNumber(e.free_run_left)},
                       {"free_run_removed", JsonNumber(e.free_run_removed)}, {"gain_train", JsonNumber(e.gain_train)},
                       {"gain_held_out", JsonNumber(e.gain_held_out)}, {"standard_errors", JsonNumber(e.z)}, {"rival_lead", JsonNumber(e.rival_lead)}, {"rival_standard_errors", JsonNumber(e.rival_z)}};
-  json["where"] = ordered_json::array();
-  for (const auto& w : d.where) {
-    json["where"].push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", JsonNumber(w.share_of_error)}, {"share_of_time", JsonNumber(w.share_of_time)}, {"low", JsonNumber(w.low)},
-                             {"high", JsonNumber(w.high)}});
-  }
+  json["where"] = JsonConditions(d.where);
+  json["remains"] = JsonConditions(d.remains);
   json["candidates"] = ordered_json::array();
   for (const auto& c : d.candidates) {
     const std::size_t at = c.name.find('@');

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/compare/conditions.h"
 #include "src/compare/score.h"
 #include "src/model/model.h"
 #include "src/report/version.h"
@@ -17,6 +18,15 @@ inline nlohmann::ordered_json JsonNumber(double value) { return std::isfinite(va
 inline nlohmann::ordered_json JsonScore(const SignalScore& s) {
   return {{"rmse", JsonNumber(s.rmse)}, {"mae", JsonNumber(s.mae)}, {"nrmse", JsonNumber(s.nrmse)}, {"max", JsonNumber(s.max)}, {"lag_s", JsonNumber(s.lag_s)},
           {"correlation", JsonNumber(s.correlation)}};
+}
+
+inline nlohmann::ordered_json JsonConditions(const std::vector<ConditionShare>& shares) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const auto& w : shares) {
+    json.push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", JsonNumber(w.share_of_error)}, {"share_of_time", JsonNumber(w.share_of_time)}, {"low", JsonNumber(w.low)},
+                    {"high", JsonNumber(w.high)}});
+  }
+  return json;
 }
 
 // What it takes to build the model again: its effects and the values of all its parameters (src/cli/result_model.h reads it).

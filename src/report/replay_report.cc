@@ -97,11 +97,7 @@ std::string ReplayJson(const ReplayReport& report) {
     for (const SignalScore& s : log.signals) {
       entry["signals"][s.signal] = JsonScore(s);
     }
-    entry["where"] = ordered_json::array();
-    for (const ConditionShare& w : log.where) {
-      entry["where"].push_back({{"signal", w.signal}, {"condition", w.condition}, {"share_of_error", JsonNumber(w.share_of_error)}, {"share_of_time", JsonNumber(w.share_of_time)},
-                                {"low", JsonNumber(w.low)}, {"high", JsonNumber(w.high)}});
-    }
+    entry["where"] = JsonConditions(log.where);
     json["logs"].push_back(std::move(entry));
   }
   json["effects"] = ordered_json::array();

@@ -4,15 +4,23 @@
 const shareBar = (share, mark, kind = "") => element("div", {class: "bar", "aria-hidden": "true"}, element("span", {class: kind, style: {width: `${Math.min(100, 100 * share)}%`}}),
   known(mark) ? element("i", {style: {left: `${Math.min(99, 100 * mark)}%`}}) : null);
 
-function writeConditions(result) {
-  const all = result.where ?? (result.logs && Array.isArray(result.logs) ? result.logs[0]?.where : null) ?? [];
-  const telling = all.filter((w) => known(w.share_of_error)).map((w) => ({...w, excess: (w.low ?? w.share_of_error) - (w.share_of_time ?? 0)})).filter((w) => result.where || (w.excess > 0 && w.share_of_error > 0.1))
+function conditionTable(caption, shares, all) {
+  const telling = shares.filter((w) => known(w.share_of_error)).map((w) => ({...w, excess: (w.low ?? w.share_of_error) - (w.share_of_time ?? 0)})).filter((w) => all || (w.excess > 0 && w.share_of_error > 0.1))
     .sort((a, b) => b.excess - a.excess).slice(0, 10);
-  if (!telling.length) return false;
-  document.getElementById("conditions").append(table("Shares of the error by condition", ["signal", "condition", {number: "of the error"}, "bar: of the error; mark: of the time", {number: "of the time"}, "90 % interval"],
+  if (!telling.length) return null;
+  return table(caption, ["signal", "condition", {number: "of the error"}, "bar: of the error; mark: of the time", {number: "of the time"}, "90 % interval"],
     telling.map((w) => [w.signal, w.condition, {number: percent(w.share_of_error)}, shareBar(w.share_of_error, w.share_of_time, "share"), {number: percent(w.share_of_time)},
-      known(w.low) && known(w.high) ? `${percent(w.low)} to ${percent(w.high)}` : "–"])));
-  return true;
+      known(w.low) && known(w.high) ? `${percent(w.low)} to ${percent(w.high)}` : "–"]));
+}
+
+function writeConditions(result) {
+  const parts = [conditionTable("Shares of the error by condition", result.where ?? result.logs?.[0]?.where ?? [], Boolean(result.where))];
+  if (result.verdict === "unknown" && result.effects.length) {
+    const left = conditionTable("Shares of what remains by condition", result.remains ?? [], true);
+    if (left) parts.push(element("h3", {}, `Of what ${listed(result.effects.map(place))} ${result.effects.length > 1 ? "leave" : "leaves"}`), left);
+  }
+  document.getElementById("conditions").append(...parts.filter(Boolean));
+  return parts.some(Boolean);
 }
 
 function writeCandidates(result) {

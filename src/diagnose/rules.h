@@ -16,12 +16,14 @@ inline constexpr Limits kSureSecond{.share = 0.3, .z = 8.5};   // or beyond doub
 inline constexpr double kSecondOfGap = 0.025;                  // and of the base model's residual: the first effect's shape is never quite the real one;
 inline constexpr double kUntoldOfGap = 0.15;                   // this much where unlike effects would do as well,
 inline constexpr double kShapeOfGap = 0.25;                    // and this much where it may be the first one's shape
-inline constexpr double kAtNoise = 0.95;                       // residual over noise at which a model explains everything: of two such models neither is the better one
+inline constexpr double kAtNoise = 1.0;                        // residual over noise at which a model explains everything: of two such models neither is the better one
 inline constexpr Limits kNested{.share = 0.03, .z = 3.0};      // a richer effect over a simpler one that it contains
 inline constexpr double kNestedShare = 0.03;                   // and of what the richer one gains,
 inline constexpr double kNestedExcess = 0.25;                  // or of what the simpler one leaves above the noise
 inline constexpr Limits kTold{.share = 0.06, .z = 2.5};        // the winner over a rival; below (a quarter of the noise apart), the two are ambiguous
-inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.55;   // left above the noise, and share of the excess removed (in windows, or of a free run)
+inline constexpr double kUnknownFloors = 2.5, kUnknownRemoved = 0.55;   // left above the noise, and share of the excess removed (in windows, or of a free run),
+inline constexpr double kUnknownRemovedInBoth = 0.35;                   // or in both: what stands for another cause helps one of the two only
+inline constexpr double kTwoAtOnce = 0.8;                      // share of the excess that two effects must remove where neither was accepted alone
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 
 // What a first effect must gain over this base model.

@@ -207,6 +207,47 @@ Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say
   return false;
 }
 
+// Second effects on the single one, and again where one of them took its place.
+Status SeekSeconds(const Workbench& bench, const Candidate& base, const Say& say, SearchResult* result) {
+  for (bool again = true; again && result->single->held_out_floors > kRemains && !bench.Late();) {
+    GS_ASSIGN(again, SeekSecond(bench, base, say, result));
+  }
+  return Ok();
+}
+
+// The two effects that fit the training logs best, far better than the base model does; one of several that contain each other stands for all.
+std::vector<EffectUse> BestFitted(const Layer& layer, const Candidate& base) {
+  constexpr double kFarBetter = 0.7;
+  constexpr std::size_t kMost = 2;
+  std::vector<const Candidate*> order, best;
+  for (const auto& child : layer.children) {
+    if (child->train_cost < kFarBetter * base.train_cost && !child->held_out_blocks.empty()) order.push_back(child.get());
+  }
+  std::stable_sort(order.begin(), order.end(), [](const Candidate* a, const Candidate* b) { return a->train_cost < b->train_cost; });
+  for (const Candidate* c : order) {
+    if (best.size() < kMost && std::none_of(best.begin(), best.end(), [&](const Candidate* b) { return Contains(*c, *b) || Contains(*b, *c); })) best.push_back(c);
+  }
+  std::vector<EffectUse> uses;
+  for (const Candidate* c : best) uses.push_back(c->effects.front());
+  return uses;
+}
+
+// Where no effect is accepted alone two may be needed at once: each bends to do what the other one does, and fails where it was not fitted.
+Status SeekTwoAtOnce(const Workbench& bench, Candidate& base, const Say& say, SearchResult* result) {
+  for (const EffectUse& use : BestFitted(result->first, base)) {
+    const auto& singles = result->first.children;
+    const auto first = std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects.front() == use; });
+    result->single = first->get();
+    GS_RETURN_IF_ERROR(SeekSeconds(bench, base, say, result));
+    const Candidate& found = *result->chosen;
+    if (Convincing(Compare(base, found), kFirst) && RemovedExcess(base.held_out_floors, found.held_out_floors) > kTwoAtOnce) break;
+    result->single = result->chosen = &base;
+    result->second_parent = nullptr;
+    result->second = {};
+  }
+  return Ok();
+}
+
 }  // namespace
 
 Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
@@ -246,8 +287,10 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   }
   if (single && Convincing(Compare(base, *single), FirstLimits(base))) result.single = result.chosen = single;
 
-  for (bool again = result.single == single; again && result.single->held_out_floors > kRemains && !bench.Late();) {
-    GS_ASSIGN(again, SeekSecond(bench, base, say, &result));
+  if (result.single == single) {
+    GS_RETURN_IF_ERROR(SeekSeconds(bench, base, say, &result));
+  } else if (base.held_out_floors > kUnknownFloors) {
+    GS_RETURN_IF_ERROR(SeekTwoAtOnce(bench, base, say, &result));
   }
   // What the logs leave open goes to where the base model's nominal values pull it: undamped steps, as damping holds it where the search left it.
   if (!bench.Late() && result.chosen != &base) {

@@ -71,7 +71,8 @@ Judgement Judge(const SearchResult& found) {
       if (rival.get() != &chosen && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) result.rivals.push_back(rival.get());
     }
   }
-  if (e.floors_left > kUnknownFloors && std::max(e.removed, e.free_run_removed) < kUnknownRemoved) {
+  const auto [less, more] = std::minmax(e.removed, e.free_run_removed);
+  if (e.floors_left > kUnknownFloors && more < kUnknownRemoved && less < kUnknownRemovedInBoth) {
     result.verdict = Verdict::kUnknown;
   } else if (&chosen == &base) {
     result.verdict = Convincing(Compare(*found.nominal, base), kRetuned) ? Verdict::kParameters : Verdict::kNone;

@@ -22,13 +22,6 @@ ModelPtr CopyForReplay(const mjModel& model) {
   ModelPtr copy(mj_copyModel(nullptr, &model));
   // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this small.
   copy->opt.disableflags |= mjDSBL_AUTORESET | mjDSBL_SENSOR | mjDSBL_ISLAND;
-  // What only pictures need is not carried along (6 % of the time): geoms matter to contacts, to tendons around them and in a fluid.
-  copy->ncam = copy->nlight = 0;
-  const bool dry = copy->opt.density == 0 && copy->opt.viscosity == 0;
-  if ((copy->opt.disableflags & mjDSBL_CONTACT) && copy->ntendon == 0 && dry) {
-    copy->ngeom = 0;
-    std::fill(copy->body_geomnum, copy->body_geomnum + copy->nbody, 0);
-  }
   return copy;
 }
 

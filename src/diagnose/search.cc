@@ -28,18 +28,21 @@ void SortByMisfit(const Candidate& parent, Candidates* children) {
   if (sound != children->end()) std::rotate(children->begin(), sound, sound + 1);
 }
 
+// Adds to `order` the visible partners of an effect, wherever they act.
+void AddPartners(const Layer& layer, const EffectUse& use, const Model& model, std::vector<std::size_t>* order) {
+  for (std::size_t i = 0; i < layer.screen.size(); ++i) {
+    const bool known = std::find(order->begin(), order->end(), i) != order->end();
+    if (!known && layer.screen[i].trial.visible && ArePartners(use, layer.screen[i].use, model)) order->push_back(i);
+  }
+}
+
 // Indices into the screen: the leaders by the score test, then the partners of the first two wherever they act.
 std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::size_t refits) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < layer.screen.size() && order.size() < refits; ++i) {
     if (layer.screen[i].trial.visible) order.push_back(i);
   }
-  for (std::size_t leader = 0, leaders = std::min<std::size_t>(2, order.size()); leader < leaders; ++leader) {
-    for (std::size_t i = 0; i < layer.screen.size(); ++i) {
-      const bool known = std::find(order.begin(), order.end(), i) != order.end();
-      if (!known && layer.screen[i].trial.visible && ArePartners(layer.screen[order[leader]].use, layer.screen[i].use, model)) order.push_back(i);
-    }
-  }
+  for (std::size_t leader = 0, leaders = std::min<std::size_t>(2, order.size()); leader < leaders; ++leader) AddPartners(layer, layer.screen[order[leader]].use, model, &order);
   return order;
 }
 
@@ -47,10 +50,12 @@ std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::si
 void AddStrongSingles(const SearchResult& found, const Candidate& parent, Layer* layer) {
   constexpr Limits kStrong{.share = 0.3, .z = 3.0};
   constexpr std::size_t kMost = 2, kPlace = 2;
+  // A partner of the first one mostly mends its shape: it is tried where more than a shape is missing.
+  const bool much_left = parent.held_out_floors > kUnknownFloors;
   std::size_t added = 0;
   for (const auto& child : found.first.children) {
     if (added == kMost || child->held_out_blocks.empty() || child->effects == parent.effects || Contains(*child, parent) || Contains(parent, *child) ||
-        ArePartners(child->effects.back(), parent.effects.back(), *parent.model) || !Convincing(Compare(*found.base, *child), kStrong)) {
+        (!much_left && ArePartners(child->effects.back(), parent.effects.back(), *parent.model)) || !Convincing(Compare(*found.base, *child), kStrong)) {
       continue;
     }
     const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back(); });
@@ -107,6 +112,10 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
   if (found) AddStrongSingles(*found, parent, layer);
   Refit(hurried, parent, say, layer);
   if (layer->children.empty()) return;
+  SortByMisfit(parent, &layer->children);
+  // Who leads now need not be who led the screen.
+  AddPartners(*layer, layer->children.front()->effects.back(), *parent.model, &layer->leaders);
+  Refit(hurried, parent, say, layer);
   SortByMisfit(parent, &layer->children);
   ImitateLeader(hurried, parent, layer);
   StartFromSimpler(hurried, layer);

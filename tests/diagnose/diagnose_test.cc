@@ -22,11 +22,12 @@ struct Logs {
   std::vector<twin::EffectLabel> effects;
 };
 
-Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect, std::uint64_t seed) {
+Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect, std::uint64_t seed, std::uint64_t index = 0) {
   twin::Case c;
   std::string problem;
   twin::CaseRequest request;
   request.seed = seed;
+  request.index = index;
   request.kind = kind;
   request.rig = rig;
   request.effect = effect;
@@ -83,6 +84,17 @@ TEST(DiagnoseTest, NamesNothingWhereNothingIsMissing) {
   const Diagnosis d = DiagnoseLogs(MakeLogs("flexjoint", twin::Kind::kNone, "", 33));
   EXPECT_TRUE(d.verdict == Verdict::kNone || d.verdict == Verdict::kParameters) << d.explanation;
   EXPECT_TRUE(d.effects.empty());
+}
+
+// A cable and dry friction: each alone bends to do what the other one does, and fails on the windows that were held out.
+TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
+  const Diagnosis d = DiagnoseLogs(MakeLogs("flexlink", twin::Kind::kAuto, "", 913, 19));
+  ASSERT_EQ(d.verdict, Verdict::kEffects) << d.explanation;
+  ASSERT_EQ(d.effects.size(), 2u);
+  std::vector<std::string> names = {d.effects[0].use.Text(), d.effects[1].use.Text()};
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names[0], "cable_spring@hub");
+  EXPECT_EQ(names[1], "coulomb_friction@hub");
 }
 
 // Commands that have nothing to do with the motion: no effect may be named with confidence.

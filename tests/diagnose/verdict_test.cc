@@ -1,0 +1,64 @@
+// From what a search found to a verdict.
+#include "src/diagnose/verdict.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/tune/fixture.h"
+
+namespace gapscope::testing {
+namespace {
+
+// A search that accepted a cable spring, whose blocks hold so many times the noise in every half second before and after.
+struct Found {
+  Rig rig = LoadRig("qube");
+  SearchResult result;
+
+  Found(double before, double after) {
+    result.base = Make({}, before);
+    result.nominal = Make({}, before);
+    result.first.children.push_back(Make({{"cable_spring", "arm"}}, after));
+    result.single = result.chosen = result.first.children.front().get();
+  }
+  std::unique_ptr<Candidate> Make(const std::vector<EffectUse>& effects, double floors) const {
+    auto candidate = std::make_unique<Candidate>();
+    candidate->effects = effects;
+    candidate->model = rig.model;
+    candidate->train_blocks = candidate->held_out_blocks = std::vector<double>(40, floors * floors);
+    candidate->held_out_cost = 40 * floors * floors;
+    candidate->held_out_floors = floors;
+    return candidate;
+  }
+};
+
+Verdict VerdictOf(double floors_before, double floors_left, double free_run_removed) {
+  Found found(floors_before, floors_left);
+  found.result.free_run_before = 1;
+  found.result.free_run_left = 1 - free_run_removed;
+  return Judge(found.result).verdict;
+}
+
+TEST(VerdictTest, AnEffectThatLeavesLittleIsTheCause) { EXPECT_EQ(VerdictOf(10, 1.5, 0), Verdict::kEffects); }
+
+TEST(VerdictTest, WhatStandsForAnotherCauseHelpsWindowsOrFreeRunsOnly) {
+  // Half of the excess in windows, and nothing or less in a free run: something else is missing.
+  EXPECT_EQ(VerdictOf(10, 5.5, 0.05), Verdict::kUnknown);
+  EXPECT_EQ(VerdictOf(10, 5.5, -2), Verdict::kUnknown);
+  EXPECT_EQ(VerdictOf(10, 9.5, 0.5), Verdict::kUnknown);
+  // Nearly half in both: the cause, with more beside it.
+  EXPECT_EQ(VerdictOf(10, 5.5, 0.45), Verdict::kEffects);
+  // Most of it in one of them.
+  EXPECT_EQ(VerdictOf(10, 3.5, -0.2), Verdict::kEffects);
+}
+
+TEST(VerdictTest, ProbabilitiesAddUpToOne) {
+  const Found found(10, 2);
+  const Judgement judgement = Judge(found.result);
+  ASSERT_EQ(judgement.probabilities.size(), judgement.explanations.size());
+  double sum = 0;
+  for (const double p : judgement.probabilities) sum += p;
+  EXPECT_NEAR(sum, 1, 1e-12);
+  EXPECT_GT(judgement.probabilities.back(), judgement.probabilities.front());
+}
+
+}  // namespace
+}  // namespace gapscope::testing

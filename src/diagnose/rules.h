@@ -6,7 +6,7 @@
 
 namespace gapscope {
 
-// Thresholds, set on the bank of twin cases of seed 900 (scripts/blind_check) and judged on others: docs/diagnosis.md.
+// Thresholds, set on banks of twin cases (scripts/blind_check) and judged on others: docs/diagnosis.md, docs/results_diagnose.md.
 inline constexpr Limits kFirst{.share = 0.01, .z = 2.5};       // the first effect over the refitted base model
 inline constexpr Limits kFirstAtFloor{.share = 0.06, .z = 3.0};  // the same where the base model is at the noise already
 inline constexpr double kRemains = 1.25;                       // residual over noise below which nothing more is sought

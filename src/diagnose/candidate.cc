@@ -65,7 +65,6 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, double rival_cost) {
   SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .deadline = bench.deadline};
   constexpr int kFairTry = 4;
-  constexpr double kFarBehind = 3;
   if (rival_cost > 0) options.hopeless = [=](double cost, int iteration) { return iteration >= kFairTry && cost > kFarBehind * rival_cost; };
   const SolveResult solved = Solve(*candidate->problem, start, options);
   candidate->point = solved.point;

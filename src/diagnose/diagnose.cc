@@ -135,7 +135,7 @@ std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const
   for (const auto& s : found.first.screen) {
     if (named.contains(s.use.Text())) continue;
     reports.push_back({.name = s.use.Text(), .held_out_error = kNan, .screen_drop = s.trial.drop, .absorbed = s.trial.absorbed,
-                       .reason = !s.trial.visible ? "cannot be seen in these logs: the base model's parameters imitate it fully"
+                       .reason = !s.left_out.empty() ? s.left_out : !s.trial.visible ? "cannot be seen in these logs: the base model's parameters imitate it fully"
                                                   : fmt::format("the score test promises {:.2g} % of the error at most, less than the leaders", 100 * s.trial.drop)});
   }
   std::stable_sort(reports.begin(), reports.end(), [](const auto& a, const auto& b) { return a.probability > b.probability; });
@@ -146,7 +146,7 @@ std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const
 std::vector<CandidateReport> DescribeSeconds(const SearchResult& found) {
   std::vector<CandidateReport> reports;
   for (const auto& s : found.second.screen) {
-    CandidateReport report{.name = s.use.Text(), .held_out_error = kNan, .screen_drop = s.trial.drop, .absorbed = s.trial.absorbed};
+    CandidateReport report{.name = s.use.Text(), .held_out_error = kNan, .screen_drop = s.trial.drop, .absorbed = s.trial.absorbed, .reason = s.left_out};
     for (const auto& c : found.second.children) {
       if (c->effects.back() != s.use) continue;
       const Evidence more = Compare(*found.second_parent, *c);
@@ -189,9 +189,14 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   result.closed = result.refit > result.floor ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0) : 0;
   GS_ASSIGN(result.effects, DescribeEffects(found, judgement, bench.scales));
   if (result.verdict == Verdict::kAmbiguous) {
-    std::vector<std::string> group = {chosen.effects.back().Text()};
-    for (const Candidate* rival : judgement.rivals) group.push_back(rival->effects.back().Text());
-    result.ambiguous.push_back(std::move(group));
+    const auto add = [&](const EffectUse& use, const std::vector<const Candidate*>& rivals) {
+      if (rivals.empty()) return;
+      std::vector<std::string> group = {use.Text()};
+      for (const Candidate* rival : rivals) group.push_back(rival->effects.back().Text());
+      result.ambiguous.push_back(std::move(group));
+    };
+    add(chosen.effects.back(), judgement.rivals);
+    add(chosen.effects.front(), judgement.first_rivals);
   }
   result.candidates = DescribeCandidates(found, judgement);
   result.seconds = DescribeSeconds(found);

@@ -57,8 +57,12 @@ std::string Explain(const Diagnosis& d) {
     case Verdict::kAmbiguous: {
       text += ExplainEffects(d) + ".";
       if (d.verdict == Verdict::kAmbiguous) {
-        text += " But these logs cannot tell it from";
-        for (std::size_t i = 1; i < d.ambiguous.front().size(); ++i) text += (i > 1 ? ", " : " ") + d.ambiguous.front()[i];
+        text += " But these logs cannot tell";
+        for (std::size_t g = 0; g < d.ambiguous.size(); ++g) {
+          const auto& group = d.ambiguous[g];
+          text += (g ? ", nor " : " ") + group.front() + " from";
+          for (std::size_t i = 1; i < group.size(); ++i) text += (i > 1 ? " or " : " ") + group[i];
+        }
         text += ": what each leaves unexplained is the same.";
       }
       break;

@@ -44,23 +44,25 @@ FitPoint StartFrom(const FitProblem& parent, const FitPoint& at, const Trial& tr
 
 }  // namespace
 
-void FitChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child) {
-  FitPoint start = StartFrom(*parent.problem, parent.point, trial, child->problem.get());
-  if (!trial.others.empty()) {
-    // Valleys side by side: a taste of each.
-    FitCandidate(bench, child, start, kTasteIterations, kFirstTolerance);
-    for (const Trial& other : trial.others) {
-      if (!bench.Late()) TryStart(bench, child, StartFrom(*parent.problem, parent.point, other, child->problem.get()), kTasteIterations, kFirstTolerance);
-    }
-    start = child->point;
+void TasteChild(const Workbench& bench, const Candidate& parent, const Trial& trial, Candidate* child) {
+  FitCandidate(bench, child, StartFrom(*parent.problem, parent.point, trial, child->problem.get()), kTasteIterations, kFirstTolerance);
+  for (const Trial& other : trial.others) {
+    if (!bench.Late()) TryStart(bench, child, StartFrom(*parent.problem, parent.point, other, child->problem.get()), kTasteIterations, kFirstTolerance);
   }
-  FitCandidate(bench, child, start, kFirstIterations, kFirstTolerance, rival_cost);
+}
+
+void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child) {
+  if (!child->converged && !(child->train_cost > kFarBehind * rival_cost)) FitCandidate(bench, child, child->point, kFirstIterations, kFirstTolerance, rival_cost);
   if (child->train_cost <= parent.train_cost * 1.0005 || bench.Late()) return;
   const auto placed = child->model->EffectParameters(use, bench.scales);
   if (!placed.ok()) return;
   std::vector<double> neutral = trial.values;
   for (const auto& p : placed.value()) neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
   TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations, kFirstTolerance);
+}
+
+void StartFromValues(const Workbench& bench, const std::vector<double>& values, Candidate* candidate) {
+  TryStart(bench, candidate, candidate->problem->At(values, candidate->problem->Start()), kFirstIterations, kFirstTolerance);
 }
 
 void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
+#include <string_view>
 
 namespace gapscope {
 namespace {
@@ -20,12 +22,22 @@ std::string JointOf(const std::string& on, const Model& model) {
   return on;
 }
 
-// A position servo, native or of a base model's gapscope.motor.
+// Whether an actuator's own stiffness holds its joint: native, or a gapscope.motor of the duty or (with a gain) the position law.
+bool HoldsPosition(const mjModel& m, int actuator) {
+  const int instance = m.actuator_plugin[actuator];
+  if (instance < 0) return m.actuator_biasprm[actuator * mjNBIAS + 1] != 0;
+  const char *law = mj_getPluginConfig(&m, instance, "law"), *name = mj_id2name(&m, mjOBJ_PLUGIN, instance);
+  if (law && std::string_view(law) == "duty") return true;
+  const int kp = name ? mj_name2id(&m, mjOBJ_NUMERIC, (std::string(name) + ".kp").c_str()) : -1;
+  const char* config = mj_getPluginConfig(&m, instance, "kp");
+  return (kp >= 0 ? m.numeric_data[m.numeric_adr[kp]] : config ? std::atof(config) : 0) != 0;
+}
+
 bool IsServoJoint(const std::string& joint, const Model& base) {
   const mjModel& m = base.compiled();
   for (int a = 0; a < m.nactuator; ++a) {
     const char* name = m.actuator_trntype[a] == mjTRN_JOINT ? mj_id2name(&m, mjOBJ_JOINT, m.actuator_trnid[2 * a]) : nullptr;
-    if (name && joint == name && (m.actuator_biasprm[a * mjNBIAS + 1] != 0 || m.actuator_plugin[a] >= 0)) return true;
+    if (name && joint == name && HoldsPosition(m, a)) return true;
   }
   return false;
 }
@@ -66,11 +78,17 @@ bool IsShape(const EffectUse& second, const EffectUse& first) {
 }
 
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
-  if (richer.effects.size() != simpler.effects.size() || richer.effects.empty()) return false;
-  for (std::size_t i = 0; i + 1 < richer.effects.size(); ++i) {
-    if (richer.effects[i] != simpler.effects[i]) return false;
-  }
-  const EffectUse &a = richer.effects.back(), &b = simpler.effects.back();
+  if (richer.effects.size() != simpler.effects.size()) return false;
+  const auto only_of = [](const Candidate& one, const Candidate& other) {
+    std::vector<EffectUse> own;
+    for (const auto& use : one.effects) {
+      if (std::find(other.effects.begin(), other.effects.end(), use) == other.effects.end()) own.push_back(use);
+    }
+    return own;
+  };
+  const auto of_richer = only_of(richer, simpler), of_simpler = only_of(simpler, richer);
+  if (of_richer.size() != 1 || of_simpler.size() != 1) return false;
+  const EffectUse &a = of_richer.front(), &b = of_simpler.front();
   // On the same place: a motor's direction asymmetry is no joint's friction.
   if (a.on != b.on) return false;
   return std::any_of(std::begin(kContainments), std::end(kContainments), [&](const Containment& c) { return a.effect == c.richer && b.effect == c.simpler && (c.exact || !exactly); });

@@ -93,12 +93,19 @@ std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const st
     std::vector<EffectUse> effects = parent.effects;
     effects.push_back(use);
     auto made = MakeCandidate(bench, effects);
-    if (!made.ok()) continue;
-    Screened entry{.use = use, .trial = {}, .child = std::move(made).value()};
-    entry.trial = TryEffect(bench, entry.child, use, *parent.problem, parent.point, base);
-    if (entry.trial.valid) screened.push_back(std::move(entry));
+    Screened entry{.use = use, .trial = {}, .child = {}, .left_out = {}};
+    if (made.ok()) {
+      entry.child = std::move(made).value();
+      entry.trial = TryEffect(bench, entry.child, use, *parent.problem, parent.point, base);
+      if (!entry.trial.valid) entry.left_out = "cannot be simulated along these logs at any trial value";
+    } else {
+      entry.left_out = "cannot be added: " + made.error().Text();
+    }
+    screened.push_back(std::move(entry));
   }
-  std::stable_sort(screened.begin(), screened.end(), [](const Screened& a, const Screened& b) { return a.trial.drop > b.trial.drop; });
+  std::stable_sort(screened.begin(), screened.end(), [](const Screened& a, const Screened& b) {
+    return a.left_out.empty() != b.left_out.empty() ? a.left_out.empty() : a.trial.drop > b.trial.drop;
+  });
   return screened;
 }
 

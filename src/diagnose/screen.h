@@ -26,9 +26,10 @@ struct Screened {
   EffectUse use;
   Trial trial;
   Candidate child;              // its model and problem, unfitted
+  std::string left_out;         // why it was not tested; empty: it was
 };
 
-// Tests `uses` on top of `parent` at its optimum; the most promising first. Effects that do not go with the parent's are left out.
+// Tests `uses` on top of `parent` at its optimum; the most promising first. Those that cannot be built or simulated come last and say why.
 std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses);
 
 }  // namespace gapscope

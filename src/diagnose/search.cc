@@ -17,6 +17,7 @@ constexpr int kFinalIterations = 20;
 constexpr double kFinalTolerance = 2e-4;
 constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4, kExchangeRefits = 2;  // leaders of the screen that are refitted, beside the partners of the first two
 constexpr double kFirstShare = 0.5, kSecondShare = 0.8;  // of the time left, for the refits of a first and of a second effect
+constexpr double kFarOff = 20, kFound = 0.4;          // floors of the base model, and share of the excess removed, below which shorter windows are tried
 constexpr double kNearly = 0.6;                        // of the best one's gain
 
 // The best first. An effect with a parameter on its bound is stretched into something it is not: it comes after one that gains nearly as much.
@@ -58,7 +59,7 @@ void AddStrongSingles(const SearchResult& found, const Candidate& parent, Layer*
         (!much_left && ArePartners(child->effects.back(), parent.effects.back(), *parent.model)) || !Convincing(Compare(*found.base, *child), kStrong)) {
       continue;
     }
-    const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back(); });
+    const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back() && s.left_out.empty(); });
     if (entry == layer->screen.end()) continue;
     ++added;
     Trial start{.drop = entry->trial.drop, .absorbed = entry->trial.absorbed, .values = entry->child.model->Nominal(), .dy = {}, .visible = true, .valid = true, .others = {}};
@@ -84,15 +85,29 @@ Workbench Hurried(const Workbench& bench, double share) {
   return hurried;
 }
 
-// Refits the leaders that have not been, in their order, as far as the time goes.
+// Refits the leaders that have not been, as far as the time goes: a taste of each in the screen's order, then the rest of each in the order of how those ended. However
+// little the time, all of them were looked at.
 void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Layer* layer) {
+  struct Tasted {
+    const Screened* entry;
+    std::unique_ptr<Candidate> child;
+  };
+  std::vector<Tasted> tasted;
   for (; layer->refitted < layer->leaders.size() && !bench.Late(); ++layer->refitted) {
     Screened& entry = layer->screen[layer->leaders[layer->refitted]];
-    say("fitting " + entry.use.Text());
-    auto child = std::make_unique<Candidate>(std::move(entry.child));
-    double best_cost = parent.train_cost;
-    for (const auto& other : layer->children) best_cost = std::min(best_cost, other->train_cost);
-    FitChild(bench, parent, entry.use, entry.trial, best_cost, child.get());
+    say("trying " + entry.use.Text());
+    tasted.push_back({&entry, std::make_unique<Candidate>(std::move(entry.child))});
+    TasteChild(bench, parent, entry.trial, tasted.back().child.get());
+  }
+  std::stable_sort(tasted.begin(), tasted.end(), [](const Tasted& a, const Tasted& b) { return a.child->train_cost < b.child->train_cost; });
+  double best_cost = parent.train_cost;
+  for (const auto& other : layer->children) best_cost = std::min(best_cost, other->train_cost);
+  for (auto& [entry, child] : tasted) {
+    if (!bench.Late()) {
+      say("fitting " + entry->use.Text());
+      FinishChild(bench, parent, entry->use, entry->trial, best_cost, child.get());
+    }
+    best_cost = std::min(best_cost, child->train_cost);
     ScoreCandidate(bench, child.get());
     layer->children.push_back(std::move(child));
   }
@@ -108,6 +123,9 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
     if (IsFinding(use, base)) uses.push_back(use);
   }
   layer->screen = Screen(bench, parent, uses);
+  for (const auto& entry : layer->screen) {
+    if (!entry.left_out.empty()) say("leaving out " + entry.use.Text() + ", which " + entry.left_out);
+  }
   layer->leaders = Leaders(*layer, *parent.model, refits);
   if (found) AddStrongSingles(*found, parent, layer);
   Refit(hurried, parent, say, layer);
@@ -131,22 +149,58 @@ void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::
   SortByMisfit(parent, &layer->children);
 }
 
+// Far from the logs, 1 s is long enough for a prediction to lose the motion altogether, and no step leads back. What windows of a third of it find is where the fits
+// over whole windows start from.
+Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResult* result) {
+  constexpr double kShorter = 0.3, kShare = 0.6;
+  constexpr std::size_t kMost = 2;
+  say("searching in shorter windows");
+  Workbench near = Hurried(bench, kShare);
+  near.window_s = kShorter * bench.window_s;
+  GS_ASSIGN(Candidate base, MakeCandidate(near, {}));
+  FitCandidate(near, &base, base.problem->Start(), kFinalIterations, kFinalTolerance);
+  ScoreCandidate(near, &base);
+  Layer found;
+  Explore(near, *base.model, base, kRefits, kShare, say, &found);
+  auto& children = result->first.children;
+  for (std::size_t i = 0; i < std::min(kMost, found.children.size()) && !bench.Late(); ++i) {
+    const Candidate& start = *found.children[i];
+    auto child = std::find_if(children.begin(), children.end(), [&](const auto& c) { return c->effects == start.effects; });
+    if (child == children.end()) {
+      GS_ASSIGN(Candidate made, MakeCandidate(bench, start.effects));
+      made.point = made.problem->Start();
+      made.train_cost = made.problem->Cost(made.point);
+      child = children.insert(children.end(), std::make_unique<Candidate>(std::move(made)));
+    }
+    StartFromValues(bench, start.values, child->get());
+    FitCandidate(bench, child->get(), (*child)->point, kFinalIterations, kFinalTolerance);
+    ScoreCandidate(bench, child->get());
+  }
+  SortByMisfit(*result->base, &children);
+  return Ok();
+}
+
 // Share of what stood above the noise that is gone; nothing where hardly anything stood.
 double RemovedExcess(double floors_before, double floors_after) {
   constexpr double kLeastExcess = 0.1;
   return floors_before > 1 + kLeastExcess ? (floors_before - std::max(floors_after, 1.0)) / (floors_before - 1) : 0;
 }
 
-// The best child, or a simpler one when the richer is not convincingly better: one that it contains, or one with fewer parameters.
-Candidate* Simplest(const Layer& layer, const Candidate& parent) {
+// The best child that is convincing over the parent, or a simpler one that is too when the richer is not convincingly better: one that it contains, or one with
+// fewer parameters. Where none is convincing, the best of all.
+Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& limits) {
   if (layer.children.empty()) return nullptr;
-  Candidate* best = layer.children.front().get();
+  const auto sound = [&](const auto& child) { return Convincing(Compare(parent, *child), limits); };
+  const auto first = std::find_if(layer.children.begin(), layer.children.end(), sound);
+  if (first == layer.children.end()) return layer.children.front().get();
+  Candidate* best = first->get();
   for (const auto& child : layer.children) {
-    if (child.get() == best || child->held_out_blocks.empty()) continue;
+    if (child.get() == best || child->held_out_blocks.empty() || !sound(child)) continue;
     const Evidence more = Compare(*child, *best);
     if (Contains(*best, *child)) {
       const bool much = more.gain > kNestedShare * Compare(parent, *best).gain || RemovedExcess(child->held_out_floors, best->held_out_floors) > kNestedExcess;
-      if (!much || !Convincing(more, kNested)) best = child.get();
+      const bool sure = more.held_out > kSureNested.share && more.z > kSureNested.z;
+      if (!sure && (!much || !Convincing(more, kNested))) best = child.get();
     } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
     } else if (IsLessLikely(*best, *child) && AreRivals(*best, *child)) {
@@ -174,13 +228,15 @@ bool IsSecond(const SearchResult& found, const Candidate& single, const Candidat
 // The other way round: what goes best with the pair's second effect? The first one was chosen while the second was missing, and may stand for another.
 void Exchange(const Workbench& bench, const Model& base, Candidate* second, const Say& say, SearchResult* result) {
   say("looking for a better partner of " + second->Name());
-  Layer layer;
+  result->exchange = {};
+  Layer& layer = result->exchange;
   Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer);
-  Candidate* other = Simplest(layer, *second);
+  Candidate* other = Simplest(layer, *second, kSecond);
   if (!other || other->effects.back() == result->single->effects.front() || LogMisfit(*other) > LogMisfit(*result->chosen)) return;
   result->second_parent = result->single = second;
   result->chosen = other;
   result->second = std::move(layer);
+  layer = {};
 }
 
 // A second effect on the single one, if there is one worth naming. True when that one alone does as well: it then is the single one, and a second is to be sought on it.
@@ -188,9 +244,10 @@ Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say
   say("looking for a second effect");
   const bool first_time = result->second_parent == nullptr;
   result->second = {};
+  result->exchange = {};
   result->second_parent = result->single;
   Explore(bench, *base.model, *result->single, kSecondRefits, kSecondShare, say, &result->second, result);
-  Candidate* pair = Simplest(result->second, *result->single);
+  Candidate* pair = Simplest(result->second, *result->single, kSecond);
   if (!pair || !IsSecond(*result, *result->single, *pair)) return false;
   result->chosen = pair;
   if (bench.Late()) return false;
@@ -253,6 +310,7 @@ Status SeekTwoAtOnce(const Workbench& bench, Candidate& base, const Say& say, Se
     result->single = result->chosen = &base;
     result->second_parent = nullptr;
     result->second = {};
+    result->exchange = {};
   }
   return Ok();
 }
@@ -287,12 +345,16 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   say("screening");
   // Where the base model is at the noise already, fewer refits show that nothing is missing.
   Explore(bench, *base.model, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, kFirstShare, say, &result.first);
-  Candidate* single = Simplest(result.first, base);
+  const auto& children = result.first.children;
+  if (base.held_out_floors > kFarOff && (children.empty() || RemovedExcess(base.held_out_floors, children.front()->held_out_floors) < kFound)) {
+    GS_RETURN_IF_ERROR(StartFromShortWindows(bench, say, &result));
+  }
+  Candidate* single = Simplest(result.first, base, FirstLimits(base));
   if (!single || single->held_out_floors <= kRemains) {
     // No second effect will be sought: the time is for rivals.
     Refit(bench, base, say, &result.first);
     SortByMisfit(base, &result.first.children);
-    single = Simplest(result.first, base);
+    single = Simplest(result.first, base, FirstLimits(base));
   }
   if (single && Convincing(Compare(base, *single), FirstLimits(base))) result.single = result.chosen = single;
 

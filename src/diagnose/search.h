@@ -10,6 +10,7 @@ namespace gapscope {
 struct SearchResult {
   std::unique_ptr<Candidate> nominal, base;  // base: refitted
   Layer first, second;           // on top of the base; on top of `single`
+  Layer exchange;                // of a pair: on top of its second effect alone, where another one in the first one's place was sought
   Candidate* single = nullptr;   // the accepted single effect, or the base
   Candidate* chosen = nullptr;   // single, or a pair
   const Candidate* second_parent = nullptr;  // what `second` stands on; null where no second effect was sought

@@ -66,18 +66,23 @@ Judgement Judge(const SearchResult& found) {
     }
   }
 
-  if (&chosen != &base) {
-    for (const auto& rival : field) {
-      if (rival.get() != &chosen && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) result.rivals.push_back(rival.get());
+  const auto rivals_in = [&](const Candidates& candidates) {
+    std::vector<const Candidate*> rivals;
+    for (const auto& rival : candidates) {
+      const bool same = std::is_permutation(rival->effects.begin(), rival->effects.end(), chosen.effects.begin(), chosen.effects.end());
+      if (!same && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) rivals.push_back(rival.get());
     }
-  }
+    return rivals;
+  };
+  if (&chosen != &base) result.rivals = rivals_in(field);
+  if (pair) result.first_rivals = rivals_in(found.exchange.children);
   const auto [less, more] = std::minmax(e.removed, e.free_run_removed);
   if (e.floors_left > kUnknownFloors && more < kUnknownRemoved && less < kUnknownRemovedInBoth) {
     result.verdict = Verdict::kUnknown;
   } else if (&chosen == &base) {
     result.verdict = Convincing(Compare(*found.nominal, base), kRetuned) ? Verdict::kParameters : Verdict::kNone;
   } else {
-    result.verdict = result.rivals.empty() ? Verdict::kEffects : Verdict::kAmbiguous;
+    result.verdict = result.rivals.empty() && result.first_rivals.empty() ? Verdict::kEffects : Verdict::kAmbiguous;
   }
   result.probability = Confidence(result.verdict, e, chosen.effects.size());
   if (found.budget_spent) result.probability *= 0.8;

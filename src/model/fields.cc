@@ -92,6 +92,13 @@ std::vector<std::string> Keys(const Map& map) {
 Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, const std::string& where) {
   const mjtNum* gain = m.actuator_gainprm + id * mjNGAIN;
   const mjtNum* bias = m.actuator_biasprm + id * mjNBIAS;
+  // The element's own, plugin or not.
+  if (field == "forcerange" || field == "ctrlrange") {
+    const mjtNum* range = field == "ctrlrange" ? m.actuator_ctrlrange + 2 * m.actuator_ctrladr[id] : m.actuator_forcerange + 2 * m.actuator_outadr[id];
+    Field result;
+    for (int i = 0; i < 2; ++i) result.components.push_back({{.offset = OffsetOf(m, range + i)}});
+    return result;
+  }
   if (m.actuator_plugin[id] >= 0) {
     const char* name = mj_id2name(&m, mjOBJ_PLUGIN, m.actuator_plugin[id]);
     const auto numeric = [&](const std::string& key) -> const mjtNum* {
@@ -117,12 +124,6 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
   if (field == "bias0" || field == "bias1" || field == "bias2") return Single(m, {{bias + (field[4] - '0'), 1}});
   if (field == "gear") return Single(m, {{m.actuator_gear + m.actuator_outadr[id] * 6, 1}});
   if (field == "delay") return Single(m, {{m.actuator_delay + id, 1}});
-  if (field == "forcerange" || field == "ctrlrange") {
-    const mjtNum* range = field == "ctrlrange" ? m.actuator_ctrlrange + 2 * m.actuator_ctrladr[id] : m.actuator_forcerange + 2 * m.actuator_outadr[id];
-    Field result;
-    for (int i = 0; i < 2; ++i) result.components.push_back({{.offset = OffsetOf(m, range + i)}});
-    return result;
-  }
   return Unknown("unknown field of an actuator", field, {"kp", "kv", "gain", "bias0", "bias1", "bias2", "gear", "delay", "forcerange", "ctrlrange"}, where);
 }
 

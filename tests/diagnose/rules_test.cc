@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "src/diagnose/search.h"
 #include "tests/tune/fixture.h"
 
@@ -31,6 +33,18 @@ TEST(RulesTest, OnlyEffectsOnOnePlaceContainEachOther) {
   // Beside the same other effect, and not beside another.
   EXPECT_TRUE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}), Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
   EXPECT_FALSE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}), Of(rig, {{"torque_limit", "motor"}, {"coulomb_friction", "arm"}})));
+  // In whichever order a pair was found.
+  EXPECT_TRUE(Contains(Of(rig, {{"stribeck_friction", "arm"}, {"dead_zone", "motor"}}), Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
+  EXPECT_FALSE(Contains(bias, bias));
+}
+
+TEST(RulesTest, ABiasIsNoFindingOnAPositionServo) {
+  // A servo of MuJoCo's own and one of the duty law; a voltage drive, and a drive of the position law whose logs need not use its gain.
+  for (const auto& [name, joint, finding] : {std::tuple{"joint", "joint", false}, {"xl330", "joint", false}, {"qube", "arm", true}, {"ak80", "joint", true}}) {
+    const Rig rig = LoadRig(name);
+    EXPECT_EQ(IsFinding({"torque_bias", joint}, *rig.model), finding) << name;
+    EXPECT_TRUE(IsFinding({"coulomb_friction", joint}, *rig.model)) << name;
+  }
 }
 
 TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {

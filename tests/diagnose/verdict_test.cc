@@ -50,6 +50,24 @@ TEST(VerdictTest, WhatStandsForAnotherCauseHelpsWindowsOrFreeRunsOnly) {
   EXPECT_EQ(VerdictOf(10, 3.5, -0.2), Verdict::kEffects);
 }
 
+// Found beside the second effect, another one does what the first one does: the pair is not told apart in its first effect.
+TEST(VerdictTest, APairsFirstEffectMayHaveRivals) {
+  Found found(10, 2);
+  SearchResult& result = found.result;
+  result.second.children.push_back(found.Make({{"cable_spring", "arm"}, {"command_delay", "motor"}}, 1.1));
+  result.chosen = result.second.children.front().get();
+  EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
+  result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"cable_spring", "arm"}}, 1.1));  // the same pair
+  result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"coulomb_friction", "arm"}}, 5));  // far behind
+  EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
+  result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"gravity_offset", "arm"}}, 1.1));
+  const Judgement judgement = Judge(result);
+  EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
+  EXPECT_TRUE(judgement.rivals.empty());
+  ASSERT_EQ(judgement.first_rivals.size(), 1u);
+  EXPECT_EQ(judgement.first_rivals[0]->effects.back().effect, "gravity_offset");
+}
+
 TEST(VerdictTest, ProbabilitiesAddUpToOne) {
   const Found found(10, 2);
   const Judgement judgement = Judge(found.result);

@@ -75,6 +75,19 @@ TEST_P(ShippedTest, MovesAsItsMjcfWhenDrivenByMuJoCoAlone) {
   EXPECT_LT(difference, 1e-9) << rig;
 }
 
+// A motor that becomes a plugin keeps every field that the experiment sets: else the diagnosis would never try what acts in the motor.
+TEST_P(ShippedTest, EveryPossibleEffectCanBeAdded) {
+  const Experiment experiment = ShippedExperiment(GetParam());
+  const auto model = MakeModel(experiment);
+  const auto uses = model->PossibleEffects();
+  ASSERT_TRUE(uses.ok());
+  EXPECT_FALSE(uses.value().empty());
+  for (const auto& use : uses.value()) {
+    const auto with = Model::Build(experiment, {use});
+    EXPECT_TRUE(with.ok()) << use.Text() << ": " << with.error().Text();
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Rigs, ShippedTest,
                          ::testing::Values("joint", "qube", "flexjoint", "flexlink", "xl330", "sts3032", "ak80",
                                            "qube_simurlacra", "qube_koopman", "flexlink_2dsfl"),

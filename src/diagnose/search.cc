@@ -4,150 +4,15 @@
 #include <cmath>
 #include <limits>
 
-#include "src/diagnose/refit.h"
 #include "src/diagnose/rules.h"
 
 namespace gapscope {
 
-bool AreRivals(const Candidate& a, const Candidate& b) { return std::max(a.held_out_floors, b.held_out_floors) < kAtNoise || !Convincing(Compare(b, a), kTold); }
-
 namespace {
 
-constexpr int kFinalIterations = 20;
-constexpr double kFinalTolerance = 2e-4;
 constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4, kExchangeRefits = 2;  // leaders of the screen that are refitted, beside the partners of the first two
 constexpr double kFirstShare = 0.5, kSecondShare = 0.8;  // of the time left, for the refits of a first and of a second effect
 constexpr double kFarOff = 20, kFound = 0.4;          // floors of the base model, and share of the excess removed, below which shorter windows are tried
-constexpr double kNearly = 0.6;                        // of the best one's gain
-
-// The best first. An effect with a parameter on its bound is stretched into something it is not: it comes after one that gains nearly as much.
-void SortByMisfit(const Candidate& parent, Candidates* children) {
-  std::stable_sort(children->begin(), children->end(), [](const auto& a, const auto& b) { return LogMisfit(*a) < LogMisfit(*b); });
-  if (children->empty() || !children->front()->at_bound) return;
-  const double most = Compare(parent, *children->front()).gain;
-  const auto sound = std::find_if(children->begin(), children->end(), [&](const auto& c) { return !c->at_bound && Compare(parent, *c).gain > kNearly * most; });
-  if (sound != children->end()) std::rotate(children->begin(), sound, sound + 1);
-}
-
-// Adds to `order` the visible partners of an effect, wherever they act.
-void AddPartners(const Layer& layer, const EffectUse& use, const Model& model, std::vector<std::size_t>* order) {
-  for (std::size_t i = 0; i < layer.screen.size(); ++i) {
-    const bool known = std::find(order->begin(), order->end(), i) != order->end();
-    if (!known && layer.screen[i].trial.visible && ArePartners(use, layer.screen[i].use, model)) order->push_back(i);
-  }
-}
-
-// Indices into the screen: the leaders by the score test, then the partners of the first two wherever they act.
-std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::size_t refits) {
-  std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < layer.screen.size() && order.size() < refits; ++i) {
-    if (layer.screen[i].trial.visible) order.push_back(i);
-  }
-  for (std::size_t leader = 0, leaders = std::min<std::size_t>(2, order.size()); leader < leaders; ++leader) AddPartners(layer, layer.screen[order[leader]].use, model, &order);
-  return order;
-}
-
-// What explained much alone beside the first effect is tried beside it too, from where it ended: where much is missing, a step of the score test says little.
-void AddStrongSingles(const SearchResult& found, const Candidate& parent, Layer* layer) {
-  constexpr Limits kStrong{.share = 0.3, .z = 3.0};
-  constexpr std::size_t kMost = 2, kPlace = 2;
-  // A partner of the first one mostly mends its shape: it is tried where more than a shape is missing.
-  const bool much_left = parent.held_out_floors > kUnknownFloors;
-  std::size_t added = 0;
-  for (const auto& child : found.first.children) {
-    if (added == kMost || child->held_out_blocks.empty() || child->effects == parent.effects || Contains(*child, parent) || Contains(parent, *child) ||
-        (!much_left && ArePartners(child->effects.back(), parent.effects.back(), *parent.model)) || !Convincing(Compare(*found.base, *child), kStrong)) {
-      continue;
-    }
-    const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back() && s.left_out.empty(); });
-    if (entry == layer->screen.end()) continue;
-    ++added;
-    Trial start{.drop = entry->trial.drop, .absorbed = entry->trial.absorbed, .values = entry->child.model->Nominal(), .dy = {}, .visible = true, .valid = true, .others = {}};
-    for (std::size_t i = 0; i < start.values.size(); ++i) {
-      const std::string& name = entry->child.model->parameters()[i].name;
-      if (name.starts_with(entry->use.Text() + ".")) start.values[i] = child->values[child->model->IndexOf(name)];
-    }
-    entry->trial.others.push_back(std::move(start));
-    const auto index = static_cast<std::size_t>(entry - layer->screen.begin());
-    if (std::find(layer->leaders.begin(), layer->leaders.end(), index) == layer->leaders.end()) {
-      layer->leaders.insert(layer->leaders.begin() + static_cast<std::ptrdiff_t>(std::min(kPlace, layer->leaders.size())), index);
-    }
-  }
-}
-
-// The bench with less time: what is left of the budget is for what comes later.
-Workbench Hurried(const Workbench& bench, double share) {
-  Workbench hurried = bench;
-  if (bench.deadline) {
-    const auto now = std::chrono::steady_clock::now();
-    hurried.deadline = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(share * (*bench.deadline - now));
-  }
-  return hurried;
-}
-
-// Refits the leaders that have not been, as far as the time goes: a taste of each in the screen's order, then the rest of each in the order of how those ended. However
-// little the time, all of them were looked at.
-void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Layer* layer) {
-  struct Tasted {
-    const Screened* entry;
-    std::unique_ptr<Candidate> child;
-  };
-  std::vector<Tasted> tasted;
-  for (; layer->refitted < layer->leaders.size() && !bench.Late(); ++layer->refitted) {
-    Screened& entry = layer->screen[layer->leaders[layer->refitted]];
-    say("trying " + entry.use.Text());
-    tasted.push_back({&entry, std::make_unique<Candidate>(std::move(entry.child))});
-    TasteChild(bench, parent, entry.trial, tasted.back().child.get());
-  }
-  std::stable_sort(tasted.begin(), tasted.end(), [](const Tasted& a, const Tasted& b) { return a.child->train_cost < b.child->train_cost; });
-  double best_cost = parent.train_cost;
-  for (const auto& other : layer->children) best_cost = std::min(best_cost, other->train_cost);
-  for (auto& [entry, child] : tasted) {
-    if (!bench.Late()) {
-      say("fitting " + entry->use.Text());
-      FinishChild(bench, parent, entry->use, entry->trial, best_cost, child.get());
-    }
-    best_cost = std::min(best_cost, child->train_cost);
-    ScoreCandidate(bench, child.get());
-    layer->children.push_back(std::move(child));
-  }
-}
-
-// `share` of the time that is left goes to finding the leader; its own last fit may take more. `found`: what singles did, for a second effect.
-void Explore(const Workbench& bench, const Model& base, Candidate& parent, std::size_t refits, double share, const Say& say, Layer* layer, const SearchResult* found = nullptr) {
-  const Workbench hurried = Hurried(bench, share);
-  const auto possible = parent.model->PossibleEffects();
-  if (!possible.ok()) return;
-  std::vector<EffectUse> uses;
-  for (const auto& use : possible.value()) {
-    if (IsFinding(use, base)) uses.push_back(use);
-  }
-  layer->screen = Screen(bench, parent, uses);
-  for (const auto& entry : layer->screen) {
-    if (!entry.left_out.empty()) say("leaving out " + entry.use.Text() + ", which " + entry.left_out);
-  }
-  layer->leaders = Leaders(*layer, *parent.model, refits);
-  if (found) AddStrongSingles(*found, parent, layer);
-  Refit(hurried, parent, say, layer);
-  if (layer->children.empty()) return;
-  SortByMisfit(parent, &layer->children);
-  // Who leads now need not be who led the screen.
-  AddPartners(*layer, layer->children.front()->effects.back(), *parent.model, &layer->leaders);
-  Refit(hurried, parent, say, layer);
-  SortByMisfit(parent, &layer->children);
-  ImitateLeader(hurried, parent, layer);
-  StartFromSimpler(hurried, layer);
-  SortByMisfit(parent, &layer->children);
-  // The leaders once more to the end.
-  for (std::size_t i = 0; i < std::min<std::size_t>(3, layer->children.size()) && !bench.Late(); ++i) {
-    Candidate& leader = *layer->children[i];
-    if (i == 0 && leader.held_out_floors > kRemains) VaryShape(hurried, parent, &leader);
-    if (i > 0 && (leader.train_cost > 1.5 * layer->children.front()->train_cost || hurried.Late())) break;
-    FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
-    ScoreCandidate(bench, &leader);
-  }
-  SortByMisfit(parent, &layer->children);
-}
 
 // Far from the logs, 1 s is long enough for a prediction to lose the motion altogether, and no step leads back. What windows of a third of it find is where the fits
 // over whole windows start from.
@@ -161,7 +26,7 @@ Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResul
   FitCandidate(near, &base, base.problem->Start(), kFinalIterations, kFinalTolerance);
   ScoreCandidate(near, &base);
   Layer found;
-  Explore(near, *base.model, base, kRefits, kShare, say, &found);
+  Explore(near, base, base, kRefits, kShare, say, &found, nullptr);
   auto& children = result->first.children;
   for (std::size_t i = 0; i < std::min(kMost, found.children.size()) && !bench.Late(); ++i) {
     const Candidate& start = *found.children[i];
@@ -180,36 +45,6 @@ Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResul
   return Ok();
 }
 
-// Share of what stood above the noise that is gone; nothing where hardly anything stood.
-double RemovedExcess(double floors_before, double floors_after) {
-  constexpr double kLeastExcess = 0.1;
-  return floors_before > 1 + kLeastExcess ? (floors_before - std::max(floors_after, 1.0)) / (floors_before - 1) : 0;
-}
-
-// The best child that is convincing over the parent, or a simpler one that is too when the richer is not convincingly better: one that it contains, or one with
-// fewer parameters. Where none is convincing, the best of all.
-Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& limits) {
-  if (layer.children.empty()) return nullptr;
-  const auto sound = [&](const auto& child) { return Convincing(Compare(parent, *child), limits); };
-  const auto first = std::find_if(layer.children.begin(), layer.children.end(), sound);
-  if (first == layer.children.end()) return layer.children.front().get();
-  Candidate* best = first->get();
-  for (const auto& child : layer.children) {
-    if (child.get() == best || child->held_out_blocks.empty() || !sound(child)) continue;
-    const Evidence more = Compare(*child, *best);
-    if (Contains(*best, *child)) {
-      const bool much = more.gain > kNestedShare * Compare(parent, *best).gain || RemovedExcess(child->held_out_floors, best->held_out_floors) > kNestedExcess;
-      const bool sure = more.held_out > kSureNested.share && more.z > kSureNested.z;
-      if (!sure && (!much || !Convincing(more, kNested))) best = child.get();
-    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
-      best = child.get();
-    } else if (IsLessLikely(*best, *child) && AreRivals(*best, *child)) {
-      best = child.get();
-    }
-  }
-  return best;
-}
-
 // A second effect worth naming: more than chance, more than a share of what the first left, and more than the first one's own shape, which is never quite the
 // real one: what is small and unlike effects explain equally well is that.
 bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
@@ -226,11 +61,11 @@ bool IsSecond(const SearchResult& found, const Candidate& single, const Candidat
 }
 
 // The other way round: what goes best with the pair's second effect? The first one was chosen while the second was missing, and may stand for another.
-void Exchange(const Workbench& bench, const Model& base, Candidate* second, const Say& say, SearchResult* result) {
+void Exchange(const Workbench& bench, const Candidate& base, Candidate* second, const Say& say, SearchResult* result) {
   say("looking for a better partner of " + second->Name());
   result->exchange = {};
   Layer& layer = result->exchange;
-  Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer);
+  Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer, nullptr);
   Candidate* other = Simplest(layer, *second, kSecond);
   if (!other || other->effects.back() == result->single->effects.front() || LogMisfit(*other) > LogMisfit(*result->chosen)) return;
   result->second_parent = result->single = second;
@@ -246,7 +81,7 @@ Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say
   result->second = {};
   result->exchange = {};
   result->second_parent = result->single;
-  Explore(bench, *base.model, *result->single, kSecondRefits, kSecondShare, say, &result->second, result);
+  Explore(bench, base, *result->single, kSecondRefits, kSecondShare, say, &result->second, &result->first.children);
   Candidate* pair = Simplest(result->second, *result->single, kSecond);
   if (!pair || !IsSecond(*result, *result->single, *pair)) return false;
   result->chosen = pair;
@@ -269,7 +104,7 @@ Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say
     result->single = result->chosen = alone;
     return first_time;
   }
-  if (!bench.Late()) Exchange(bench, *base.model, alone, say, result);
+  if (!bench.Late()) Exchange(bench, base, alone, say, result);
   return false;
 }
 
@@ -344,7 +179,7 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
 
   say("screening");
   // Where the base model is at the noise already, fewer refits show that nothing is missing.
-  Explore(bench, *base.model, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, kFirstShare, say, &result.first);
+  Explore(bench, base, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, kFirstShare, say, &result.first, nullptr);
   const auto& children = result.first.children;
   if (base.held_out_floors > kFarOff && (children.empty() || RemovedExcess(base.held_out_floors, children.front()->held_out_floors) < kFound)) {
     GS_RETURN_IF_ERROR(StartFromShortWindows(bench, say, &result));

@@ -2,8 +2,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_SEARCH_H_
 #define GAPSCOPE_DIAGNOSE_SEARCH_H_
 
-#include "src/diagnose/evidence.h"
-#include "src/diagnose/refit.h"
+#include "src/diagnose/explore.h"
 
 namespace gapscope {
 
@@ -19,13 +18,8 @@ struct SearchResult {
   bool budget_spent = false;
 };
 
-using Say = std::function<void(const std::string&)>;
-
 // `stop_if_uneven`: ends after the base model's refit when the split is a poor one. Errors: the base model cannot be simulated along the logs.
 Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
-
-// Two effects on the same parent that explain the logs equally well: `a` is not convincingly better than `b`.
-bool AreRivals(const Candidate& a, const Candidate& b);
 
 }  // namespace gapscope
 

@@ -189,14 +189,11 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   result.closed = result.refit > result.floor ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0) : 0;
   GS_ASSIGN(result.effects, DescribeEffects(found, judgement, bench.scales));
   if (result.verdict == Verdict::kAmbiguous) {
-    const auto add = [&](const EffectUse& use, const std::vector<const Candidate*>& rivals) {
-      if (rivals.empty()) return;
-      std::vector<std::string> group = {use.Text()};
-      for (const Candidate* rival : rivals) group.push_back(rival->effects.back().Text());
-      result.ambiguous.push_back(std::move(group));
-    };
-    add(chosen.effects.back(), judgement.rivals);
-    add(chosen.effects.front(), judgement.first_rivals);
+    for (const auto& group : judgement.groups) {
+      std::vector<std::string> names;
+      for (const EffectUse& use : group) names.push_back(use.Text());
+      result.ambiguous.push_back(std::move(names));
+    }
   }
   result.candidates = DescribeCandidates(found, judgement);
   result.seconds = DescribeSeconds(found);

@@ -40,6 +40,9 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = 
 // Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.
 bool MayBeRivals(const Candidate& a, const Candidate& b);
 
+// Whether the two are a late command and a late sensor: the same motion where that sensor is all that is measured, whatever their fits cost.
+bool IsSameDelay(const EffectUse& a, const EffectUse& b);
+
 // Whether `a` is the less likely of two that explain the logs equally well: gravity on a joint whose axis stands upright, where only a tilted rig would
 // feel it, beside a cable; two late sensors beside a late command and one.
 bool IsLessLikely(const Candidate& a, const Candidate& b);

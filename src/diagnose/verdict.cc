@@ -21,6 +21,21 @@ const Candidate* NearestRival(const Candidates& field, const Candidate& chosen) 
   return nearest;
 }
 
+// What could stand in the place of `use`, one of the chosen effects: rivals among `field`, and what is the same motion by definition.
+void AddGroup(const SearchResult& found, const Candidates& field, const EffectUse& use, std::vector<std::vector<EffectUse>>* groups) {
+  const Candidate& chosen = *found.chosen;
+  std::vector<EffectUse> group = {use};
+  for (const auto& rival : field) {
+    const bool same = std::is_permutation(rival->effects.begin(), rival->effects.end(), chosen.effects.begin(), chosen.effects.end());
+    if (!same && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) group.push_back(rival->effects.back());
+  }
+  for (const auto& other : found.first.screen) {
+    const bool known = std::find(group.begin(), group.end(), other.use) != group.end();
+    if (!known && found.one_signal && IsSameDelay(use, other.use)) group.push_back(other.use);
+  }
+  if (group.size() > 1) groups->push_back(std::move(group));
+}
+
 // Probability that the verdict is right as a whole: logistic in what the banks of twin cases of seeds 910, 911 and 912 showed to matter (scripts/blind/calibrate.py;
 // 179 cases, so the weights are rounded).
 double Confidence(Verdict verdict, const VerdictEvidence& e, std::size_t effects) {
@@ -66,23 +81,17 @@ Judgement Judge(const SearchResult& found) {
     }
   }
 
-  const auto rivals_in = [&](const Candidates& candidates) {
-    std::vector<const Candidate*> rivals;
-    for (const auto& rival : candidates) {
-      const bool same = std::is_permutation(rival->effects.begin(), rival->effects.end(), chosen.effects.begin(), chosen.effects.end());
-      if (!same && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) rivals.push_back(rival.get());
-    }
-    return rivals;
-  };
-  if (&chosen != &base) result.rivals = rivals_in(field);
-  if (pair) result.first_rivals = rivals_in(found.exchange.children);
+  if (&chosen != &base) {
+    AddGroup(found, field, chosen.effects.back(), &result.groups);
+    if (pair) AddGroup(found, found.exchange.children, chosen.effects.front(), &result.groups);
+  }
   const auto [less, more] = std::minmax(e.removed, e.free_run_removed);
   if (e.floors_left > kUnknownFloors && more < kUnknownRemoved && less < kUnknownRemovedInBoth) {
     result.verdict = Verdict::kUnknown;
   } else if (&chosen == &base) {
     result.verdict = Convincing(Compare(*found.nominal, base), kRetuned) ? Verdict::kParameters : Verdict::kNone;
   } else {
-    result.verdict = result.rivals.empty() && result.first_rivals.empty() ? Verdict::kEffects : Verdict::kAmbiguous;
+    result.verdict = result.groups.empty() ? Verdict::kEffects : Verdict::kAmbiguous;
   }
   result.probability = Confidence(result.verdict, e, chosen.effects.size());
   if (found.budget_spent) result.probability *= 0.8;

@@ -10,8 +10,7 @@ namespace gapscope {
 struct Judgement {
   Verdict verdict = Verdict::kNone;
   double probability = 0;                      // of the verdict as a whole
-  std::vector<const Candidate*> rivals;        // of the last effect of the chosen one, when ambiguous
-  std::vector<const Candidate*> first_rivals;  // likewise of a pair's first effect
+  std::vector<std::vector<EffectUse>> groups;  // ambiguous: one of the chosen effects and what could stand in its place
   std::vector<const Candidate*> explanations;  // the base and the single effects ...
   std::vector<double> probabilities;           // ... and the probability of each, adding up to one
   VerdictEvidence evidence;

@@ -63,9 +63,22 @@ TEST(VerdictTest, APairsFirstEffectMayHaveRivals) {
   result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"gravity_offset", "arm"}}, 1.1));
   const Judgement judgement = Judge(result);
   EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
-  EXPECT_TRUE(judgement.rivals.empty());
-  ASSERT_EQ(judgement.first_rivals.size(), 1u);
-  EXPECT_EQ(judgement.first_rivals[0]->effects.back().effect, "gravity_offset");
+  EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"cable_spring", "arm"}, {"gravity_offset", "arm"}}}));
+}
+
+// Where one sensor is all that is measured, a late sensor and a late command are the same motion, whatever their fits cost.
+TEST(VerdictTest, OneSignalCannotTellALateSensorFromALateCommand) {
+  Found found(10, 2);
+  SearchResult& result = found.result;
+  result.first.children.push_back(found.Make({{"sensor_delay", "arm_rad"}}, 1.1));
+  result.first.children.push_back(found.Make({{"command_delay", "motor"}}, 1.5));
+  result.first.screen.push_back({.use = {"command_delay", "motor"}, .trial = {}, .child = {}, .left_out = {}});
+  result.single = result.chosen = result.first.children[1].get();
+  EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
+  result.one_signal = true;
+  const Judgement judgement = Judge(result);
+  EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
+  EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}}}));
 }
 
 TEST(VerdictTest, ProbabilitiesAddUpToOne) {

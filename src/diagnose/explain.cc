@@ -24,7 +24,10 @@ std::string Reason(const Candidate& candidate, const SearchResult& found) {
   if (std::find(chosen.effects.begin(), chosen.effects.end(), candidate.effects.front()) != chosen.effects.end()) {
     return fmt::format("accepted: removes {:.1f} % of the held-out cost ({:.1f} standard errors){}", 100 * gain.held_out, gain.z, converged);
   }
-  if (!Convincing(gain, FirstLimits(base))) return fmt::format("removes {:.2f} % of the held-out cost ({:.1f} standard errors): not more than chance{}", 100 * gain.held_out, gain.z, converged);
+  if (!Convincing(gain, FirstLimits(base))) {
+    const char* why = Convincing(gain, kFirst) ? "too little where the base model is near the noise" : "not more than chance";
+    return fmt::format("removes {:.2f} % of the held-out cost ({:.1f} standard errors): {}{}", 100 * gain.held_out, gain.z, why, converged);
+  }
   const Evidence behind = Compare(candidate, chosen);
   return fmt::format("removes {:.1f} % of the held-out cost, but {} removes {:.1f} % of what it leaves ({:.1f} standard errors){}", 100 * gain.held_out, chosen.Name(), 100 * behind.held_out,
                      behind.z, converged);

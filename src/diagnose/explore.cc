@@ -156,7 +156,7 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& l
       const bool much = more.gain > kNestedShare * Compare(parent, *best).gain || RemovedExcess(child->held_out_floors, best->held_out_floors) > kNestedExcess;
       const bool sure = more.held_out > kSureNested.share && more.z > kSureNested.z;
       if (!sure && (!much || !Convincing(more, kNested))) best = child.get();
-    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
+    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && !Convincing(more, kNested) && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
     } else if (IsLessLikely(*best, *child) && AreRivals(*best, *child)) {
       best = child.get();

@@ -8,9 +8,11 @@ namespace gapscope {
 
 // Thresholds, set on banks of twin cases (scripts/blind_check) and judged on others: docs/diagnosis.md, docs/results_diagnose.md.
 inline constexpr Limits kFirst{.share = 0.01, .z = 2.5};       // the first effect over the refitted base model
-inline constexpr Limits kFirstAtFloor{.share = 0.06, .z = 3.0};  // the same where the base model is at the noise already
+inline constexpr Limits kFirstNearFloor{.share = 0.06, .z = 3.0};  // the same where the base model is near the noise (kUnknownFloors),
+inline constexpr Limits kFirstAtFloor{.share = 0.25, .z = 3.0};  // and where it is at the noise (kAtNoise): what is left there is the noise's own colour
 inline constexpr double kRemains = 1.25;                       // residual over noise below which nothing more is sought
 inline constexpr Limits kSecond{.share = 0.06, .z = 3.0};      // a second effect over the first
+inline constexpr double kSecondTrain = 0.1;                    // that much of the training cost too: a speck of an effect can move what the training logs leave open,
 inline constexpr double kSecondExcess = 0.5;                   // and of what the first left above the noise,
 inline constexpr Limits kSureSecond{.share = 0.3, .z = 8.5};   // or beyond doubt: what else is missing need not be small;
 inline constexpr double kSecondOfGap = 0.025;                  // and of the base model's residual: the first effect's shape is never quite the real one;
@@ -28,7 +30,7 @@ inline constexpr double kTwoAtOnce = 0.8;                      // share of the e
 inline constexpr Limits kRetuned{.share = 0.05, .z = 2.5};     // the refitted base model over the nominal one
 
 // What a first effect must gain over this base model.
-inline const Limits& FirstLimits(const Candidate& base) { return base.held_out_floors > kRemains ? kFirst : kFirstAtFloor; }
+inline const Limits& FirstLimits(const Candidate& base) { return base.held_out_floors > kUnknownFloors ? kFirst : base.held_out_floors > kAtNoise ? kFirstNearFloor : kFirstAtFloor; }
 // Whether the effect can be a finding on a base model (without effects, which may turn a plain motor into a plugin): a bias on a servo equals a zero offset, viscous friction is a parameter.
 bool IsFinding(const EffectUse& use, const Model& base);
 // Whether the effects are known to be confused with each other, at places that are one.

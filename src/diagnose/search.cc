@@ -48,10 +48,11 @@ Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResul
 // A second effect worth naming: more than chance, more than a share of what the first left, and more than the first one's own shape, which is never quite the
 // real one: what is small and unlike effects explain equally well is that.
 bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
-  if (!Convincing(Compare(single, pair), kSecond)) return false;
+  const Evidence more = Compare(single, pair);
+  if (!Convincing(more, kSecond) || more.train < kSecondTrain) return false;
   const bool shape = IsShape(pair.effects.back(), single.effects.back());
   const double removed = RemovedExcess(single.held_out_floors, pair.held_out_floors), typically = RemovedExcess(TypicalFloors(single), TypicalFloors(pair));
-  if (std::max(removed, typically) < kSecondExcess && (shape || !Convincing(Compare(single, pair), kSureSecond))) return false;
+  if (std::max(removed, typically) < kSecondExcess && (shape || !Convincing(more, kSureSecond))) return false;
   const double size = std::sqrt(std::max(0.0, std::pow(single.held_out_floors, 2) - std::pow(pair.held_out_floors, 2))) / found.base->held_out_floors;
   const bool told = std::none_of(found.second.children.begin(), found.second.children.end(), [&](const auto& rival) {
     return rival.get() != &pair && !rival->held_out_blocks.empty() && !Contains(*rival, pair) && !Contains(pair, *rival) && !ArePartners(rival->effects.back(), pair.effects.back(), *single.model) &&

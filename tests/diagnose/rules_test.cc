@@ -80,8 +80,10 @@ TEST(RulesTest, ExplanationsAtTheNoiseAreRivals) {
 TEST(RulesTest, AFirstEffectNeedsMoreWhereTheBaseModelIsAtTheNoise) {
   Candidate base;
   base.held_out_floors = 0.95;
+  EXPECT_GT(FirstLimits(base).share, 0.2);
+  base.held_out_floors = 1.5;
   EXPECT_GT(FirstLimits(base).share, 0.05);
-  base.held_out_floors = 2;
+  base.held_out_floors = 3;
   EXPECT_LT(FirstLimits(base).share, 0.02);
 }
 

@@ -44,13 +44,13 @@ TEST(JointModelTest, HasNoGravityLoad) {
   }
 }
 
-// As experiment.yaml sets a PD run.
+// As experiment.yaml sets a PD run: live parameters of the motor plugin.
 void SetGains(mjModel* m, double kp, double kd) {
-  const int motor = Actuator(*m, "motor"), velocity = Actuator(*m, "motor.velocity");
-  m->actuator_gainprm[motor * mjNGAIN] = kp;
-  m->actuator_biasprm[motor * mjNBIAS + 1] = -kp;
-  m->actuator_biasprm[motor * mjNBIAS + 2] = -kd;
-  m->actuator_gainprm[velocity * mjNGAIN] = kd;
+  for (const auto& [name, value] : {std::pair{"motor.kp", kp}, std::pair{"motor.kd", kd}}) {
+    const int id = mj_name2id(m, mjOBJ_NUMERIC, name);
+    ASSERT_GE(id, 0) << name;
+    m->numeric_data[m->numeric_adr[id]] = value;
+  }
 }
 
 TEST(Ak80ModelTest, FollowsThePendulumEquationUnderTorqueAndUnderPd) {

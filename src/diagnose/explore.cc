@@ -43,7 +43,7 @@ void AddStrongSingles(const Candidate& base, const Candidates& singles, const Ca
     const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back() && s.left_out.empty(); });
     if (entry == layer->screen.end()) continue;
     ++added;
-    Trial start{.drop = entry->trial.drop, .absorbed = entry->trial.absorbed, .values = entry->child.model->Nominal(), .dy = {}, .visible = true, .valid = true, .others = {}};
+    Trial start{.drop = entry->trial.drop, .absorbed = entry->trial.absorbed, .trial = {}, .values = entry->child.model->Nominal(), .dy = {}, .visible = true, .valid = true, .others = {}};
     for (std::size_t i = 0; i < start.values.size(); ++i) {
       const std::string& name = entry->child.model->parameters()[i].name;
       if (name.starts_with(entry->use.Text() + ".")) start.values[i] = child->values[child->model->IndexOf(name)];

@@ -45,42 +45,58 @@ Trial BestOfScan(std::vector<Trial> trials, int scanned) {
   return best;
 }
 
-}  // namespace
-
-Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, const FitProblem& parent, const FitPoint& point, const Snapshot& base) {
-  std::vector<Trial> best;
+// The trials of one effect against one snapshot.
+struct Tests {
+  std::vector<Trial> best;  // one per scanned value; without a scan, one
+  int scan = -1;            // index of the scanned parameter in the model
   bool visible = false;
-  int scan = -1;
+};
+
+void Test(Candidate& child, const std::vector<PlacedParameter>& placed, const std::vector<std::vector<double>>& trials, const FitProblem& parent, const FitPoint& point, const Snapshot& base,
+          Tests* tests) {
   const Model& model = *child.model;
-  const auto placed = model.EffectParameters(use, bench.scales);
-  if (!placed.ok()) return {};
   const std::vector<double> nominal = model.Nominal();
-  for (const auto& trial : Trials(placed.value())) {
+  tests->best.clear();
+  for (const auto& trial : trials) {
     std::vector<double> tried = nominal;
-    for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed.value()[i].name)] = trial[i];
+    for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed[i].name)] = trial[i];
     const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
     if (!test.valid) continue;
     constexpr double kAllAbsorbed = 0.999, kPromises = 0.05;  // little of a column may be its own and yet be what is missing
-    visible = visible || test.absorbed < kAllAbsorbed || test.drop > kPromises * base.cost;
-    int scanned = -1;
+    tests->visible = tests->visible || test.absorbed < kAllAbsorbed || test.drop > kPromises * base.cost;
     for (std::size_t i = 0; i < trial.size(); ++i) {
-      const PlacedParameter& p = placed.value()[i];
-      tried[model.IndexOf(p.name)] = StepTo(p, trial[i], test.scale);
-      if (p.trials.size() >= kScan) scanned = model.IndexOf(p.name);
+      tried[model.IndexOf(placed[i].name)] = StepTo(placed[i], trial[i], test.scale);
+      if (placed[i].trials.size() >= kScan) tests->scan = model.IndexOf(placed[i].name);
     }
-    Trial found{.drop = test.drop / base.cost, .absorbed = test.absorbed, .values = std::move(tried), .dy = test.dy, .valid = true, .others = {}};
-    // One per scanned value; without a scan, one.
-    const auto same = std::find_if(best.begin(), best.end(), [&](const Trial& t) { return scanned < 0 || t.values[scanned] == found.values[scanned]; });
-    if (same == best.end()) {
-      best.push_back(std::move(found));
+    Trial found{.drop = test.drop / base.cost, .absorbed = test.absorbed, .trial = trial, .values = std::move(tried), .dy = test.dy, .valid = true, .others = {}};
+    const auto same = std::find_if(tests->best.begin(), tests->best.end(), [&](const Trial& t) { return tests->scan < 0 || t.values[tests->scan] == found.values[tests->scan]; });
+    if (same == tests->best.end()) {
+      tests->best.push_back(std::move(found));
     } else if (found.drop > same->drop) {
       *same = std::move(found);
     }
-    scan = scanned;
   }
-  if (best.empty()) return {};
-  Trial result = scan < 0 ? std::move(best.front()) : BestOfScan(std::move(best), scan);
-  result.visible = visible;
+}
+
+}  // namespace
+
+Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, FitProblem& parent, const FitPoint& point, const Snapshot& base) {
+  const auto placed = child.model->EffectParameters(use, bench.scales);
+  if (!placed.ok()) return {};
+  constexpr std::size_t kFewWindows = 8, kThin = 4;
+  std::vector<std::vector<double>> trials = Trials(placed.value());
+  Tests tests;
+  if (std::any_of(placed.value().begin(), placed.value().end(), [](const PlacedParameter& p) { return p.trials.size() >= kScan; })) {
+    Test(child, placed.value(), trials, parent, point, parent.Thin(base, point, std::max(kFewWindows, parent.windows() / kThin)), &tests);
+    if (tests.best.empty()) return {};
+    const Trial best = BestOfScan(std::move(tests.best), tests.scan);
+    trials = {best.trial};
+    for (const Trial& other : best.others) trials.push_back(other.trial);
+  }
+  Test(child, placed.value(), trials, parent, point, base, &tests);
+  if (tests.best.empty()) return {};
+  Trial result = tests.scan < 0 ? std::move(tests.best.front()) : BestOfScan(std::move(tests.best), tests.scan);
+  result.visible = tests.visible;
   return result;
 }
 

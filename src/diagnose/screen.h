@@ -12,6 +12,7 @@ inline constexpr std::size_t kScan = 8;  // trial values that make a scan
 struct Trial {
   double drop = 0;              // share of the parent's cost that the best step promises
   double absorbed = 1;          // share of the column that the parent can imitate, at that trial
+  std::vector<double> trial;    // the trial value of each of the effect's parameters
   std::vector<double> values;   // the child's parameters to start from
   Eigen::VectorXd dy;           // and how the parent's own coordinates answer
   bool visible = false;         // some trial value leaves a column that the parent cannot imitate
@@ -19,8 +20,8 @@ struct Trial {
   std::vector<Trial> others;    // the next best at other values of a scanned parameter (the number of periods): valleys of their own
 };
 
-// Tries the values of `use`, the last effect of `child`, against `base`: a snapshot of `parent` at `point`, whose parameters are `values`.
-Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, const FitProblem& parent, const FitPoint& point, const Snapshot& base);
+// Tries the values of `use`, the last effect of `child`, against `base`: a snapshot of `parent` at `point`. A scan tests all its values on few windows, the best of them on all.
+Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, FitProblem& parent, const FitPoint& point, const Snapshot& base);
 
 struct Screened {
   EffectUse use;

@@ -153,6 +153,11 @@ Linearization FitProblem::Reduce(const FitPoint& point, const Snapshot& snapshot
     const FitWindow& window = windows_[w];
     const Eigen::VectorXd& state = point.states[w];
     Part& part = parts[w];
+    if (snapshot.residuals[w].size() == 0) {
+      part = {.cost = 0, .hessian = Eigen::MatrixXd::Zero(n, n), .gain = Eigen::MatrixXd::Zero(state.size(), n), .gradient = Eigen::VectorXd::Zero(n),
+              .state_step = Eigen::VectorXd::Zero(state.size()), .blocks = {}};
+      return;
+    }
     part.cost = WindowCost(snapshot.residuals[w], window, state);
     worker.residual = snapshot.residuals[w];
     worker.jacobian = snapshot.jacobians[w];
@@ -275,6 +280,23 @@ Snapshot FitProblem::Capture(const FitPoint& point, double step) {
   return snapshot;
 }
 
+Snapshot FitProblem::Thin(const Snapshot& snapshot, const FitPoint& point, std::size_t count) {
+  GS_CHECK(std::isinf(huber_threshold_));
+  if (!snapshot.valid || count >= windows_.size()) return snapshot;
+  Snapshot thin;
+  thin.residuals.resize(windows_.size());
+  thin.jacobians.resize(windows_.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t w = i * windows_.size() / count;
+    thin.residuals[w] = snapshot.residuals[w];
+    thin.jacobians[w] = snapshot.jacobians[w];
+  }
+  thin.valid = true;
+  thin.linearization = Reduce(point, thin, false);
+  thin.cost = thin.linearization.cost;
+  return thin;
+}
+
 ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const FitPoint& parent_point, const Snapshot& base) {
   GS_CHECK(parent.windows_.size() == windows_.size());
   const Eigen::Index n = base.linearization.gradient.size();
@@ -287,6 +309,10 @@ ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& paren
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    if (base.residuals[w].size() == 0) {
+      parts[w] = {.cross = Eigen::VectorXd::Zero(n), .valid = true};
+      return;
+    }
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
     if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) return;

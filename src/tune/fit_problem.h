@@ -84,7 +84,7 @@ struct Linearization {
 
 // Residuals and Jacobian of a point: for normal equations (FitProblem::Reduce), or to test what one more column would explain (TestColumn).
 struct Snapshot {
-  std::vector<Eigen::VectorXd> residuals;   // per window, weighted
+  std::vector<Eigen::VectorXd> residuals;   // per window, weighted; empty: left out (Thin)
   std::vector<Eigen::MatrixXd> jacobians;   // per window: y, then the window's states
   bool valid = false;                       // false: the point cannot be simulated
   Linearization linearization;              // of Capture
@@ -153,6 +153,8 @@ class FitProblem {
 
   // Snapshot of a point.
   Snapshot Capture(const FitPoint& point, double step);
+  // The same with `count` evenly chosen windows only: a cheaper test. Plain squares only.
+  Snapshot Thin(const Snapshot& snapshot, const FitPoint& point, std::size_t count);
   // The change of residuals from `base` (a snapshot of `parent` at `parent_point`, over the same windows) to this problem at `point`, as a column.
   ColumnTest TestColumn(const FitPoint& point, const FitProblem& parent, const FitPoint& parent_point, const Snapshot& base);
   // A parent's solution as a point of this problem, whose model has more parameters: they start from `values` (this model's parameters).

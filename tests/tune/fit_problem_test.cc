@@ -338,5 +338,33 @@ TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
   EXPECT_LT(drop(0.001), 0.01);  // earlier than the shift already is
 }
 
+// Windows 0 and 2 of four: their costs add up, and they too ask for the column.
+TEST(TestColumnTest, FewWindowsAreTheirShareOfTheCost) {
+  const Rig truth = LoadRig("flexlink", {"coulomb_friction@hub"}), rig = LoadRig("flexlink");
+  const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
+  const std::vector<Recording> logs = {MakeLog(truth, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), command, 4, 0.004, 2e-4, 1)};
+  ThreadPool pool(2);
+  const FitOptions options{.free = {rig.Index("hub.inertia")}, .time_step_s = 0.004};
+  FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
+  ASSERT_EQ(parent.windows(), 4u);
+  const FitPoint start = parent.Start();  // where neither the states nor the parameters are pulled
+  const Snapshot first = parent.Capture(start, 0.01);
+  const std::vector<double> blocks = parent.BlockCosts(start);
+  ASSERT_EQ(blocks.size(), 8u);
+  EXPECT_NEAR(parent.Thin(first, start, 2).cost, blocks[0] + blocks[1] + blocks[4] + blocks[5], 1e-6 * first.cost);
+  EXPECT_DOUBLE_EQ(parent.Thin(first, start, 4).cost, first.cost);
+  const FitPoint point = Solve(parent, start, {.tolerance = 1e-5}).point;
+  const Snapshot base = parent.Capture(point, 0.01), thin = parent.Thin(base, point, 2);
+  ASSERT_TRUE(thin.valid);
+  FitOptions of_child = options;
+  of_child.free = {truth.Index("hub.inertia"), truth.Index("coulomb_friction@hub.friction_n_m")};
+  FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
+  const FitPoint at = child.FromParent(parent, point, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), {});
+  const ColumnTest of_all = child.TestColumn(at, parent, point, base), of_few = child.TestColumn(at, parent, point, thin);
+  ASSERT_TRUE(of_few.valid);
+  EXPECT_GT(of_few.drop, 0.3 * thin.cost);
+  EXPECT_LT(of_few.drop, of_all.drop);
+}
+
 }  // namespace
 }  // namespace gapscope::testing

@@ -62,10 +62,8 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   return candidate;
 }
 
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, double rival_cost) {
-  SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .deadline = bench.deadline};
-  constexpr int kFairTry = 4;
-  if (rival_cost > 0) options.hopeless = [=](double cost, int iteration) { return iteration >= kFairTry && cost > kFarBehind * rival_cost; };
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, GiveUp give_up) {
+  const SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .hopeless = std::move(give_up), .deadline = bench.deadline};
   const SolveResult solved = Solve(*candidate->problem, start, options);
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;

@@ -51,10 +51,9 @@ struct Workbench {
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
-// A fit is given up when, after a fair try, it costs this much more than the best one.
-inline constexpr double kFarBehind = 3;
-// Fits from `start` on the training logs. A fit that after a fair try still is far behind `rival_cost` is given up (0: never).
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, double rival_cost = 0);
+using GiveUp = std::function<bool(double cost, int iteration)>;
+// Fits from `start` on the training logs, until `give_up` says to.
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, GiveUp give_up = {});
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
 void PolishCandidate(const Workbench& bench, Candidate* candidate);
 // Fills the blocks and the held-out fields.

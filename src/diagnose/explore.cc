@@ -132,6 +132,8 @@ void Explore(const Workbench& bench, const Candidate& base, Candidate& parent, s
     Candidate& leader = *layer->children[i];
     if (i == 0 && leader.held_out_floors > kRemains) VaryShape(hurried, parent, &leader);
     if (i > 0 && (leader.train_cost > 1.5 * layer->children.front()->train_cost || hurried.Late())) break;
+    // Where much is missing the last digits tell nothing: a second effect moves them all.
+    if (leader.converged && leader.held_out_floors > kUnknownFloors) continue;
     FitCandidate(bench, &leader, leader.point, kFinalIterations, kFinalTolerance);
     ScoreCandidate(bench, &leader);
   }

@@ -13,13 +13,31 @@ constexpr int kFirstIterations = 14, kTasteIterations = 4;
 constexpr double kFirstTolerance = 2e-3;
 constexpr double kWorthImitating = 0.8;  // a leader that leaves less than this share of its parent's cost
 
+constexpr double kFarBehind = 3;  // times the best cost, at which a fit is given up after a fair try
+
+GiveUp FarBehind(double best_cost) {
+  constexpr int kFairTry = 4;
+  return [=](double cost, int iteration) { return iteration >= kFairTry && cost > kFarBehind * best_cost; };
+}
+
+// Gives up where the better of the last two gains, made again in each iteration left, would not lead below `known`.
+GiveUp TooSlow(double known, int iterations) {
+  double last = std::numeric_limits<double>::infinity(), gained = last;
+  return [=](double cost, int iteration) mutable {
+    const double gain = last - cost, best = std::max(gain, gained);
+    last = cost;
+    gained = gain;
+    return iteration > 1 && cost - best * (iterations - iteration) > known;
+  };
+}
+
 // A fit from a start of its own, kept if it ends below the candidate's.
 void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance) {
   if (!std::isfinite(candidate->problem->Cost(start))) return;
   const FitPoint before = candidate->point;
   const double cost = candidate->train_cost;
   const bool converged = candidate->converged;
-  FitCandidate(bench, candidate, start, iterations, tolerance);
+  FitCandidate(bench, candidate, start, iterations, tolerance, TooSlow(cost, iterations));
   if (candidate->train_cost < cost) return;
   candidate->point = before;
   candidate->train_cost = cost;
@@ -51,8 +69,8 @@ void TasteChild(const Workbench& bench, const Candidate& parent, const Trial& tr
   }
 }
 
-void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child) {
-  if (!child->converged && !(child->train_cost > kFarBehind * rival_cost)) FitCandidate(bench, child, child->point, kFirstIterations, kFirstTolerance, rival_cost);
+void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double best_cost, Candidate* child) {
+  if (!child->converged && !(child->train_cost > kFarBehind * best_cost)) FitCandidate(bench, child, child->point, kFirstIterations, kFirstTolerance, FarBehind(best_cost));
   if (child->train_cost <= parent.train_cost * 1.0005 || bench.Late()) return;
   const auto placed = child->model->EffectParameters(use, bench.scales);
   if (!placed.ok()) return;

@@ -20,8 +20,8 @@ struct Layer {
 
 // A few Jacobians of `child`, a parent's model and one effect more, from the screen's own steps: from each where a scan left several.
 void TasteChild(const Workbench& bench, const Candidate& parent, const Trial& trial, Candidate* child);
-// Goes on from there, and where that ends above the parent from hardly any effect. `rival_cost`: see FitCandidate.
-void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double rival_cost, Candidate* child);
+// Goes on from there, and where that ends above the parent from hardly any effect. Given up where it stays far above `best_cost`.
+void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double best_cost, Candidate* child);
 // Another start for a candidate: these values, with states from the logs.
 void StartFromValues(const Workbench& bench, const std::vector<double>& values, Candidate* candidate);
 // Rivals of the layer's first start anew where they best imitate it, and are scored.

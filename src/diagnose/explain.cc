@@ -39,11 +39,7 @@ namespace {
 std::string ExplainEffects(const Diagnosis& d) {
   std::string text;
   for (const auto& found : d.effects) {
-    text += fmt::format("{} explains {:.0f} % of the gap that closes", found.use.Text(), 100 * found.share_of_gap);
-    const auto& all = Catalogue();
-    const auto effect = std::find_if(all.begin(), all.end(), [&](const Effect& e) { return e.name == found.use.effect; });
-    if (effect != all.end()) text += " (" + effect->meaning + "; signature: " + effect->signature + ")";
-    text += ". ";
+    text += fmt::format("{} explains {:.0f} % of the gap that closes ({}; signature: {}). ", found.use.Text(), 100 * found.share_of_gap, found.effect->meaning, found.effect->signature);
   }
   return text + fmt::format("With {} the held-out error is {:.3g}, {:.1f} times the noise", d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);
 }

@@ -72,7 +72,8 @@ bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
   return false;
 }
 
-bool IsShape(const EffectUse& second, const EffectUse& first) {
+bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model) {
+  if (mj_name2id(&model.compiled(), mjOBJ_ACTUATOR, first.on.c_str()) >= 0) return false;  // a drive whose gain differs by direction does not stick
   const auto any = [](const std::string& effect, std::initializer_list<const char*> names) { return std::find(names.begin(), names.end(), effect) != names.end(); };
   return any(first.effect, {"coulomb_friction", "stribeck_friction", "load_friction", "direction_asymmetry"}) && any(second.effect, {"joint_compliance", "backlash"});
 }

@@ -36,7 +36,7 @@ bool IsFinding(const EffectUse& use, const Model& base);
 // Whether the effects are known to be confused with each other, at places that are one.
 bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
 // Whether `second` may stand for what the model of `first` leaves out of the real effect: dry friction gives way elastically before it slides.
-bool IsShape(const EffectUse& second, const EffectUse& first);
+bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model);
 // Whether `richer` can do all that `simpler` does (same other effects, in any order); `exactly`: not only nearly, as far as its bounds go.
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = false);
 // Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.

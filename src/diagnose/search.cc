@@ -50,7 +50,7 @@ Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResul
 bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
   const Evidence more = Compare(single, pair);
   if (!Convincing(more, kSecond) || more.train < kSecondTrain) return false;
-  const bool shape = IsShape(pair.effects.back(), single.effects.back());
+  const bool shape = IsShape(pair.effects.back(), single.effects.back(), *single.model);
   const double removed = RemovedExcess(single.held_out_floors, pair.held_out_floors), typically = RemovedExcess(TypicalFloors(single), TypicalFloors(pair));
   if (std::max(removed, typically) < kSecondExcess && (shape || !Convincing(more, kSureSecond))) return false;
   const double size = std::sqrt(std::max(0.0, std::pow(single.held_out_floors, 2) - std::pow(pair.held_out_floors, 2))) / found.base->held_out_floors;

@@ -201,6 +201,11 @@ Result<std::vector<EffectUse>> Model::PossibleEffects() const {
   return AllUses(structure);
 }
 
+Result<const Effect*> Model::EffectAt(const EffectUse& use) const {
+  GS_ASSIGN(const Structure structure, Structure::Load(experiment_));
+  return &EffectOf(use, structure);
+}
+
 Result<std::vector<PlacedParameter>> Model::EffectParameters(const EffectUse& use, const ScaleTable& scales) const {
   GS_ASSIGN(const Structure structure, Structure::Load(experiment_));
   return PlacedParameters(use, structure, scales);

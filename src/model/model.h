@@ -61,6 +61,8 @@ class Model {
   // "cable_spring@arm" ... as uses in this experiment's structure (see ParseEffectUse); all uses that make sense in it.
   Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& texts) const;
   Result<std::vector<EffectUse>> PossibleEffects() const;
+  // The catalogue's entry of an effect there: one name may act differently on motors and joints.
+  Result<const Effect*> EffectAt(const EffectUse& use) const;
   // The parameters that an effect would add.
   Result<std::vector<PlacedParameter>> EffectParameters(const EffectUse& use, const ScaleTable& scales) const;
 

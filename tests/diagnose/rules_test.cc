@@ -58,10 +58,13 @@ TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {
 }
 
 TEST(RulesTest, ComplianceMayBeFrictionsElasticGive) {
-  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "arm"}));
-  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"stribeck_friction", "pendulum"}));
-  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"torque_bias", "arm"}));
-  EXPECT_FALSE(IsShape({"cable_spring", "arm"}, {"coulomb_friction", "arm"}));
+  const Rig rig = LoadRig("qube");
+  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "arm"}, *rig.model));
+  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"stribeck_friction", "pendulum"}, *rig.model));
+  EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"direction_asymmetry", "arm"}, *rig.model));
+  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"direction_asymmetry", "motor"}, *rig.model));
+  EXPECT_FALSE(IsShape({"joint_compliance", "arm"}, {"torque_bias", "arm"}, *rig.model));
+  EXPECT_FALSE(IsShape({"cable_spring", "arm"}, {"coulomb_friction", "arm"}, *rig.model));
 }
 
 // Below the noise there is nothing left to tell two explanations apart by.

@@ -175,6 +175,15 @@ TEST(DirectionAsymmetryTest, OfTheVoltageIsTheBaseModelOnScaledVoltages) {
   EXPECT_EQ(placed.value()[1].low, placed.value()[1].high);
 }
 
+// One name, two effects: what is told of it depends on the place.
+TEST(CatalogueTest, AsymmetryOfAJointIsFrictionAndOfAMotorItsGain) {
+  const auto model = MakeModel(ShippedExperiment("qube"));
+  const auto of_joint = model->EffectAt({"direction_asymmetry", "arm"}), of_motor = model->EffectAt({"direction_asymmetry", "motor"});
+  ASSERT_TRUE(of_joint.ok() && of_motor.ok());
+  EXPECT_NE(of_joint.value()->meaning.find("friction"), std::string::npos);
+  EXPECT_NE(of_motor.value()->meaning.find("gain"), std::string::npos);
+}
+
 TEST(CatalogueTest, EveryEffectFindsAPlaceSomewhere) {
   std::set<std::string> placed, all;
   for (const char* rig : {"joint", "qube", "flexjoint", "flexlink", "xl330"}) {

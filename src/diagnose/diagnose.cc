@@ -103,7 +103,7 @@ Result<std::vector<FoundEffect>> DescribeEffects(const SearchResult& found, cons
   for (std::size_t e = 0; e < chosen.effects.size(); ++e) {
     const EffectUse& use = chosen.effects[e];
     GS_ASSIGN(const Effect* entry, chosen.model->EffectAt(use));
-    FoundEffect effect{.use = use, .effect = entry, .probability = probability(use), .error_before = base.held_out_error, .error_after = chosen.held_out_error, .share_of_gap = 1};
+    FoundEffect effect{.use = use, .meaning = entry->meaning, .signature = entry->signature, .probability = probability(use), .error_before = base.held_out_error, .error_after = chosen.held_out_error, .share_of_gap = 1};
     GS_ASSIGN(const auto placed, chosen.model->EffectParameters(use, scales));
     for (const auto& p : placed) {
       for (const auto& tuned : uncertainty.tuned) {

@@ -21,7 +21,7 @@ struct EffectEstimate {
 // An effect of the verdict.
 struct FoundEffect {
   EffectUse use;
-  const Effect* effect = nullptr;            // the catalogue's entry
+  std::string meaning, signature;            // of the catalogue, for where it acts
   double probability = 0;
   std::vector<EffectEstimate> parameters;
   double error_before = 0, error_after = 0;  // held out, normalised

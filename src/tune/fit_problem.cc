@@ -83,10 +83,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       const auto rows = MakeWindows(recording, mode, options_.window_s);
       for (std::size_t i = 0; i < rows.size(); ++i) {
         if (options_.fold != Fold::kAll && (i % 3 == 1) != (options_.fold == Fold::kHeldOut)) continue;
-        Window window = rows[i];
-        for (const double from = recording.time_s.front(); window.rows() > 0 && recording.time_s[window.begin] - from < options_.settle_s;) ++window.begin;
-        constexpr std::size_t kFewestRows = 4;
-        if (options_.settle_s > 0 && window.rows() < kFewestRows) continue;
+        const Window& window = rows[i];
         FitWindow w = prototype;
         w.rows = window;
         w.start = InitialStateAt(model, recording, window.begin, values_);

@@ -26,6 +26,8 @@ constexpr double kPriorShare = 0.15;
 constexpr double kPriorOffset_rad = 0.03;
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known beforehand.
 constexpr double kCorrelated = 10;
+// Ten time constants of 30 ms.
+constexpr double kSettle_s = 0.3;
 
 }  // namespace
 
@@ -36,7 +38,7 @@ std::string Candidate::Name() const {
 }
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
-  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
+  FitOptions options{.window_s = window_s, .settle_s = kSettle_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
                      .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated), .linear_terms = true, .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
@@ -63,7 +65,7 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
 }
 
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, GiveUp give_up) {
-  const SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .hopeless = std::move(give_up), .deadline = bench.deadline};
+  const SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .give_up = std::move(give_up), .deadline = bench.deadline};
   const SolveResult solved = Solve(*candidate->problem, start, options);
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;

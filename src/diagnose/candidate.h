@@ -51,7 +51,6 @@ struct Workbench {
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
-using GiveUp = std::function<bool(double cost, int iteration)>;
 // Fits from `start` on the training logs, until `give_up` says to.
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, GiveUp give_up = {});
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.

@@ -145,6 +145,13 @@ double RemovedExcess(double floors_before, double floors_after) {
   return floors_before > 1 + kLeastExcess ? (floors_before - std::max(floors_after, 1.0)) / (floors_before - 1) : 0;
 }
 
+bool Pays(const Candidate& richer, const Candidate& simpler, const Candidate& parent) {
+  const Evidence more = Compare(simpler, richer);
+  if (more.held_out > kSureNested.share && more.z > kSureNested.z) return true;
+  const bool much = more.gain > kNestedShare * Compare(parent, richer).gain || RemovedExcess(simpler.held_out_floors, richer.held_out_floors) > kNestedExcess;
+  return much && Convincing(more, kNested);
+}
+
 Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& limits) {
   if (layer.children.empty()) return nullptr;
   const auto sound = [&](const auto& child) { return Convincing(Compare(parent, *child), limits); };
@@ -155,9 +162,7 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& l
     if (child.get() == best || child->held_out_blocks.empty() || !sound(child)) continue;
     const Evidence more = Compare(*child, *best);
     if (Contains(*best, *child)) {
-      const bool much = more.gain > kNestedShare * Compare(parent, *best).gain || RemovedExcess(child->held_out_floors, best->held_out_floors) > kNestedExcess;
-      const bool sure = more.held_out > kSureNested.share && more.z > kSureNested.z;
-      if (!sure && (!much || !Convincing(more, kNested))) best = child.get();
+      if (!Pays(*best, *child, parent)) best = child.get();
     } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && !Convincing(more, kNested) && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
     } else if (IsLessLikely(*best, *child) && AreRivals(*best, *child)) {

@@ -27,6 +27,8 @@ void Explore(const Workbench& bench, const Candidate& base, Candidate& parent, s
 void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Layer* layer);
 // The best first. An effect with a parameter on its bound is stretched into something it is not: it comes after one that gains nearly as much.
 void SortByMisfit(const Candidate& parent, Candidates* children);
+// Whether what `richer` can do beyond `simpler`, which it contains, is worth its parameters. `parent`: what both stand on.
+bool Pays(const Candidate& richer, const Candidate& simpler, const Candidate& parent);
 // The best child that is convincing over the parent, or a simpler one that is too when the richer is not convincingly better: one that it contains, or one with
 // fewer parameters. Where none is convincing, the best of all.
 Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& limits);

@@ -68,7 +68,9 @@ void Exchange(const Workbench& bench, const Candidate& base, Candidate* second, 
   Layer& layer = result->exchange;
   Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer, nullptr);
   Candidate* other = Simplest(layer, *second, kSecond);
-  if (!other || other->effects.back() == result->single->effects.front() || LogMisfit(*other) > LogMisfit(*result->chosen)) return;
+  if (!other || other->effects.back() == result->single->effects.front()) return;
+  // A richer first effect did what the second one was missing for.
+  if (Contains(*result->chosen, *other) ? Pays(*result->chosen, *other, *second) : LogMisfit(*other) > LogMisfit(*result->chosen)) return;
   result->second_parent = result->single = second;
   result->chosen = other;
   result->second = std::move(layer);

@@ -202,7 +202,7 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
         s.termination = Termination::kBudget;
         break;
       }
-      if (options.hopeless && options.hopeless(s.cost, s.iterations)) {
+      if (options.give_up && options.give_up(s.cost, s.iterations)) {
         s.termination = Termination::kHopeless;
         break;
       }

@@ -24,6 +24,9 @@ struct Progress {
   int iteration = 0;
 };
 
+// True ends the fit.
+using GiveUp = std::function<bool(double cost, int iteration)>;
+
 struct SolveOptions {
   Optimizer optimizer = Optimizer::kLevenbergMarquardt;
   int max_iterations = 60;       // of LM; NLopt: evaluations = 20 times that
@@ -32,7 +35,7 @@ struct SolveOptions {
   double damping = 1e-2;         // LM: of the first step, relative to the diagonal
   bool central = false;          // LM: central differences, whose columns of parameters that only act as a ratio are parallel
   bool secant = true;            // LM: between two Jacobians, steps with secant updates of the last one
-  std::function<bool(double cost, int iteration)> hopeless;  // asked before each Jacobian; true ends the fit
+  GiveUp give_up;                   // asked before each Jacobian
   Deadline deadline;
   unsigned long seed = 0;
   std::function<void(const Progress&)> progress;

@@ -39,13 +39,15 @@ bool IsSane(const mjModel& m, const mjData& d) {
   return true;
 }
 
-// Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1]; before the first stamp the first value. `row` is a hint that
-// moves with the time.
-double MeanHeld(const std::vector<double>& time, const std::vector<double>& values, double from, double to, std::size_t& row) {
+// Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1], and `earlier` before the first stamp. `row` is a hint that moves with
+// the time.
+double MeanHeld(const std::vector<double>& time, const std::vector<double>& values, double earlier, double from, double to, std::size_t& row) {
+  if (to <= time.front() && from < time.front()) return earlier;
   while (row > 0 && time[row] > from) --row;
   while (row + 1 < time.size() && time[row + 1] <= from) ++row;
-  if (row + 1 >= time.size() || time[row + 1] >= to) return values[row];
-  double sum = 0, t = from;
+  const double begin = std::max(from, time.front());
+  double sum = earlier * (begin - from), t = begin;
+  if (row + 1 >= time.size() || time[row + 1] >= to) return from < begin ? (sum + values[row] * (to - begin)) / (to - from) : values[row];
   std::size_t k = row;
   while (t < to) {
     const double next = k + 1 < time.size() ? std::min(time[k + 1], to) : to;
@@ -102,7 +104,7 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
 
 Simulator::Simulator(const Model& model, double max_step_s)
     : model_(model), mujoco_(CopyForReplay(model.compiled())), data_(mj_makeData(mujoco_.get())), writer_(model, mujoco_.get(), data_.get()),
-      max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep), values_(model.Nominal()), held_(model.command_actuators().size(), 0) {
+      max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep), values_(model.Nominal()), earlier_(model.command_actuators().size(), 0), held_(model.command_actuators().size(), 0) {
   // Friction rows written for "as stiff as the step allows" (solref -1 -1/h) follow the step that is really used.
   for (int dof = 0; dof < mujoco_->nv; ++dof) {
     mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
@@ -110,6 +112,11 @@ Simulator::Simulator(const Model& model, double max_step_s)
   }
   for (std::size_t i = 0; i < model.parameters().size(); ++i) {
     if (model.parameters()[i].name.find("time_constant_s") != std::string::npos) time_constants_.push_back(i);
+  }
+  // A motor's other inputs (supply, enable) are no commands to move: the first one is.
+  for (const auto& command : model.experiment().commands) {
+    const int actuator = mj_name2id(mujoco_.get(), mjOBJ_ACTUATOR, command.actuator.c_str()), plugin = mujoco_->actuator_plugin[actuator];
+    moves_.push_back(plugin < 0 || actuator == 0 || plugin != mujoco_->actuator_plugin[actuator - 1]);
   }
   apart_.resize(model.mirrored_joints().size());
   remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nu, [](int plugin) { return plugin >= 0; });
@@ -126,7 +133,7 @@ void Simulator::SetCommands(const Recording& recording, std::size_t row, double 
   const auto& actuators = model_.command_actuators();
   for (std::size_t c = 0; c < actuators.size(); ++c) {
     const auto& values = recording.commands[c].values;
-    data_->ctrl[actuators[c]] = command_delay_s_ == 0 ? values[row] : MeanHeld(recording.time_s, values, from_s - command_delay_s_, to_s - command_delay_s_, held_[c]);
+    data_->ctrl[actuators[c]] = command_delay_s_ == 0 ? values[row] : MeanHeld(recording.time_s, values, earlier_[c], from_s - command_delay_s_, to_s - command_delay_s_, held_[c]);
   }
 }
 
@@ -150,6 +157,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
   mj_resetData(m, d);
   std::fill(held_.begin(), held_.end(), window.begin);
+  if ((remembers_ || command_delay_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past()) FindEarlierCommands(recording);
   PreRoll(recording, window);
   // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
   for (std::size_t i = 0; i < apart_.size(); ++i) {
@@ -236,28 +244,80 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
   }
 }
 
+double Simulator::Past() const {
+  double past_s = mujoco_->na > 0 && time_constants_.empty() ? kPreRoll_s : kHistory_s;
+  if (!apart_.empty()) past_s = std::max(past_s, kTransmission_s);
+  for (const std::size_t i : time_constants_) past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
+  return std::max(past_s, command_delay_s_);
+}
+
+void Simulator::Follow(const Recording& recording, std::size_t row) {
+  for (const auto& measured : recording.measured) {
+    const SignalSource& source = model_.source(measured.index);
+    if (source.kind != SignalKind::kPosition) continue;
+    const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+    data_->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
+    data_->qvel[source.dof] = fit.slope;
+  }
+}
+
+// What was commanded before the log began. A mechanism that stands still at the first stamp had been held there: by no command, where the model accelerates
+// less under none than under the first one (a step at the first stamp; a held weight's first command is what holds it). One that moves was driven by nobody
+// knows what: by the first command.
+void Simulator::FindEarlierCommands(const Recording& recording) {
+  mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  constexpr double kBetter = 0.5;
+  const auto& actuators = model_.command_actuators();
+  for (std::size_t c = 0; c < earlier_.size(); ++c) earlier_[c] = recording.commands[c].values.front();
+  bool measured = false, still = true;
+  for (const auto& signal : recording.measured) {
+    if (model_.source(signal.index).kind != SignalKind::kPosition) continue;
+    measured = true;
+    still = still && FitLocally(recording, signal, 0, kInitialFitHalfWidth_s).slope == 0;
+  }
+  from_nothing_ = false;
+  for (std::size_t c = 0; c < earlier_.size(); ++c) from_nothing_ = from_nothing_ || (moves_[c] && earlier_[c] != 0);
+  if (!measured || !still || !from_nothing_) {
+    from_nothing_ = false;
+    return;
+  }
+  const auto acceleration = [&](bool commanded) {
+    Follow(recording, 0);
+    for (const auto& [joint, of] : model_.mirrored_joints()) d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
+    for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[actuators[c]] = moves_[c] && !commanded ? 0 : earlier_[c];
+    mj_forward(m, d);
+    const double norm = mju_norm(d->qacc, m->nv);
+    mj_resetData(m, d);
+    return norm;
+  };
+  from_nothing_ = acceleration(false) < kBetter * acceleration(true);
+  for (std::size_t c = 0; c < earlier_.size(); ++c) {
+    if (from_nothing_ && moves_[c]) earlier_[c] = 0;
+  }
+}
+
 // Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log for a while, so that they hold what
 // the log says and not nothing.
 void Simulator::PreRoll(const Recording& recording, Window window) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  if ((!remembers_ && apart_.empty()) || window.begin == 0) return;
-  double past_s = m->na > 0 && time_constants_.empty() ? kPreRoll_s : kHistory_s;
-  if (!apart_.empty()) past_s = std::max(past_s, kTransmission_s);
-  for (const std::size_t i : time_constants_) past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
-  const double from = recording.time_s[window.begin] - past_s;
+  if (!remembers_ && apart_.empty()) return;
+  const double from = recording.time_s[window.begin] - Past();
   std::size_t first = window.begin;
   while (first > 0 && recording.time_s[first - 1] >= from) --first;
   const int integrator = m->opt.integrator;
   if (apart_.empty()) m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
+  if (remembers_ && first == 0 && from_nothing_ && recording.rows() > 1) {
+    Follow(recording, 0);
+    for (const auto& [joint, of] : model_.mirrored_joints()) d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
+    for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[model_.command_actuators()[c]] = earlier_[c];
+    m->opt.timestep = std::min(max_step_s_, recording.time_s[1] - recording.time_s[0]);
+    d->time = recording.time_s.front() - m->opt.timestep;
+    mj_step(m, d);
+  }
   for (std::size_t row = first; row < window.begin; ++row) {
-    for (const auto& measured : recording.measured) {
-      const SignalSource& source = model_.source(measured.index);
-      if (source.kind != SignalKind::kPosition) continue;
-      const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
-      d->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
-      d->qvel[source.dof] = fit.slope;
-    }
+    Follow(recording, row);
     // A transmission's motor side is free to move beside the load.
     for (const auto& [joint, of] : model_.mirrored_joints()) {
       if (row > first) break;

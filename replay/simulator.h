@@ -57,6 +57,11 @@ class Simulator {
 
  private:
   void PreRoll(const Recording& recording, Window window);
+  // How far back the states of a run remember.
+  double Past() const;
+  // Measured joints as the log has them at a row.
+  void Follow(const Recording& recording, std::size_t row);
+  void FindEarlierCommands(const Recording& recording);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;
   // What the sensors make of the states: filter, delay, offset.
@@ -74,6 +79,9 @@ class Simulator {
   std::vector<std::pair<double, double>> apart_;  // per mirrored joint: angle and speed beside its load at the start of a run
   std::vector<double> values_;
   std::vector<double> column_, shaped_;  // scratch of ApplySensors
+  std::vector<bool> moves_;           // per command: drives, and does not supply or enable
+  std::vector<double> earlier_;       // per command: before the log began
+  bool from_nothing_ = false;         // nothing was commanded then, and something is at the first stamp
   std::vector<std::size_t> held_;     // per command: row held at the start of the step
 };
 

@@ -19,7 +19,7 @@ struct ReplayFlags {
   CommonFlags common;
   ModelFlags model;
   std::string mode;
-  double window_s = 0, time_step_s = 0, settle_s = 0, fail_above = 0;
+  double window_s = 0, time_step_s = 0, fail_above = 0;
   bool nuisances = false;
 };
 
@@ -40,7 +40,7 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   }
   ReplayResult result = controller ? closed.result : Replay(*session.model, session.recordings, options, *session.pool);
   if (flags.nuisances) {
-    const TuneOptions fit{.window_s = options.window_s, .settle_s = flags.settle_s, .time_step_s = result.time_step_s};
+    const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
     result.logs = Evaluate(*session.model, session.recordings, session.values, std::nullopt, options.mode, fit, *session.pool);
   }
   const Comparison comparison = Compare(result, session.recordings, *session.pool);
@@ -105,7 +105,6 @@ void AddReplay(CLI::App& program, Run& run) {
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
   command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen so that halving it changes the error by < 1 %)")->check(FinitePositive());
   command->add_flag("--nuisances", flags->nuisances, "Fit what is no finding first: zero offsets, initial states, a command shift below one sample; as tune and diagnose do");
-  command->add_option("--settle", flags->settle_s, "With --nuisances: Start of each log (at most a tenth of it) that is only driven through, s; diagnose takes 0.3")->needs("--nuisances")->check(FinitePositive());
   command->add_option("--fail-above", flags->fail_above, "Exit status 1 when the error is above this")->check(FinitePositive());
   command->footer("Example: gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out out");
   command->callback([flags, &run] { run = [flags] { return RunReplay(*flags); }; });

@@ -26,8 +26,6 @@ constexpr double kPriorShare = 0.15;
 constexpr double kPriorOffset_rad = 0.03;
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known beforehand.
 constexpr double kCorrelated = 10;
-// Ten time constants of 30 ms.
-constexpr double kSettle_s = 0.3;
 
 }  // namespace
 
@@ -38,7 +36,7 @@ std::string Candidate::Name() const {
 }
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
-  FitOptions options{.window_s = window_s, .settle_s = kSettle_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
+  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
                      .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated), .linear_terms = true, .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.

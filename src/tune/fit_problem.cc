@@ -18,8 +18,6 @@ constexpr double kMotorSidePrior_rad = 0.02;  // how well the pre-roll knows whe
 constexpr double kOffsetBound_rad = 0.3;
 // Of the sum of squares, per residual and squared range of a coordinate.
 constexpr double kAnchor = 1e-8;
-constexpr double kMostSettling = 0.1;  // of a log
-constexpr std::size_t kFewestRows = 4;
 
 }  // namespace
 
@@ -81,14 +79,11 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       prior.push_back(1 / kMotorSidePrior_rad * kSpeedPrior_s);
     }
     prototype.prior = Eigen::Map<Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
-    const double first_s = recording.time_s.front(), scored_from_s = first_s + std::min(options_.settle_s, kMostSettling * (recording.time_s.back() - first_s));
     const auto add = [&](ReplayMode mode) {
       const auto rows = MakeWindows(recording, mode, options_.window_s);
       for (std::size_t i = 0; i < rows.size(); ++i) {
         if (options_.fold != Fold::kAll && (i % 3 == 1) != (options_.fold == Fold::kHeldOut)) continue;
-        Window window = rows[i];
-        while (window.rows() > 0 && recording.time_s[window.begin] < scored_from_s) ++window.begin;
-        if (window.rows() < std::min(kFewestRows, rows[i].rows())) continue;
+        const Window& window = rows[i];
         FitWindow w = prototype;
         w.rows = window;
         w.start = InitialStateAt(model, recording, window.begin, values_);

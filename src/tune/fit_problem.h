@@ -32,7 +32,6 @@ struct FitOptions {
   Objective objective = Objective::kWindows;
   double window_s = 1.0;
   double lead_in_s = 0.05;          // start of a window that is not scored
-  double settle_s = 0;              // start of a log (at most a tenth of it) that is only driven through: what was commanded before it, which a slow drive still follows, is not known
   Fold fold = Fold::kAll;
   std::size_t max_windows = 0;      // 0: all; else evenly chosen ones
   double time_step_s = 0;           // 0: the model's

@@ -14,7 +14,7 @@ constexpr double kSingleLogHeldOut = 0.3;
 constexpr double kAgree = 0.01;  // starts agree when their costs differ by less than this share
 
 FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& free, double time_step_s) {
-  return {.free = free, .objective = options.objective, .window_s = options.window_s, .settle_s = options.settle_s, .time_step_s = time_step_s, .fit_offsets = options.fit_offsets,
+  return {.free = free, .objective = options.objective, .window_s = options.window_s, .time_step_s = time_step_s, .fit_offsets = options.fit_offsets,
           .fit_shift = options.fit_shift, .fit_states = options.fit_states, .normalization = options.normalization, .huber = options.huber};
 }
 

@@ -25,7 +25,6 @@ struct TuneOptions {
   std::vector<int> free;            // parameters; empty: all that are not frozen
   Objective objective = Objective::kBoth;
   double window_s = 1.0;
-  double settle_s = 0;              // see FitOptions
   bool fit_offsets = true, fit_shift = true, fit_states = true;
   Normalization normalization = Normalization::kDeviation;
   double huber = 4;                 // see FitOptions

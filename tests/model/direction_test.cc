@@ -193,11 +193,11 @@ TEST_F(DirectionTest, DroopAsymmetryAndDeadZoneTakeTorqueAway) {
 TEST_F(DirectionTest, LagAndDelaysAreLate) {
   Build("actuator_lag");
   Run([](double) { return 0.1; }, 0, 0, {{"time_constant_s", 0.05}});
-  // w = T/J (t - tau (1 - exp(-t / tau))); the lag starts at the present request, so the step is there from the start.
+  // w = T/J (t - tau (1 - exp(-t / tau))): before a log that begins at rest nothing was asked of the drive.
   const double lagged = w_.back();
   Run([](double t) { return t < 0.1 ? 0.0 : 0.1; }, 0, 0, {{"time_constant_s", 0.05}});
   EXPECT_NEAR(w_.back(), 0.1 / kInertia * (0.4 - 0.05 * (1 - std::exp(-0.4 / 0.05))), 2e-3);
-  EXPECT_NEAR(lagged, 0.1 / kInertia * 0.5, 2e-3);
+  EXPECT_NEAR(lagged, 0.1 / kInertia * (0.5 - 0.05 * (1 - std::exp(-0.5 / 0.05))), 2e-3);
   Build("command_delay");
   Run([](double t) { return t < 0.1 ? 0.0 : 0.1; }, 0, 0, {{"delay_s", 0.03}});
   EXPECT_NEAR(w_.back(), 0.1 / kInertia * 0.37, 1e-9);

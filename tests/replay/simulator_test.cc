@@ -55,14 +55,20 @@ Recording Irregular(const Experiment& experiment, int rows) {
   return recording;
 }
 
-// The exact motion, the command being late by `delay_s` (before the log's start: its first value).
-std::vector<State> Exact(const Recording& r, double delay_s = 0) {
+// The exact motion, the command being late by `delay_s`; `earlier`: what was commanded before the log's start.
+std::vector<State> Exact(const Recording& r, double delay_s = 0, double earlier = 0) {
   std::vector<State> states = {{}};
   State s;
   const auto& u = r.commands[0].values;
   for (std::size_t k = 0; k + 1 < r.rows(); ++k) {
     double t = r.time_s[k];
     while (t < r.time_s[k + 1]) {
+      if (t + 1e-13 < r.time_s[0] + delay_s) {
+        const double until = std::min(r.time_s[0] + delay_s, r.time_s[k + 1]);
+        s = Held(s, earlier, until - t);
+        t = until;
+        continue;
+      }
       // What acts at t: the last command sent at or before t - delay; until when.
       std::size_t held = 0;
       while (held + 1 < r.rows() && r.time_s[held + 1] + delay_s <= t + 1e-13) ++held;
@@ -232,6 +238,43 @@ TEST_F(DelayTest, AFractionalDelayOfHeldCommandsIsTheLinearSystemsOwn) {
               kWithinStep / 4)
         << delay_s;
   }
+}
+
+// A log that begins with a step: before it the disc stood still, and nothing was asked of it.
+TEST_F(DelayTest, ALogThatBeginsAtRestBeganWithoutACommand) {
+  const double step = 0.7, delay_s = 0.0137;
+  Recording recording = MakeRecording(experiment_, 300, 0.002, [&](int, double) { return step; });
+  EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, 0)), 3e-5);
+  // One that begins in motion was driven by nobody knows what: by the first command.
+  for (std::size_t k = 0; k < recording.rows(); ++k) recording.measured[0].values[k] = 2 * recording.time_s[k];
+  EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, step)), 3e-5);
+}
+
+TEST_F(SimulatorTest, ALaggingDriveStartsFromRestWithTheLog) {
+  // J w' + b w = u (1 - exp(-t / T)).
+  const double u = 0.7, time_constant_s = 0.03, rate = kDamping / kInertia, lag = 1 / time_constant_s;
+  const auto uses = model_->ParseEffects({"actuator_lag@motor"});
+  ASSERT_TRUE(uses.ok());
+  const auto model = MakeModel(experiment_, uses.value());
+  const Recording recording = MakeRecording(experiment_, 300, 0.002, [&](int, double) { return u; });
+  const auto predicted = Predict(*model, recording, {{"actuator_lag@motor.time_constant_s", time_constant_s}});
+  for (std::size_t k = 0; k < recording.rows(); ++k) {
+    const double t = recording.time_s[k];
+    const double w = u / kDamping * (1 - std::exp(-rate * t)) - u / kInertia * (std::exp(-lag * t) - std::exp(-rate * t)) / (rate - lag);
+    ASSERT_NEAR(predicted[1][k], w, 1e-6) << t;
+  }
+}
+
+TEST(EarlierCommandsTest, WhatHoldsAWeightHeldItBeforeTheLog) {
+  // A spring-loaded disc that its first command holds still: the lag has nothing to do.
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, Mjcf("damping=\"0.05\" stiffness=\"2\" springref=\"0.4\""), kYaml);
+  const auto uses = MakeModel(experiment)->ParseEffects({"actuator_lag@motor"});
+  ASSERT_TRUE(uses.ok());
+  const auto model = MakeModel(experiment, uses.value());
+  const Recording recording = MakeRecording(experiment, 300, 0.002, [](int, double) { return -0.8; });
+  const auto predicted = Predict(*model, recording, {{"actuator_lag@motor.time_constant_s", 0.03}});
+  EXPECT_LT(Largest(predicted[0]), 1e-9);
 }
 
 TEST_F(DelayTest, ALateSensorShowsThePast) {

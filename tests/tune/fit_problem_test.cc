@@ -140,26 +140,6 @@ TEST(FitProblemTest, GradientIsThatOfTheReducedCost) {
   }
 }
 
-// What moved the cart until 0.3 s is not what its model says: with that start left out the gain is the true one all the same, on short logs no more than a tenth goes.
-TEST(FitProblemTest, TheStartOfALogIsOnlyDrivenThrough) {
-  const Rig rig = LoadCart();
-  const auto gain = [&](double settle_s, std::size_t rows) {
-    constexpr std::size_t kDisturbed = 75;  // 0.3 s
-    Recording log = CartLog(rig, rows, 0);
-    for (std::size_t k = 0; k < kDisturbed; ++k) log.measured.front().values[k] += 0.2 * std::pow(1 - static_cast<double>(k) / kDisturbed, 2);
-    const std::vector<Recording> logs = {std::move(log)};
-    ThreadPool pool(1);
-    FitOptions options = CartOptions(rig, Objective::kWindows);
-    options.settle_s = settle_s;
-    FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
-    return problem.Values(Solve(problem, problem.Start(), {}).point)[static_cast<std::size_t>(rig.Index("cart.gain"))];
-  };
-  constexpr std::size_t kLong = 1001, kShort = 501;  // 4 s, 2 s
-  EXPECT_NEAR(gain(0.3, kLong), 1.2, 1e-3);
-  EXPECT_GT(std::abs(gain(0, kLong) - 1.2), 5e-3);
-  EXPECT_GT(std::abs(gain(0.3, kShort) - 1.2), 5e-3);
-}
-
 TEST(FitProblemTest, HuberGrowsLinearlyBeyondTheThreshold) {
   const Rig rig = LoadCart();
   Recording log = CartLog(rig, 501, 0.01);

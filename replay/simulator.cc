@@ -74,6 +74,21 @@ LocalFit FitLater(const Recording& recording, const Recording::Measured& measure
   return between;
 }
 
+// Whether the log begins with this joint at rest: nothing moves, or so much farther in the 40 ms after the first 10 ms (24 times at a constant acceleration from
+// rest, 4 times at a constant speed) that it had only begun to.
+bool StartsStill(const Recording& recording, const Recording::Measured& measured) {
+  constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
+  if (FitLocally(recording, measured, 0, kInitialFitHalfWidth_s).slope == 0) return true;
+  const auto& t = recording.time_s;
+  const auto at = [&](double after_s) {
+    std::size_t row = 1;
+    while (row + 1 < t.size() && t[row] - t[0] < after_s) ++row;
+    return row;
+  };
+  const double first = measured.values[at(kBegin_s)], later = measured.values[at(kEnd_s)];
+  return kFarther * std::abs(first - measured.values[0]) <= std::abs(later - first);
+}
+
 }  // namespace
 
 InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values) {
@@ -157,6 +172,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
   mj_resetData(m, d);
   std::fill(held_.begin(), held_.end(), window.begin);
+  from_nothing_ = false;
   if ((remembers_ || command_delay_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past()) FindEarlierCommands(recording);
   PreRoll(recording, window);
   // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
@@ -261,6 +277,15 @@ void Simulator::Follow(const Recording& recording, std::size_t row) {
   }
 }
 
+void Simulator::StandAt(const Recording& recording, std::size_t row) {
+  Follow(recording, row);
+  const mjModel& m = *mujoco_;
+  for (const auto& [joint, of] : model_.mirrored_joints()) {
+    data_->qpos[m.jnt_qposadr[joint]] = data_->qpos[m.jnt_qposadr[of]];
+    data_->qvel[m.jnt_dofadr[joint]] = data_->qvel[m.jnt_dofadr[of]];
+  }
+}
+
 // What was commanded before the log began. A mechanism that stands still at the first stamp had been held there: by no command, where the model accelerates
 // less under none than under the first one (a step at the first stamp; a held weight's first command is what holds it). One that moves was driven by nobody
 // knows what: by the first command.
@@ -270,22 +295,17 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   constexpr double kBetter = 0.5;
   const auto& actuators = model_.command_actuators();
   for (std::size_t c = 0; c < earlier_.size(); ++c) earlier_[c] = recording.commands[c].values.front();
-  bool measured = false, still = true;
+  bool measured = false, still = true, commanded = false;
   for (const auto& signal : recording.measured) {
     if (model_.source(signal.index).kind != SignalKind::kPosition) continue;
     measured = true;
-    still = still && FitLocally(recording, signal, 0, kInitialFitHalfWidth_s).slope == 0;
+    still = still && StartsStill(recording, signal);
   }
-  from_nothing_ = false;
-  for (std::size_t c = 0; c < earlier_.size(); ++c) from_nothing_ = from_nothing_ || (moves_[c] && earlier_[c] != 0);
-  if (!measured || !still || !from_nothing_) {
-    from_nothing_ = false;
-    return;
-  }
-  const auto acceleration = [&](bool commanded) {
-    Follow(recording, 0);
-    for (const auto& [joint, of] : model_.mirrored_joints()) d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
-    for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[actuators[c]] = moves_[c] && !commanded ? 0 : earlier_[c];
+  for (std::size_t c = 0; c < earlier_.size(); ++c) commanded = commanded || (moves_[c] && earlier_[c] != 0);
+  if (!measured || !still || !commanded) return;
+  const auto acceleration = [&](bool with_first) {
+    StandAt(recording, 0);
+    for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
     mj_forward(m, d);
     const double norm = mju_norm(d->qacc, m->nv);
     mj_resetData(m, d);
@@ -309,21 +329,15 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
   const int integrator = m->opt.integrator;
   if (apart_.empty()) m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
   if (remembers_ && first == 0 && from_nothing_ && recording.rows() > 1) {
-    Follow(recording, 0);
-    for (const auto& [joint, of] : model_.mirrored_joints()) d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
+    StandAt(recording, 0);
     for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[model_.command_actuators()[c]] = earlier_[c];
     m->opt.timestep = std::min(max_step_s_, recording.time_s[1] - recording.time_s[0]);
     d->time = recording.time_s.front() - m->opt.timestep;
     mj_step(m, d);
   }
   for (std::size_t row = first; row < window.begin; ++row) {
-    Follow(recording, row);
     // A transmission's motor side is free to move beside the load.
-    for (const auto& [joint, of] : model_.mirrored_joints()) {
-      if (row > first) break;
-      d->qpos[m->jnt_qposadr[joint]] = d->qpos[m->jnt_qposadr[of]];
-      d->qvel[m->jnt_dofadr[joint]] = d->qvel[m->jnt_dofadr[of]];
-    }
+    row == first ? StandAt(recording, row) : Follow(recording, row);
     d->time = recording.time_s[row];
     const double interval = recording.time_s[row + 1] - recording.time_s[row];
     const int steps = apart_.empty() ? 1 : StepsOver(interval, max_step_s_);

@@ -61,6 +61,8 @@ class Simulator {
   double Past() const;
   // Measured joints as the log has them at a row.
   void Follow(const Recording& recording, std::size_t row);
+  // The same, each transmission's motor side with its load.
+  void StandAt(const Recording& recording, std::size_t row);
   void FindEarlierCommands(const Recording& recording);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;

@@ -19,7 +19,10 @@ class Case:
         self.index, self.label, self.verdict = index, label, verdict
         self.kind, self.rig = label["kind"], label["rig"]
         self.truth = [(e["name"], e["on"]) for e in label["effects"]]
-        self.strength = min([e["effect_to_floor_refit"] for e in label["effects"]], default=label["effect_to_floor_refit"])
+        # What only the log that is kept from the program shows, nobody can find.
+        given = len(label["logs"]) - 1 if len(label["logs"]) > 3 else len(label["logs"])
+        seen = [min(e["effect_to_floor_refit"], max(e.get("effect_to_floor_logs", [math.inf])[:given])) for e in label["effects"]]
+        self.strength = min(seen, default=label["effect_to_floor_refit"])
         # A delay below one sample is a nuisance of every model, by the contract: no severity makes it a finding.
         below_a_sample = any(e["name"] == "command_delay" and e["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"]) for e in label["effects"])
         self.strong = self.kind in ("none", "ambiguous") or (self.strength >= STRONG and not below_a_sample)

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "src/diagnose/rules.h"
+
 namespace gapscope {
 
 namespace {
@@ -12,11 +14,9 @@ bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
   if (candidate.effects.empty()) return false;
   const auto placed = candidate.model->EffectParameters(candidate.effects.back(), bench.scales);
   if (!placed.ok()) return false;
-  constexpr double kEdge = 1e-3;  // of the range
   return std::any_of(placed.value().begin(), placed.value().end(), [&](const PlacedParameter& p) {
-    const double value = candidate.values[candidate.model->IndexOf(p.name)], edge = kEdge * (p.high - p.low);
-    const bool share = p.trials.empty();  // what was not screened, the logs hardly know
-    return !share && ((value <= p.low + edge && p.neutral != p.low) || (value >= p.high - edge && p.neutral != p.high));
+    const bool shape = p.trials.empty();  // what was not screened, the logs hardly know
+    return !shape && IsStretched(p, candidate.values[candidate.model->IndexOf(p.name)]);
   });
 }
 

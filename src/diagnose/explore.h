@@ -12,10 +12,6 @@ namespace gapscope {
 
 using Say = std::function<void(const std::string&)>;
 
-// The last fits of a leader.
-inline constexpr int kFinalIterations = 20;
-inline constexpr double kFinalTolerance = 2e-4;
-
 // The bench with less time: what is left of the budget is for what comes later.
 Workbench Hurried(const Workbench& bench, double share);
 

@@ -153,6 +153,17 @@ void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candi
   }
 }
 
+void FinishRivals(const Workbench& bench, const Candidate& parent, Layer* layer) {
+  constexpr double kMuch = 0.3;  // of the parent's cost
+  for (const auto& child : layer->children) {
+    if (bench.Late()) return;
+    if (child->converged || !(child->train_cost < (1 - kMuch) * parent.train_cost)) continue;
+    FitCandidate(bench, child.get(), child->point, kFinalIterations, kFinalTolerance);
+    VaryShape(bench, parent, child.get());
+    ScoreCandidate(bench, child.get());
+  }
+}
+
 void StartFromSimpler(const Workbench& bench, Layer* layer) {
   constexpr double kSliding = 0.9, kHump = 1.5, kClearlyBetter = 0.9;
   for (const auto& simple : layer->children) {

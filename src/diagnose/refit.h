@@ -8,6 +8,10 @@
 
 namespace gapscope {
 
+// The last fits of a leader.
+inline constexpr int kFinalIterations = 20;
+inline constexpr double kFinalTolerance = 2e-4;
+
 using Candidates = std::vector<std::unique_ptr<Candidate>>;
 
 // What was found on top of one parent.
@@ -28,6 +32,9 @@ void StartFromValues(const Workbench& bench, const std::vector<double>& values, 
 void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer);
 // Other starts: on the other side of each parameter that was not screened (how an inertia splits), and at trial values of another order of size. Valleys of their own.
 void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candidate);
+// The fits that were given up because another was far ahead, of effects that explain much all the same: to their end and from other starts, the nearest first. For when
+// there is time and nothing more to seek.
+void FinishRivals(const Workbench& bench, const Candidate& parent, Layer* layer);
 // What contains a simpler effect starts from where that ended. Coulomb friction: both directions alike, or a hump a little above the sliding level, below which a
 // hump has no gradient and its fit would stay Coulomb's. A torque limit: a ceiling that sags.
 void StartFromSimpler(const Workbench& bench, Layer* layer);

@@ -95,6 +95,12 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
   return std::any_of(std::begin(kContainments), std::end(kContainments), [&](const Containment& c) { return a.effect == c.richer && b.effect == c.simpler && (c.exact || !exactly); });
 }
 
+bool IsStretched(const PlacedParameter& p, double value) {
+  constexpr double kEdge = 1e-3;  // of the range
+  const double at = p.low > 0 ? std::log(std::max(value, p.low) / p.low) / std::log(p.high / p.low) : (value - p.low) / (p.high - p.low);
+  return (at <= kEdge && p.neutral != p.low) || (at >= 1 - kEdge && p.neutral != p.high);
+}
+
 namespace {
 
 std::size_t LateSensors(const Candidate& candidate) {
@@ -107,6 +113,15 @@ bool MayBeRivals(const Candidate& a, const Candidate& b) {
   // Two sensors late are one late command and what one of them is late beyond it: the same motion, told in a less likely way.
   const bool same = a.effects.size() == 2 && b.effects.size() == 2 && LateSensors(a) + LateSensors(b) == 3;
   return !same && !Contains(a, b, true) && !Contains(b, a, true) && !a.at_bound && !b.at_bound;
+}
+
+bool IsOneSignal(const std::vector<Recording>& recordings) {
+  return std::all_of(recordings.begin(), recordings.end(), [](const Recording& recording) {
+    const auto changing = std::count_if(recording.commands.begin(), recording.commands.end(), [](const Recording::Command& command) {
+      return std::any_of(command.values.begin(), command.values.end(), [&](double value) { return value != command.values.front(); });
+    });
+    return recording.measured.size() == 1 && changing <= 1;
+  });
 }
 
 bool IsSameDelay(const EffectUse& a, const EffectUse& b) {

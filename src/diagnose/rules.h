@@ -39,9 +39,13 @@ bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
 bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model);
 // Whether `richer` can do all that `simpler` does (same other effects, in any order); `exactly`: not only nearly, as far as its bounds go.
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly = false);
+// Whether a parameter ended on a bound that does not mean "no effect": on a positive range of decades, in its logarithm, as it is searched.
+bool IsStretched(const PlacedParameter& parameter, double value);
 // Whether the two can be taken for each other: neither contains the other exactly, and neither is stretched to a bound.
 bool MayBeRivals(const Candidate& a, const Candidate& b);
 
+// Whether one command that changes (a constant supply does not) and one signal are all that the logs hold.
+bool IsOneSignal(const std::vector<Recording>& recordings);
 // Whether the two are a late command and a late sensor: the same motion where that sensor is all that is measured, whatever their fits cost.
 bool IsSameDelay(const EffectUse& a, const EffectUse& b);
 

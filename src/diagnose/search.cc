@@ -157,11 +157,7 @@ Status SeekTwoAtOnce(const Workbench& bench, Candidate& base, const Say& say, Se
 
 Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
   SearchResult result;
-  const auto alone = [](const Recording& recording) {
-    const auto same = [&](const Recording::Command& command) { return command.actuator == recording.commands.front().actuator; };
-    return recording.measured.size() == 1 && std::all_of(recording.commands.begin(), recording.commands.end(), same);
-  };
-  result.one_signal = std::all_of(bench.data.train.begin(), bench.data.train.end(), alone) && std::all_of(bench.data.held_out.begin(), bench.data.held_out.end(), alone);
+  result.one_signal = IsOneSignal(bench.data.train) && IsOneSignal(bench.data.held_out);
   say("refitting the baseline");
   GS_ASSIGN(Candidate nominal, MakeCandidate(bench, {}));
   result.base = std::make_unique<Candidate>();
@@ -196,6 +192,7 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   if (!single || single->held_out_floors <= kRemains) {
     // No second effect will be sought: the time is for rivals.
     Refit(bench, base, say, &result.first);
+    FinishRivals(bench, base, &result.first);
     SortByMisfit(base, &result.first.children);
     single = Simplest(result.first, base, FirstLimits(base));
   }

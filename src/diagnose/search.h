@@ -14,7 +14,7 @@ struct SearchResult {
   Candidate* chosen = nullptr;   // single, or a pair
   const Candidate* second_parent = nullptr;  // what `second` stands on; null where no second effect was sought
   double free_run_before = 0, free_run_left = 0;  // see FreeRunError: of the base, of the chosen one
-  bool one_signal = false;       // the logs hold one actuator's commands and one signal
+  bool one_signal = false;       // see IsOneSignal
   bool uneven = false;           // train and held-out logs show the gap very differently; then nothing else was searched unless asked to
   bool budget_spent = false;
 };

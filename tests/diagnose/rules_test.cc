@@ -57,6 +57,30 @@ TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {
   EXPECT_TRUE(MayBeRivals(Of(rig, {{"sensor_delay", "arm_rad"}}), Of(rig, {{"command_delay", "motor"}})));
 }
 
+// A soft spring, at a hundredth of the stiff end of its range of four decades, is no bound.
+TEST(RulesTest, OnlyTheEndOfARangeIsStretched) {
+  const PlacedParameter stiffness{.name = {}, .key = {}, .unit = {}, .neutral = 3000, .low = 0.5, .high = 3000, .start = 100, .trials = {}};
+  EXPECT_FALSE(IsStretched(stiffness, 2));
+  EXPECT_TRUE(IsStretched(stiffness, 0.5));
+  EXPECT_FALSE(IsStretched(stiffness, 3000)) << "no effect";
+  const PlacedParameter angle{.name = {}, .key = {}, .unit = {}, .neutral = 0, .low = -2, .high = 2, .start = 0.1, .trials = {}};
+  EXPECT_TRUE(IsStretched(angle, -2));
+  EXPECT_TRUE(IsStretched(angle, 1.999));
+  EXPECT_FALSE(IsStretched(angle, 1.9));
+}
+
+TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {
+  Recording servo;
+  servo.measured.resize(1);
+  servo.commands = {{.actuator = "motor", .column = "goal", .values = {0, 1, 0}}, {.actuator = "motor.supply", .column = "constant", .values = {7, 7, 7}}};
+  EXPECT_TRUE(IsOneSignal({servo}));
+  Recording supplied = servo;
+  supplied.commands[1].values[2] = 6;
+  EXPECT_FALSE(IsOneSignal({servo, supplied}));
+  servo.measured.resize(2);
+  EXPECT_FALSE(IsOneSignal({servo}));
+}
+
 TEST(RulesTest, ComplianceMayBeFrictionsElasticGive) {
   const Rig rig = LoadRig("qube");
   EXPECT_TRUE(IsShape({"joint_compliance", "arm"}, {"coulomb_friction", "arm"}, *rig.model));

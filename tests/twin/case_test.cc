@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -73,6 +74,20 @@ TEST(CaseTest, SevererIsFartherAndRefitNeverWorse) {
   EXPECT_GT(strong.raw, 2 * weak.gap.raw);
   EXPECT_LE(weak.gap.refit, weak.gap.raw);
   EXPECT_LE(strong.refit, strong.raw);
+}
+
+// A limit that a log does not reach is nothing there.
+TEST(CaseTest, AGapIsToldLogByLog) {
+  const Case c = Make(Single("flexlink", "command_delay", 1));
+  Plant limited = c.base;
+  limited.drive.torque_limit_n_m = 1e3;
+  const Gap none = MeasureGap(CoarseRecords(limited, c.logs, c.sensors, {}), c.base, c.Floor(), {}, false, {});
+  ASSERT_EQ(none.logs.size(), c.logs.size());
+  EXPECT_LT(*std::max_element(none.logs.begin(), none.logs.end()), 1e-6);
+  double square = 0;
+  for (const double gap : c.gap.logs) square += gap * gap / static_cast<double>(c.gap.logs.size());
+  EXPECT_NEAR(std::sqrt(square) / c.gap.raw, 1, 0.3) << "logs differ in length by no more than that";
+  EXPECT_GT(*std::max_element(c.gap.logs.begin(), c.gap.logs.end()), c.gap.raw);
 }
 
 TEST(CaseTest, WithoutEffectThereIsNoGap) {

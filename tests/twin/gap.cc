@@ -127,9 +127,11 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
       {{1e-3, 0, 0, 0}, {0, 1e-2, 0, 0}, {0, 0, 1e-3, 0}, {0, 0, 0, 1e-2}}};
 
   double raw = 0, left = 0, count = 0;
+  std::vector<double> logs;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
   for (const Record& record : records) {
+    const double raw_before = raw, count_before = count;
     const Commands commands = Received(record, other);
     std::vector<Commands> moved_commands;
     if (refit) {
@@ -167,8 +169,10 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
       normal += global.transpose() * global;
       right += global.transpose() * change;
     }
+    logs.push_back(std::sqrt((raw - raw_before) / std::max(count - count_before, 1.0)));
   }
   Gap gap;
+  gap.logs = std::move(logs);
   gap.raw = std::sqrt(raw / std::max(count, 1.0));
   if (!refit) return gap;
   // Priors: what a diagnosis allows itself too.

@@ -32,6 +32,7 @@ struct GapOptions {
 struct Gap {
   double raw = 0, refit = 0;
   std::vector<double> moves;  // best moves along the directions
+  std::vector<double> logs;   // raw, of each record alone
   bool Finite() const;
 };
 

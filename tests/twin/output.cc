@@ -74,7 +74,8 @@ std::string LabelText(const Case& c, const std::vector<std::string>& files) {
                                {"twin_parameters", ToJson(e.extra)},
                                {"severity", e.choice.severity},
                                {"effect_to_floor", e.gap.raw},
-                               {"effect_to_floor_refit", e.gap.refit}});
+                               {"effect_to_floor_refit", e.gap.refit},
+                               {"effect_to_floor_logs", e.gap.logs}});
   }
   json["ambiguous"] = Json::array();
   if (!c.group.empty()) {

@@ -189,7 +189,8 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   result.floor = std::min(FloorError(bench.data.held_out, noise), result.final);
   result.closed = result.refit > result.floor ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0) : 0;
   GS_ASSIGN(result.effects, DescribeEffects(found, judgement, bench.scales));
-  if (result.verdict == Verdict::kAmbiguous) {
+  // Of what an `unknown` accepted too.
+  if (result.verdict == Verdict::kAmbiguous || result.verdict == Verdict::kUnknown) {
     for (const auto& group : judgement.groups) {
       std::vector<std::string> names;
       for (const EffectUse& use : group) names.push_back(use.Text());

@@ -5,6 +5,11 @@ from collections import Counter
 STRONG = 3.0  # effect over floor, after the base model's refit: the targets hold from here on
 
 
+def given(logs):
+    """The logs of a case that the program is given: all but the last, where that leaves three."""
+    return logs[:-1] if len(logs) > 3 else logs
+
+
 def load(folder, indices):
     cases = []
     for index in indices:
@@ -20,8 +25,8 @@ class Case:
         self.kind, self.rig = label["kind"], label["rig"]
         self.truth = [(e["name"], e["on"]) for e in label["effects"]]
         # What only the log that is kept from the program shows, nobody can find.
-        given = len(label["logs"]) - 1 if len(label["logs"]) > 3 else len(label["logs"])
-        seen = [min(e["effect_to_floor_refit"], max(e.get("effect_to_floor_logs", [math.inf])[:given])) for e in label["effects"]]
+        logs = len(given(label["logs"]))
+        seen = [min(e["effect_to_floor_refit"], max(e.get("effect_to_floor_logs", [math.inf])[:logs])) for e in label["effects"]]
         self.strength = min(seen, default=label["effect_to_floor_refit"])
         # A delay below one sample is a nuisance of every model, by the contract: no severity makes it a finding.
         below_a_sample = any(e["name"] == "command_delay" and e["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"]) for e in label["effects"])

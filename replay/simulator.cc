@@ -74,21 +74,6 @@ LocalFit FitLater(const Recording& recording, const Recording::Measured& measure
   return between;
 }
 
-// Whether the log begins with this joint at rest: nothing moves, or so much farther in the 40 ms after the first 10 ms (24 times at a constant acceleration from
-// rest, 4 times at a constant speed) that it had only begun to.
-bool StartsStill(const Recording& recording, const Recording::Measured& measured) {
-  constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
-  if (FitLocally(recording, measured, 0, kInitialFitHalfWidth_s).slope == 0) return true;
-  const auto& t = recording.time_s;
-  const auto at = [&](double after_s) {
-    std::size_t row = 1;
-    while (row + 1 < t.size() && t[row] - t[0] < after_s) ++row;
-    return row;
-  };
-  const double first = measured.values[at(kBegin_s)], later = measured.values[at(kEnd_s)];
-  return kFarther * std::abs(first - measured.values[0]) <= std::abs(later - first);
-}
-
 }  // namespace
 
 InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values) {
@@ -299,7 +284,7 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   for (const auto& signal : recording.measured) {
     if (model_.source(signal.index).kind != SignalKind::kPosition) continue;
     measured = true;
-    still = still && StartsStill(recording, signal);
+    still = still && FitLocally(recording, signal, 0, kInitialFitHalfWidth_s).slope == 0;
   }
   for (std::size_t c = 0; c < earlier_.size(); ++c) commanded = commanded || (moves_[c] && earlier_[c] != 0);
   if (!measured || !still || !commanded) return;

@@ -48,7 +48,7 @@ Moments MomentsOf(const std::vector<double>& values);
 
 // The value and slope of a measured signal at `row`, from a local quadratic least-squares fit over +-`half_width_s`
 // (one-sided at the ends): the initial state of a replay. Slope in SI per second; a slope within two standard errors of zero is zero, and the value
-// then the sample itself; so is that of a first row whose neighbours stay within one count for 10 ms.
+// then the sample itself; so is that of a first row that is followed by 10 ms within one count, or by so little way beside the next 40 ms that motion had only begun.
 struct LocalFit {
   double value = 0, slope = 0;
 };

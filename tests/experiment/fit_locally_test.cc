@@ -60,6 +60,15 @@ TEST(FitLocallyTest, ALogThatBeginsAtRestStartsAtRest) {
   EXPECT_EQ(fit.slope, 0);
 }
 
+TEST(FitLocallyTest, AStepThroughALagAtTheFirstStampStartsAtRest) {
+  // x''' = 400 / 0.05 / s^3 from rest, exact to the last bit: the parabola through +20 ms sees a slope of -0.3 rad/s there.
+  const auto cube = [](double t) { return 0.1 + 400 / 0.05 * t * t * t / 6; };
+  const LocalFit fit = Fit(Sampled(200, 0.002, cube), 0);
+  EXPECT_EQ(fit.value, 0.1);
+  EXPECT_EQ(fit.slope, 0);
+  EXPECT_NEAR(Fit(Sampled(200, 0.002, [&](double t) { return cube(t) + 5 * t; }), 0).slope, 5, 0.35);
+}
+
 TEST(FitLocallyTest, NoiseWithoutMotionGivesMostlyRest) {
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0, 1e-3);

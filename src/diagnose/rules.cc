@@ -128,6 +128,10 @@ bool IsSameDelay(const EffectUse& a, const EffectUse& b) {
   return (a.effect == "sensor_delay" && b.effect == "command_delay") || (a.effect == "command_delay" && b.effect == "sensor_delay");
 }
 
+bool IsSameFriction(const EffectUse& a, const EffectUse& b) {
+  return a.on == b.on && ((a.effect == "coulomb_friction" && b.effect == "direction_asymmetry") || (a.effect == "direction_asymmetry" && b.effect == "coulomb_friction"));
+}
+
 bool IsLessLikely(const Candidate& a, const Candidate& b) {
   if (LateSensors(a) == 2 && LateSensors(b) == 1 && b.effects.size() == 2 && (b.effects.front().effect == "command_delay" || b.effects.back().effect == "command_delay")) return true;
   if (a.effects.empty() || b.effects.size() != a.effects.size() || a.effects.back().effect != "gravity_offset" || b.effects.back().effect != "cable_spring" || a.effects.back().on != b.effects.back().on) return false;

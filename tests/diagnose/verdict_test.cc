@@ -81,6 +81,23 @@ TEST(VerdictTest, OneSignalCannotTellALateSensorFromALateCommand) {
   EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}}}));
 }
 
+// On a joint that a spring holds, a constant torque moves the rest, as a zero offset does: Coulomb friction is then friction of any two levels with that mean.
+TEST(VerdictTest, OnASpringAZeroOffsetHidesInWhichDirectionFrictionIsLarger) {
+  Found found(10, 2);
+  SearchResult& result = found.result;
+  result.first.children.push_back(found.Make({{"coulomb_friction", "arm"}}, 1.1));
+  result.single = result.chosen = result.first.children[1].get();
+  result.first.screen.push_back({.use = {"direction_asymmetry", "arm"}, .trial = {}, .child = {}, .left_out = {}});
+  result.first.screen.push_back({.use = {"torque_bias", "arm"}, .trial = {.absorbed = 1, .valid = false}, .child = {}, .left_out = "not tested"});
+  EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
+  result.first.screen.back().trial = {.absorbed = 0.98, .valid = true};  // a pendulum's rest, or a hub without a spring
+  EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
+  result.first.screen.back().trial.absorbed = 0.99999;
+  const Judgement judgement = Judge(result);
+  EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
+  EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"coulomb_friction", "arm"}, {"direction_asymmetry", "arm"}}}));
+}
+
 TEST(VerdictTest, ProbabilitiesAddUpToOne) {
   const Found found(10, 2);
   const Judgement judgement = Judge(found.result);

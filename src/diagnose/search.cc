@@ -158,6 +158,8 @@ Status SeekTwoAtOnce(const Workbench& bench, Candidate& base, const Say& say, Se
 Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
   SearchResult result;
   result.one_signal = IsOneSignal(bench.data.train) && IsOneSignal(bench.data.held_out);
+  const auto& measured = bench.data.train.front().measured;
+  result.torque = std::any_of(measured.begin(), measured.end(), [](const auto& m) { return m.spec.kind == SignalKind::kTorque; });
   say("refitting the baseline");
   GS_ASSIGN(Candidate nominal, MakeCandidate(bench, {}));
   result.base = std::make_unique<Candidate>();

@@ -15,6 +15,7 @@ struct SearchResult {
   const Candidate* second_parent = nullptr;  // what `second` stands on; null where no second effect was sought
   double free_run_before = 0, free_run_left = 0;  // see FreeRunError: of the base, of the chosen one
   bool one_signal = false;       // see IsOneSignal
+  bool torque = false;                  // a drive's torque is measured: a constant load on a servo shows
   bool uneven = false;           // train and held-out logs show the gap very differently; then nothing else was searched unless asked to
   bool budget_spent = false;
 };

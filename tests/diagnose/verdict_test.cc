@@ -10,10 +10,10 @@ namespace {
 
 // A search that accepted a cable spring, whose blocks hold so many times the noise in every half second before and after.
 struct Found {
-  Rig rig = LoadRig("qube");
+  Rig rig;
   SearchResult result;
 
-  Found(double before, double after) {
+  Found(double before, double after, const std::string& name = "qube") : rig(LoadRig(name)) {
     result.base = Make({}, before);
     result.nominal = Make({}, before);
     result.first.children.push_back(Make({{"cable_spring", "arm"}}, after));
@@ -96,6 +96,18 @@ TEST(VerdictTest, OnASpringAZeroOffsetHidesInWhichDirectionFrictionIsLarger) {
   const Judgement judgement = Judge(result);
   EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
   EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"coulomb_friction", "arm"}, {"direction_asymmetry", "arm"}}}));
+}
+
+// On a servo likewise, unless its torque is measured: that shows the load.
+TEST(VerdictTest, OnAServoOnlyItsTorqueTellsFrictionByDirection) {
+  Found found(10, 2, "joint");
+  SearchResult& result = found.result;
+  result.first.children.push_back(found.Make({{"coulomb_friction", "joint"}}, 1.1));
+  result.single = result.chosen = result.first.children[1].get();
+  result.first.screen.push_back({.use = {"direction_asymmetry", "joint"}, .trial = {}, .child = {}, .left_out = {}});
+  EXPECT_EQ(Judge(result).verdict, Verdict::kAmbiguous);
+  result.torque = true;
+  EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
 }
 
 TEST(VerdictTest, ProbabilitiesAddUpToOne) {

@@ -10,9 +10,9 @@ namespace gapscope::bench {
 namespace {
 
 struct RigSetting {
-  double sample_s;                            // of its logs
-  double amplitude;                           // of the sweep on the first command, SI
-  std::map<std::string, double> constants;    // other commands
+  double sample_s;                          // of its logs
+  double amplitude;                         // of the sweep on the first command, SI
+  std::map<std::string, double> constants;  // other commands
   std::map<std::string, double> log_values;
 };
 
@@ -22,7 +22,11 @@ const std::map<std::string, RigSetting>& Settings() {
       {"qube", {0.002, 1.5, {}, {}}},
       {"flexjoint", {0.002, 2.0, {}, {}}},
       {"flexlink", {0.002, 0.3, {}, {}}},
-      {"xl330", {0.0054, 0.8, {{"motor.supply", 7.4}, {"motor.enable", 1}}, {{"log.kp", 400}, {"log.mass", 0.49}, {"log.length", 0.1}, {"log.supply_v", 7.4}}}},
+      {"xl330",
+       {0.0054,
+        0.8,
+        {{"motor.supply", 7.4}, {"motor.enable", 1}},
+        {{"log.kp", 400}, {"log.mass", 0.49}, {"log.length", 0.1}, {"log.supply_v", 7.4}}}},
   };
   return settings;
 }
@@ -39,7 +43,8 @@ std::vector<std::string> Rigs() { return {"joint", "qube", "flexjoint", "flexlin
 
 Result<Case> MakeCase(const std::string& rig, double duration_s) {
   const RigSetting& setting = Settings().at(rig);
-  GS_ASSIGN(const Experiment experiment, LoadExperiment(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/experiment.yaml"));
+  GS_ASSIGN(const Experiment experiment,
+            LoadExperiment(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/experiment.yaml"));
   Case made{.rig = rig};
   GS_ASSIGN(made.model, Model::Build(experiment));
   made.time_step_s = made.model->compiled().opt.timestep;
@@ -49,7 +54,8 @@ Result<Case> MakeCase(const std::string& rig, double duration_s) {
   recording.log_path = rig;
   recording.values = setting.log_values;
   recording.timeline.median_step_s = setting.sample_s;
-  for (int k = 0; k * setting.sample_s < duration_s + 0.5 * setting.sample_s; ++k) recording.time_s.push_back(k * setting.sample_s);
+  for (int k = 0; k * setting.sample_s < duration_s + 0.5 * setting.sample_s; ++k)
+    recording.time_s.push_back(k * setting.sample_s);
   for (const auto& spec : experiment.commands) {
     Recording::Command command{.actuator = spec.actuator, .column = "bench"};
     const auto constant = setting.constants.find(spec.actuator);
@@ -61,7 +67,10 @@ Result<Case> MakeCase(const std::string& rig, double duration_s) {
   }
   for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
     if (experiment.measured[i].optional) continue;
-    recording.measured.push_back({.spec = experiment.measured[i], .index = i, .column = "bench", .values = std::vector<double>(recording.rows(), 0.0)});
+    recording.measured.push_back({.spec = experiment.measured[i],
+                                  .index = i,
+                                  .column = "bench",
+                                  .values = std::vector<double>(recording.rows(), 0.0)});
   }
 
   Simulator simulator(*made.model, made.time_step_s);

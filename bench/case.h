@@ -1,4 +1,5 @@
-// A rig of models/ with a recording made here, so that the benchmark needs no data: sine sweeps as commands, sampled as the rig's logs are.
+// A rig of models/ with a recording made here, so that the benchmark needs no data: sine sweeps as commands, sampled as
+// the rig's logs are.
 #ifndef GAPSCOPE_BENCH_CASE_H_
 #define GAPSCOPE_BENCH_CASE_H_
 
@@ -21,8 +22,8 @@ struct Case {
 // The rigs that MakeCase knows.
 std::vector<std::string> Rigs();
 
-// `duration_s` of a rig; the measured signals are what the model itself does, so that windows start in states that belong to the motion.
-// Errors: those of loading models/RIG.
+// `duration_s` of a rig; the measured signals are what the model itself does, so that windows start in states that
+// belong to the motion. Errors: those of loading models/RIG.
 Result<Case> MakeCase(const std::string& rig, double duration_s);
 
 }  // namespace gapscope::bench

@@ -1,5 +1,6 @@
-// Two sides of a comparison timed in one run, one after the other again and again, so that both meet the same machine: its clock, its caches, its
-// other users. A row is the median of the pairs' ratios, with the range that holds the middle 80 % of them.
+// Two sides of a comparison timed in one run, one after the other again and again, so that both meet the same machine:
+// its clock, its caches, its other users. A row is the median of the pairs' ratios, with the range that holds the
+// middle 80 % of them.
 #ifndef GAPSCOPE_BENCH_MEASURE_H_
 #define GAPSCOPE_BENCH_MEASURE_H_
 

@@ -27,8 +27,10 @@ std::string MakeCsv(double bytes) {
   csv.reserve(static_cast<std::size_t>(bytes) + 200);
   for (std::size_t k = 0; static_cast<double>(csv.size()) < bytes; ++k) {
     const double t = 0.004 * static_cast<double>(k), u = std::clamp(2 * noise(random), -5.0, 5.0);
-    const double theta = 0.00306796158 * std::round(100 * noise(random)), alpha = 0.00306796158 * std::round(300 * noise(random));
-    fmt::format_to(std::back_inserter(csv), "{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", t, u, u, theta, alpha, noise(random), 3 * noise(random));
+    const double theta = 0.00306796158 * std::round(100 * noise(random)),
+                 alpha = 0.00306796158 * std::round(300 * noise(random));
+    fmt::format_to(std::back_inserter(csv), "{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", t, u, u, theta, alpha,
+                   noise(random), 3 * noise(random));
   }
   return csv;
 }
@@ -68,7 +70,10 @@ Result<std::vector<Row>> ReadRows(const BenchOptions& options) {
       [&] { sink = sink + FromCharsPass(csv); });
   const auto lines = static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n'));
   if (rows + 1 != lines || columns != kColumns) {
-    return Error{.what = "the CSV came back with another shape", .where = path, .actual = std::to_string(rows) + " rows", .allowed = std::to_string(lines - 1)};
+    return Error{.what = "the CSV came back with another shape",
+                 .where = path,
+                 .actual = std::to_string(rows) + " rows",
+                 .allowed = std::to_string(lines - 1)};
   }
   const double megabytes = 1e-6 * static_cast<double>(csv.size());
   std::vector<double> rates, ratios;

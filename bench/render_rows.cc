@@ -25,7 +25,8 @@ Result<std::vector<Row>> RenderRows(const BenchOptions& options) {
     for (auto& measured : recording.measured) {
       for (double& value : measured.values) value += 0.1;
     }
-    const std::string out = (std::filesystem::path(options.folder) / fmt::format("gapscope_bench_{}.mp4", getpid())).string();
+    const std::string out =
+        (std::filesystem::path(options.folder) / fmt::format("gapscope_bench_{}.mp4", getpid())).string();
     const std::vector<VideoModel> models = {{"nominal", bench_case.model, bench_case.values}};
     std::vector<double> ratios;
     VideoSummary last;
@@ -36,7 +37,8 @@ Result<std::vector<Row>> RenderRows(const BenchOptions& options) {
     }
     Row row{.name = "render_vs_real_time." + rig, .target = 1};
     Summarise(ratios, row);
-    row.detail = fmt::format("{} frames of 1280x720, overlay, in {:.2f} s with {} workers", last.frames, last.wall_s, pool.workers());
+    row.detail = fmt::format("{} frames of 1280x720, overlay, in {:.2f} s with {} workers", last.frames, last.wall_s,
+                             pool.workers());
     rows.push_back(row);
   }
   return rows;

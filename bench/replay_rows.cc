@@ -58,16 +58,21 @@ Result<Row> CompareWithBareLoop(const std::string& name, const Case& made, const
   ThreadPool pool(1);
   std::size_t bare_steps = 0, replay_steps = 0;
   const Pairs pairs = TimePairs(
-      Clock::kThread, repeats, [&] { replay_steps = Replay(*made.model, made.recordings, replay, pool).steps; }, [&] { bare_steps = bare.Run(); });
+      Clock::kThread, repeats, [&] { replay_steps = Replay(*made.model, made.recordings, replay, pool).steps; },
+      [&] { bare_steps = bare.Run(); });
   if (bare_steps != replay_steps) {
-    return Error{.what = "the two sides took different numbers of steps", .where = name, .actual = std::to_string(replay_steps), .allowed = std::to_string(bare_steps)};
+    return Error{.what = "the two sides took different numbers of steps",
+                 .where = name,
+                 .actual = std::to_string(replay_steps),
+                 .allowed = std::to_string(bare_steps)};
   }
   Row row{.name = name, .target = 0.9};
   std::vector<double> ratios;
   for (std::size_t i = 0; i < pairs.a_s.size(); ++i) ratios.push_back(pairs.b_s[i] / pairs.a_s[i]);
   Summarise(ratios, row);
   const double steps = static_cast<double>(bare_steps);
-  row.detail = fmt::format("{:.0f} k steps/s replayed, {:.0f} k bare", 1e-3 * steps / Quantile(pairs.a_s, 0.5), 1e-3 * steps / Quantile(pairs.b_s, 0.5));
+  row.detail = fmt::format("{:.0f} k steps/s replayed, {:.0f} k bare", 1e-3 * steps / Quantile(pairs.a_s, 0.5),
+                           1e-3 * steps / Quantile(pairs.b_s, 0.5));
   return row;
 }
 
@@ -83,7 +88,8 @@ Result<std::vector<Row>> ReplayRows(const BenchOptions& options) {
   std::vector<Row> rows;
   for (const auto& rig : Rigs()) {
     GS_ASSIGN(const Case made, MakeCase(rig, kDuration_s));
-    GS_ASSIGN(Row row, CompareWithBareLoop("replay_vs_mj_step." + rig, made, {.time_step_s = made.time_step_s, .values = made.values}, options.repeats));
+    GS_ASSIGN(Row row, CompareWithBareLoop("replay_vs_mj_step." + rig, made,
+                                           {.time_step_s = made.time_step_s, .values = made.values}, options.repeats));
     rows.push_back(std::move(row));
   }
   return rows;
@@ -92,7 +98,11 @@ Result<std::vector<Row>> ReplayRows(const BenchOptions& options) {
 Result<std::vector<Row>> WindowRows(const BenchOptions& options) {
   GS_ASSIGN(const Case made, ManyWindows());
   const std::size_t windows = MakeWindows(made.recordings.front(), ReplayMode::kWindows, kWindow_s).size();
-  if (windows != kWindows) return Error{.what = "wrong number of windows", .where = "bench", .actual = std::to_string(windows), .allowed = std::to_string(kWindows)};
+  if (windows != kWindows)
+    return Error{.what = "wrong number of windows",
+                 .where = "bench",
+                 .actual = std::to_string(windows),
+                 .allowed = std::to_string(kWindows)};
   GS_ASSIGN(Row row, CompareWithBareLoop("replay_windows_vs_mj_step.qube", made, WindowOptions(made), options.repeats));
   return std::vector<Row>{row};
 }
@@ -102,7 +112,8 @@ Result<std::vector<Row>> ScalingRows(const BenchOptions& options) {
   const ReplayOptions replay = WindowOptions(made);
   ThreadPool one(1), two(2);
   const Pairs pairs = TimePairs(
-      Clock::kWall, options.repeats, [&] { Replay(*made.model, made.recordings, replay, one); }, [&] { Replay(*made.model, made.recordings, replay, two); });
+      Clock::kWall, options.repeats, [&] { Replay(*made.model, made.recordings, replay, one); },
+      [&] { Replay(*made.model, made.recordings, replay, two); });
   Row row{.name = "scaling_1_to_2.qube", .target = 1.8};
   std::vector<double> ratios;
   for (std::size_t i = 0; i < pairs.a_s.size(); ++i) ratios.push_back(pairs.a_s[i] / pairs.b_s[i]);
@@ -118,7 +129,8 @@ Result<std::vector<Row>> ScalingRows(const BenchOptions& options) {
       });
   std::vector<double> gains;
   for (std::size_t i = 0; i < machine.a_s.size(); ++i) gains.push_back(2 * machine.a_s[i] / machine.b_s[i]);
-  row.detail = fmt::format("two threads of bare mj_step gain {:.2f} here ({:.2f} to {:.2f}), {} processors", Quantile(gains, 0.5), Quantile(gains, 0.1), Quantile(gains, 0.9),
+  row.detail = fmt::format("two threads of bare mj_step gain {:.2f} here ({:.2f} to {:.2f}), {} processors",
+                           Quantile(gains, 0.5), Quantile(gains, 0.1), Quantile(gains, 0.9),
                            std::thread::hardware_concurrency());
   return std::vector<Row>{row};
 }

@@ -14,7 +14,8 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRunaway = 1e6;
 
 // One log. False after a divergence; `sent` and predictions are NaN from there on.
-bool RunLoop(const Model& model, const Recording& recording, Controller& controller, const ReplayOptions& options, LogReplay* log, std::vector<double>* sent, std::size_t* steps) {
+bool RunLoop(const Model& model, const Recording& recording, Controller& controller, const ReplayOptions& options,
+             LogReplay* log, std::vector<double>* sent, std::size_t* steps) {
   const std::vector<double> values = options.values.empty() ? model.Nominal() : options.values;
   Simulator simulator(model, options.time_step_s);
   sent->assign(recording.rows(), kNan);
@@ -34,7 +35,9 @@ bool RunLoop(const Model& model, const Recording& recording, Controller& control
     for (std::size_t s = 0; s < readings.size(); ++s) {
       const auto& measured = recording.measured[s];
       const SignalSource& source = model.source(measured.index);
-      double value = source.kind == SignalKind::kPosition ? d->qpos[source.qpos] : source.kind == SignalKind::kVelocity ? d->qvel[source.dof] : kNan;
+      double value = source.kind == SignalKind::kPosition   ? d->qpos[source.qpos]
+                     : source.kind == SignalKind::kVelocity ? d->qvel[source.dof]
+                                                            : kNan;
       if (source.offset >= 0) value += values[source.offset];
       log->signals[s].predicted[row] = value;
       const double count = measured.spec.resolution;
@@ -51,7 +54,9 @@ bool RunLoop(const Model& model, const Recording& recording, Controller& control
       while (held + 1 <= row && recording.time_s[held + 1] <= at + 1e-12) ++held;
       for (std::size_t c = 0; c < recording.commands.size(); ++c) {
         const bool closed = c == controller.command();
-        d->ctrl[model.command_actuators()[c]] = !closed ? recording.commands[c].values[row] : at < recording.time_s[0] ? recording.commands[c].values[0] : (*sent)[held];
+        d->ctrl[model.command_actuators()[c]] = !closed                    ? recording.commands[c].values[row]
+                                                : at < recording.time_s[0] ? recording.commands[c].values[0]
+                                                                           : (*sent)[held];
       }
       mj_step(m, d);
     }
@@ -92,13 +97,19 @@ MotionStatistics StatisticsOf(const std::vector<double>& time_s, const std::vect
   return out;
 }
 
-Result<ClosedLoopResult> ReplayClosedLoop(const Model& model, const std::vector<Recording>& recordings, const ControllerSpec& spec, const ReplayOptions& options, ThreadPool& pool) {
+Result<ClosedLoopResult> ReplayClosedLoop(const Model& model, const std::vector<Recording>& recordings,
+                                          const ControllerSpec& spec, const ReplayOptions& options, ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
   for (const SignalSource& source : model.sources()) {
     if (source.delay < 0 && source.cutoff < 0) continue;
-    const std::string& signal = model.experiment().measured[static_cast<std::size_t>(&source - model.sources().data())].signal;
-    return Error{.what = "a late or filtered sensor cannot be replayed in closed loop: the controller would see the joint itself", .where = model.experiment().path, .actual = "'" + signal + "'",
-                 .cure = "replay in free_run or windows, or leave sensor_delay and 'filter:' out"};
+    const std::string& signal =
+        model.experiment().measured[static_cast<std::size_t>(&source - model.sources().data())].signal;
+    return Error{
+        .what =
+            "a late or filtered sensor cannot be replayed in closed loop: the controller would see the joint itself",
+        .where = model.experiment().path,
+        .actual = "'" + signal + "'",
+        .cure = "replay in free_run or windows, or leave sensor_delay and 'filter:' out"};
   }
   ClosedLoopResult closed;
   closed.result.mode = ReplayMode::kClosedLoop;

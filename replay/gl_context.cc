@@ -32,7 +32,8 @@ Function Symbol(const char* name) {
 
 const char* const kOsmesaLibraries[] = {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"};
 const char* const kEglLibraries[] = {"libEGL.so.1", "libEGL.so"};
-constexpr const char* kInstall = "on Debian: apt-get install libosmesa6 (or libegl1 libegl-mesa0 libgl1-mesa-dri for --gl egl)";
+constexpr const char* kInstall =
+    "on Debian: apt-get install libosmesa6 (or libegl1 libegl-mesa0 libgl1-mesa-dri for --gl egl)";
 
 Status Open(GlBackend backend) {
   std::string reason;
@@ -51,7 +52,10 @@ Status Open(GlBackend backend) {
     Process().backend = backend;
     return Ok();
   }
-  return Error{.what = "cannot render: no OpenGL library", .where = "--gl " + GlBackendName(backend), .actual = reason, .cure = kInstall};
+  return Error{.what = "cannot render: no OpenGL library",
+               .where = "--gl " + GlBackendName(backend),
+               .actual = reason,
+               .cure = kInstall};
 }
 
 class OsmesaContext : public GlContext {
@@ -60,8 +64,17 @@ class OsmesaContext : public GlContext {
     const auto create = Symbol<decltype(&OSMesaCreateContextAttribs)>("OSMesaCreateContextAttribs");
     const auto make_current = Symbol<decltype(&OSMesaMakeCurrent)>("OSMesaMakeCurrent");
     const auto destroy = Symbol<decltype(&OSMesaDestroyContext)>("OSMesaDestroyContext");
-    if (!create || !make_current || !destroy) return Error{.what = "cannot render: this libOSMesa is too old", .where = "--gl osmesa", .cure = kInstall};
-    const int attributes[] = {OSMESA_FORMAT, OSMESA_RGBA, OSMESA_DEPTH_BITS, 24, OSMESA_STENCIL_BITS, 8, OSMESA_PROFILE, OSMESA_COMPAT_PROFILE, 0};
+    if (!create || !make_current || !destroy)
+      return Error{.what = "cannot render: this libOSMesa is too old", .where = "--gl osmesa", .cure = kInstall};
+    const int attributes[] = {OSMESA_FORMAT,
+                              OSMESA_RGBA,
+                              OSMESA_DEPTH_BITS,
+                              24,
+                              OSMESA_STENCIL_BITS,
+                              8,
+                              OSMESA_PROFILE,
+                              OSMESA_COMPAT_PROFILE,
+                              0};
     std::unique_ptr<OsmesaContext> made(new OsmesaContext);
     made->context_ = create(attributes, nullptr);
     made->make_current_ = make_current;
@@ -89,7 +102,9 @@ class OsmesaContext : public GlContext {
 class EglContext : public GlContext {
  public:
   static Result<std::unique_ptr<GlContext>> Make() {
-    const auto no_context = [](const std::string& what) { return Error{.what = "cannot render: " + what, .where = "--gl egl", .cure = kInstall}; };
+    const auto no_context = [](const std::string& what) {
+      return Error{.what = "cannot render: " + what, .where = "--gl egl", .cure = kInstall};
+    };
     const auto display = Display();
     if (!display.ok()) return display.error();
     std::unique_ptr<EglContext> made(new EglContext);
@@ -102,10 +117,12 @@ class EglContext : public GlContext {
     const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
     EGLConfig config = nullptr;
     EGLint count = 0;
-    if (!bind(EGL_OPENGL_API) || !choose(made->display_, wanted, &config, 1, &count) || count < 1) return no_context("EGL has no desktop OpenGL");
+    if (!bind(EGL_OPENGL_API) || !choose(made->display_, wanted, &config, 1, &count) || count < 1)
+      return no_context("EGL has no desktop OpenGL");
     made->context_ = create(made->display_, config, EGL_NO_CONTEXT, nullptr);
     if (made->context_ == EGL_NO_CONTEXT) return no_context("EGL gives no context");
-    if (!made->make_current_(made->display_, EGL_NO_SURFACE, EGL_NO_SURFACE, made->context_)) return no_context("EGL gives no context without a surface");
+    if (!made->make_current_(made->display_, EGL_NO_SURFACE, EGL_NO_SURFACE, made->context_))
+      return no_context("EGL gives no context without a surface");
     return std::unique_ptr<GlContext>(std::move(made));
   }
   ~EglContext() override {
@@ -120,21 +137,25 @@ class EglContext : public GlContext {
     static const EGLDisplay display = [] {
       const auto get_proc = Symbol<decltype(&eglGetProcAddress)>("eglGetProcAddress");
       const auto initialize = Symbol<decltype(&eglInitialize)>("eglInitialize");
-      const auto platform_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(get_proc("eglGetPlatformDisplayEXT"));
+      const auto platform_display =
+          reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(get_proc("eglGetPlatformDisplayEXT"));
       const auto query_devices = reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(get_proc("eglQueryDevicesEXT"));
       if (!platform_display) return EGL_NO_DISPLAY;
-      std::vector<EGLDisplay> displays = {platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr)};
+      std::vector<EGLDisplay> displays = {
+          platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr)};
       EGLDeviceEXT devices[16];
       EGLint count = 0;
       if (query_devices && query_devices(16, devices, &count)) {
-        for (EGLint i = 0; i < count; ++i) displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, devices[i], nullptr));
+        for (EGLint i = 0; i < count; ++i)
+          displays.push_back(platform_display(EGL_PLATFORM_DEVICE_EXT, devices[i], nullptr));
       }
       for (EGLDisplay candidate : displays) {
         if (candidate != EGL_NO_DISPLAY && initialize(candidate, nullptr, nullptr)) return candidate;
       }
       return EGL_NO_DISPLAY;
     }();
-    if (display == EGL_NO_DISPLAY) return Error{.what = "cannot render: EGL has no display without a screen", .where = "--gl egl", .cure = kInstall};
+    if (display == EGL_NO_DISPLAY)
+      return Error{.what = "cannot render: EGL has no display without a screen", .where = "--gl egl", .cure = kInstall};
     return display;
   }
   EGLDisplay display_ = EGL_NO_DISPLAY;
@@ -145,14 +166,18 @@ class EglContext : public GlContext {
 
 }  // namespace
 
-std::string GlBackendName(GlBackend backend) { return backend == GlBackend::kEgl ? "egl" : backend == GlBackend::kOsmesa ? "osmesa" : "auto"; }
+std::string GlBackendName(GlBackend backend) {
+  return backend == GlBackend::kEgl ? "egl" : backend == GlBackend::kOsmesa ? "osmesa" : "auto";
+}
 
 Result<GlBackend> OpenGl(GlBackend wanted, int threads, std::string* note) {
   Opened& opened = Process();
   const std::lock_guard lock(opened.mutex);
   if (opened.backend != GlBackend::kAuto) {
     if (wanted == GlBackend::kAuto || wanted == opened.backend) return opened.backend;
-    return Error{.what = "cannot render with two OpenGL libraries in one process", .where = "--gl " + GlBackendName(wanted), .actual = GlBackendName(opened.backend) + " is open"};
+    return Error{.what = "cannot render with two OpenGL libraries in one process",
+                 .where = "--gl " + GlBackendName(wanted),
+                 .actual = GlBackendName(opened.backend) + " is open"};
   }
   constexpr int kMost = 16;  // Mesa's own limit
   setenv("LP_NUM_THREADS", threads > 1 ? std::to_string(std::min(threads, kMost)).c_str() : "0", 0);

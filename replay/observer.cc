@@ -6,8 +6,13 @@
 namespace gapscope {
 
 Observer::Observer(ObserverSpec spec)
-    : spec_(std::move(spec)), left_inverse_(spec_.c.completeOrthogonalDecomposition().pseudoInverse()), state_(Eigen::VectorXd::Zero(spec_.a.rows())), next_(state_),
-      wanted_(state_), readings_(spec_.c.rows()), references_(spec_.c.rows()) {}
+    : spec_(std::move(spec)),
+      left_inverse_(spec_.c.completeOrthogonalDecomposition().pseudoInverse()),
+      state_(Eigen::VectorXd::Zero(spec_.a.rows())),
+      next_(state_),
+      wanted_(state_),
+      readings_(spec_.c.rows()),
+      references_(spec_.c.rows()) {}
 
 void Observer::Discretise(double period_s) {
   if (std::abs(period_s - period_s_) <= 1e-9 * period_s_) return;
@@ -23,7 +28,8 @@ void Observer::Discretise(double period_s) {
   period_s_ = period_s;
 }
 
-double Observer::Step(std::span<const double> readings, std::span<const double> references, double sent, double period_s) {
+double Observer::Step(std::span<const double> readings, std::span<const double> references, double sent,
+                      double period_s) {
   for (Eigen::Index i = 0; i < readings_.size(); ++i) {
     readings_[i] = readings[static_cast<std::size_t>(i)];
     references_[i] = references[static_cast<std::size_t>(i)];

@@ -8,8 +8,10 @@ namespace {
 
 enum class Which { kMeasured, kPredicted };
 
-// Writes the joints that the log measures into `track`; rows without a value keep what they have (predicted) or lose their pose (measured).
-void WriteMeasuredJoints(const Model& model, std::span<const double> values, const Recording& recording, const LogReplay* replay, PoseTrack& track) {
+// Writes the joints that the log measures into `track`; rows without a value keep what they have (predicted) or lose
+// their pose (measured).
+void WriteMeasuredJoints(const Model& model, std::span<const double> values, const Recording& recording,
+                         const LogReplay* replay, PoseTrack& track) {
   const std::size_t nq = track.nq();
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {
     const SignalSource& source = model.source(recording.measured[s].index);
@@ -33,14 +35,16 @@ bool IsPose(const double* qpos, std::size_t nq) {
 
 }  // namespace
 
-PoseTrack PredictedPoses(const Model& model, std::span<const double> values, const Recording& recording, const LogReplay& replay) {
+PoseTrack PredictedPoses(const Model& model, std::span<const double> values, const Recording& recording,
+                         const LogReplay& replay) {
   GS_CHECK(replay.qpos.size() == recording.rows() * static_cast<std::size_t>(model.compiled().nq));
   PoseTrack track{.time_s = recording.time_s, .qpos = replay.qpos};
   WriteMeasuredJoints(model, values, recording, &replay, track);
   return track;
 }
 
-PoseTrack MeasuredPoses(const Model& model, std::span<const double> values, const Recording& recording, const PoseTrack& predicted) {
+PoseTrack MeasuredPoses(const Model& model, std::span<const double> values, const Recording& recording,
+                        const PoseTrack& predicted) {
   PoseTrack track = predicted;
   // A simulation that ran away says nothing about joints that nobody measured: they stay where they were.
   const std::size_t nq = track.nq();

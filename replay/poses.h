@@ -1,4 +1,5 @@
-// Poses of a mechanism over a recording: what the log measured and what a replay predicted, read at any time between the stamps.
+// Poses of a mechanism over a recording: what the log measured and what a replay predicted, read at any time between
+// the stamps.
 #ifndef GAPSCOPE_REPLAY_POSES_H_
 #define GAPSCOPE_REPLAY_POSES_H_
 
@@ -16,15 +17,20 @@ struct PoseTrack {
   std::size_t nq() const { return time_s.empty() ? 0 : qpos.size() / time_s.size(); }
 };
 
-// `replay`, made with ReplayOptions::keep_poses of the same model and values, so that measured joints stand exactly where the predicted signal says
-// (with its sensor's delay, without its zero offset), the others where the simulation had them.
-PoseTrack PredictedPoses(const Model& model, std::span<const double> values, const Recording& recording, const LogReplay& replay);
+// `replay`, made with ReplayOptions::keep_poses of the same model and values, so that measured joints stand exactly
+// where the predicted signal says (with its sensor's delay, without its zero offset), the others where the simulation
+// had them.
+PoseTrack PredictedPoses(const Model& model, std::span<const double> values, const Recording& recording,
+                         const LogReplay& replay);
 
-// Measured joints where the log says (without the zero offset of `values`), the others as in `predicted`, of the same recording and model.
-PoseTrack MeasuredPoses(const Model& model, std::span<const double> values, const Recording& recording, const PoseTrack& predicted);
+// Measured joints where the log says (without the zero offset of `values`), the others as in `predicted`, of the same
+// recording and model.
+PoseTrack MeasuredPoses(const Model& model, std::span<const double> values, const Recording& recording,
+                        const PoseTrack& predicted);
 
-// The pose at `time_s` by interpolation between the stamps around it (along the shortest way where a joint has a quaternion), held beyond the ends.
-// Where the later stamp has no pose, the earlier one stays. `qpos` has model.nq numbers. Returns false, leaving `qpos` alone, where there is no pose.
+// The pose at `time_s` by interpolation between the stamps around it (along the shortest way where a joint has a
+// quaternion), held beyond the ends. Where the later stamp has no pose, the earlier one stays. `qpos` has model.nq
+// numbers. Returns false, leaving `qpos` alone, where there is no pose.
 bool PoseAt(const mjModel& model, const PoseTrack& track, double time_s, std::span<double> qpos);
 
 }  // namespace gapscope

@@ -48,8 +48,12 @@ LogReplay EmptyTraces(const Recording& recording) {
   log.log_path = recording.log_path;
   log.time_s = recording.time_s;
   for (const auto& measured : recording.measured) {
-    log.signals.push_back({.signal = measured.spec.signal, .kind = measured.spec.kind, .scored = measured.spec.scored, .resolution = measured.spec.resolution,
-                           .measured = measured.values, .predicted = std::vector<double>(recording.rows(), kNan)});
+    log.signals.push_back({.signal = measured.spec.signal,
+                           .kind = measured.spec.kind,
+                           .scored = measured.spec.scored,
+                           .resolution = measured.spec.resolution,
+                           .measured = measured.values,
+                           .predicted = std::vector<double>(recording.rows(), kNan)});
   }
   return log;
 }
@@ -85,7 +89,8 @@ double ReplayError(const std::vector<LogReplay>& logs) {
   return count == 0 ? kNan : std::sqrt(sum / static_cast<double>(count));
 }
 
-ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool) {
+ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options,
+                    ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
   ReplayResult result{.mode = options.mode};
   const std::vector<double> values = options.values.empty() ? model.Nominal() : options.values;
@@ -102,7 +107,8 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
   for (std::size_t log = 0; log < recordings.size(); ++log) {
     result.logs.push_back(EmptyTraces(recordings[log]));
     if (options.keep_poses) result.logs.back().qpos.assign(recordings[log].rows() * nq, kNan);
-    for (const Window& window : MakeWindows(recordings[log], options.mode, options.window_s)) jobs.push_back({log, window});
+    for (const Window& window : MakeWindows(recordings[log], options.mode, options.window_s))
+      jobs.push_back({log, window});
   }
   std::vector<std::unique_ptr<Simulator>> simulators(pool.workers());
   std::vector<std::size_t> last_log(pool.workers(), std::numeric_limits<std::size_t>::max());
@@ -122,10 +128,13 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
     if (buffer.size() < job.window.rows() * signals) buffer.resize(job.window.rows() * signals);
     if (valid[worker]) {
       poses[worker].resize(options.keep_poses ? job.window.rows() * nq : 0);
-      runs[index] = simulators[worker]->Run(recording, job.window, InitialStateAt(model, recording, job.window.begin, values), buffer, poses[worker]);
+      runs[index] = simulators[worker]->Run(
+          recording, job.window, InitialStateAt(model, recording, job.window.begin, values), buffer, poses[worker]);
       // Windows share a stamp: the later one begins there, and its own pose is the one that counts.
       const std::size_t last = job.window.end == recording.rows() ? job.window.rows() : job.window.rows() - 1;
-      if (options.keep_poses) std::copy_n(poses[worker].begin(), last * nq, result.logs[job.log].qpos.begin() + static_cast<std::ptrdiff_t>(job.window.begin * nq));
+      if (options.keep_poses)
+        std::copy_n(poses[worker].begin(), last * nq,
+                    result.logs[job.log].qpos.begin() + static_cast<std::ptrdiff_t>(job.window.begin * nq));
     } else {
       runs[index].outcome = Outcome::kDiverged;
       std::fill(buffer.begin(), buffer.end(), kNan);
@@ -151,7 +160,8 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
   return result;
 }
 
-TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool) {
+TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options,
+                        ThreadPool& pool) {
   ReplayOptions trial = options;
   trial.keep_poses = false;
   const auto error_at = [&](double step) {
@@ -184,7 +194,8 @@ ScaleTable EstimateScales(const Model& model, const std::vector<Recording>& reco
   ScaleTable table;
   Simulator simulator(model, 0);
   const std::vector<double> values = model.Nominal();
-  std::vector<Scales> joints(m.njnt, {.torque_n_m = 0, .angle_rad = 0, .speed_rad_per_s = 0, .sample_s = 0, .command = 0, .inertia_kg_m2 = 0});
+  std::vector<Scales> joints(
+      m.njnt, {.torque_n_m = 0, .angle_rad = 0, .speed_rad_per_s = 0, .sample_s = 0, .command = 0, .inertia_kg_m2 = 0});
   std::vector<double> buffer, pose(m.nq);
   std::vector<double> steps;
   const auto largest = [](double& value, double candidate) {
@@ -195,13 +206,15 @@ ScaleTable EstimateScales(const Model& model, const std::vector<Recording>& reco
     steps.push_back(recording.timeline.median_step_s);
     mjModel* copy = const_cast<mjModel*>(&simulator.mujoco_model());
     mjData* d = &simulator.data();
-    // Follow the measured motion, not a free run that may run off: the torques that the motors would give, and the motion's own inertial torques.
+    // Follow the measured motion, not a free run that may run off: the torques that the motors would give, and the
+    // motion's own inertial torques.
     for (std::size_t row = 0; row < recording.rows(); row += std::max<std::size_t>(1, recording.rows() / 200)) {
       const InitialState state = InitialStateAt(model, recording, row, values);
       mj_resetData(copy, d);
       std::copy(state.qpos.begin(), state.qpos.end(), d->qpos);
       std::copy(state.qvel.begin(), state.qvel.end(), d->qvel);
-      for (std::size_t c = 0; c < recording.commands.size(); ++c) d->ctrl[model.command_actuators()[c]] = recording.commands[c].values[row];
+      for (std::size_t c = 0; c < recording.commands.size(); ++c)
+        d->ctrl[model.command_actuators()[c]] = recording.commands[c].values[row];
       mj_forward(copy, d);
       for (int j = 0; j < m.njnt; ++j) {
         if (m.jnt_type[j] != mjJNT_HINGE && m.jnt_type[j] != mjJNT_SLIDE) continue;

@@ -12,10 +12,10 @@ namespace gapscope {
 
 struct ReplayOptions {
   ReplayMode mode = ReplayMode::kFreeRun;
-  double window_s = 1.0;         // kWindows: length; windows follow each other without overlap
-  double time_step_s = 0;        // 0: chosen (see ChooseTimeStep)
-  std::vector<double> values;    // parameters, as model.Nominal(); empty: nominal
-  bool keep_poses = false;       // fill LogReplay::qpos
+  double window_s = 1.0;       // kWindows: length; windows follow each other without overlap
+  double time_step_s = 0;      // 0: chosen (see ChooseTimeStep)
+  std::vector<double> values;  // parameters, as model.Nominal(); empty: nominal
+  bool keep_poses = false;     // fill LogReplay::qpos
 };
 
 // Measured and predicted on the recording's stamps.
@@ -34,7 +34,8 @@ struct LogReplay {
   std::size_t windows = 0, diverged_windows = 0;
   std::vector<double> time_s;
   std::vector<SignalTrace> signals;
-  std::vector<double> qpos;  // with keep_poses: rows x model nq, the simulated pose at each stamp; NaN after a divergence
+  std::vector<double>
+      qpos;  // with keep_poses: rows x model nq, the simulated pose at each stamp; NaN after a divergence
 };
 
 // The recording's measurements with nothing predicted yet.
@@ -52,21 +53,24 @@ struct ReplayResult {
 // The windows of a recording: one for a free run; else windows of `window_s`, the last one at least half as long.
 std::vector<Window> MakeWindows(const Recording& recording, ReplayMode mode, double window_s);
 
-ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool);
+ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options,
+                    ThreadPool& pool);
 
-// The largest step, of the log's own sample time halved again and again (down to a 32nd of the model's time step), whose halving changes the combined
-// error by less than 1 % of it.
+// The largest step, of the log's own sample time halved again and again (down to a 32nd of the model's time step),
+// whose halving changes the combined error by less than 1 % of it.
 struct TimeStep {
   double step_s = 0;
   double error_change = 0;  // of the combined error
 };
-TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options, ThreadPool& pool);
+TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options,
+                        ThreadPool& pool);
 
-// Root mean square over scored signals of (RMSE / standard deviation of the measured signal), then over logs; NaN rows are left out, a log that
-// diverged gives infinity.
+// Root mean square over scored signals of (RMSE / standard deviation of the measured signal), then over logs; NaN rows
+// are left out, a log that diverged gives infinity.
 double ReplayError(const std::vector<LogReplay>& logs);
 
-// Largest torque, angle, speed and command on each joint and actuator over the recordings, from a nominal free run: the rig's own size.
+// Largest torque, angle, speed and command on each joint and actuator over the recordings, from a nominal free run: the
+// rig's own size.
 ScaleTable EstimateScales(const Model& model, const std::vector<Recording>& recordings);
 
 }  // namespace gapscope

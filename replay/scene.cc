@@ -13,7 +13,8 @@ constexpr int kMaxGeoms = 20000;
 constexpr float kGhostAlpha = 0.5f;
 // Apart by this share of the model's size a ghost is at its clearest: about four pixels of a picture 500 high.
 constexpr float kClearAt = 0.008f;
-// Ghosts are drawn a little larger: where they touch the solid mechanism their skin is in front of it all over, instead of in stripes.
+// Ghosts are drawn a little larger: where they touch the solid mechanism their skin is in front of it all over, instead
+// of in stripes.
 constexpr float kGhostGrowth = 1.012f;
 
 constexpr int kSampledPoses = 200;     // of a track, to frame it
@@ -51,7 +52,8 @@ void ForEachCorner(const mjModel& m, const mjData& d, int geom, const Use& use) 
     mjtNum local[3], world[3];
     for (int i = 0; i < 3; ++i) local[i] = box[i] + ((corner >> i & 1) ? box[3 + i] : -box[3 + i]);
     mju_mulMatVec3(world, d.geom_xmat + 9 * geom, local);
-    use(Vector{world[0] + d.geom_xpos[3 * geom], world[1] + d.geom_xpos[3 * geom + 1], world[2] + d.geom_xpos[3 * geom + 2]});
+    use(Vector{world[0] + d.geom_xpos[3 * geom], world[1] + d.geom_xpos[3 * geom + 1],
+               world[2] + d.geom_xpos[3 * geom + 2]});
   }
 }
 
@@ -94,9 +96,11 @@ Framing FrameMotion(const mjModel& model, std::span<const PoseTrack* const> trac
   SetPose(model, d, std::span<const double>(model.qpos0, static_cast<std::size_t>(model.nq)));
   PointCamera(model, d, framing);
   const double azimuth = framing.azimuth_deg * mjPI / 180, elevation = framing.elevation_deg * mjPI / 180;
-  const Vector forward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation)};
+  const Vector forward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                          std::sin(elevation)};
   const Vector right = {std::sin(azimuth), -std::cos(azimuth), 0};
-  const Vector up = {right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2], right[0] * forward[1] - right[1] * forward[0]};
+  const Vector up = {right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2],
+                     right[0] * forward[1] - right[1] * forward[0]};
 
   // Corners of what moves in the camera's axes; kTracking: about the middle of each pose, where the camera looks.
   std::vector<Vector> seen;
@@ -135,15 +139,20 @@ Framing FrameMotion(const mjModel& model, std::span<const PoseTrack* const> trac
   for (std::size_t i = 0; i < 3; ++i) middle[i] = view == View::kTracking ? 0 : (low[i] + high[i]) / 2;
   const double tall = std::tan(model.vis.global.fovy * mjPI / 360) / kMargin, wide = tall * aspect;
   double distance = 0;
-  for (const Vector& p : seen) distance = std::max(distance, std::max(std::abs(p[0] - middle[0]) / wide, std::abs(p[1] - middle[1]) / tall) - (p[2] - middle[2]));
+  for (const Vector& p : seen)
+    distance = std::max(
+        distance, std::max(std::abs(p[0] - middle[0]) / wide, std::abs(p[1] - middle[1]) / tall) - (p[2] - middle[2]));
   framing.distance_m = distance * (view == View::kTracking ? kTrackingZoom : 1);
-  for (std::size_t i = 0; i < 3; ++i) framing.centre[i] = first[i] + middle[0] * right[i] + middle[1] * up[i] + middle[2] * forward[i];
+  for (std::size_t i = 0; i < 3; ++i)
+    framing.centre[i] = first[i] + middle[0] * right[i] + middle[1] * up[i] + middle[2] * forward[i];
 
   // A table that all of the mechanism stands on.
   double reach = 0;
   for (int g = 0; g < model.ngeom; ++g) {
     if (model.geom_type[g] == mjGEOM_PLANE || model.geom_type[g] == mjGEOM_HFIELD) continue;
-    ForEachCorner(model, d, g, [&](const Vector& p) { reach = std::max(reach, std::hypot(p[0] - framing.centre[0], p[1] - framing.centre[1])); });
+    ForEachCorner(model, d, g, [&](const Vector& p) {
+      reach = std::max(reach, std::hypot(p[0] - framing.centre[0], p[1] - framing.centre[1]));
+    });
   }
   framing.ground_m = 1.7 * reach;
   return framing;
@@ -206,18 +215,27 @@ struct Scene::Impl {
     mjr_render(viewport, &scene, &context);
     mjr_readPixels(rgb.data(), nullptr, viewport, &context);
     std::copy_n(cameras, 2, scene.camera);
-    if (const int error = mjr_getError(); error != 0) return Error{.what = "OpenGL failed while drawing", .actual = fmt::format("error {:#x}", error), .cure = "try another --gl"};
+    if (const int error = mjr_getError(); error != 0)
+      return Error{.what = "OpenGL failed while drawing",
+                   .actual = fmt::format("error {:#x}", error),
+                   .cure = "try another --gl"};
     for (int row = 0; row < part.height; ++row) {
       const unsigned char* from = rgb.data() + 3 * static_cast<std::size_t>(row) * static_cast<std::size_t>(part.width);
-      std::uint32_t* to = picture.pixels.data() + static_cast<std::size_t>(height - 1 - part.bottom - row) * static_cast<std::size_t>(width) + part.left;
-      for (int x = 0; x < part.width; ++x, from += 3) to[x] = 0xff000000u | static_cast<std::uint32_t>(from[0]) << 16 | static_cast<std::uint32_t>(from[1]) << 8 | from[2];
+      std::uint32_t* to = picture.pixels.data() +
+                          static_cast<std::size_t>(height - 1 - part.bottom - row) * static_cast<std::size_t>(width) +
+                          part.left;
+      for (int x = 0; x < part.width; ++x, from += 3)
+        to[x] = 0xff000000u | static_cast<std::uint32_t>(from[0]) << 16 | static_cast<std::uint32_t>(from[1]) << 8 |
+                from[2];
     }
     return Ok();
   }
 
   Status DrawStill(const mjrRect& whole) {
     const std::vector<mjvGeom> all(scene.geoms, scene.geoms + scene.ngeom);
-    scene.ngeom = static_cast<int>(std::remove_if(scene.geoms, scene.geoms + scene.ngeom, [](const mjvGeom& g) { return g.category != mjCAT_STATIC; }) - scene.geoms);
+    scene.ngeom = static_cast<int>(std::remove_if(scene.geoms, scene.geoms + scene.ngeom,
+                                                  [](const mjvGeom& g) { return g.category != mjCAT_STATIC; }) -
+                                   scene.geoms);
     const Status drawn = DrawPart(whole, still);
     std::copy(all.begin(), all.end(), scene.geoms);
     scene.ngeom = static_cast<int>(all.size());
@@ -241,7 +259,8 @@ struct Scene::Impl {
         x += d * right[i], y += d * u[i], z += d * f[i];
       }
       if (z < camera.frustum_near) return void(all = true);
-      const double at[] = {(x / z * camera.frustum_near - camera.frustum_center) / pixel + 0.5 * width, (y / z * camera.frustum_near - camera.frustum_bottom) / pixel};
+      const double at[] = {(x / z * camera.frustum_near - camera.frustum_center) / pixel + 0.5 * width,
+                           (y / z * camera.frustum_near - camera.frustum_bottom) / pixel};
       for (int i = 0; i < 2; ++i) low[i] = std::min(low[i], at[i]), high[i] = std::max(high[i], at[i]);
     };
     double ground = 1e9;
@@ -257,7 +276,9 @@ struct Scene::Impl {
         Vector p{};
         for (int i = 0; i < 3; ++i) {
           p[static_cast<std::size_t>(i)] = geom.pos[i];
-          for (int j = 0; j < 3; ++j) p[static_cast<std::size_t>(i)] += geom.mat[3 * i + j] * (box[j] + kGhostGrowth * ((corner >> j & 1) ? box[3 + j] : -box[3 + j]));
+          for (int j = 0; j < 3; ++j)
+            p[static_cast<std::size_t>(i)] +=
+                geom.mat[3 * i + j] * (box[j] + kGhostGrowth * ((corner >> j & 1) ? box[3 + j] : -box[3 + j]));
         }
         see(p);
         for (int l = 0; geom.castshadow && l < scene.nlight; ++l) {
@@ -275,12 +296,14 @@ struct Scene::Impl {
     part.left = static_cast<int>(std::clamp(std::floor(low[0] - kRim), 0.0, static_cast<double>(width)));
     part.bottom = static_cast<int>(std::clamp(std::floor(low[1] - kRim), 0.0, static_cast<double>(height)));
     part.width = static_cast<int>(std::clamp(std::ceil(high[0] + kRim), 0.0, static_cast<double>(width))) - part.left;
-    part.height = static_cast<int>(std::clamp(std::ceil(high[1] + kRim), 0.0, static_cast<double>(height))) - part.bottom;
+    part.height =
+        static_cast<int>(std::clamp(std::ceil(high[1] + kRim), 0.0, static_cast<double>(height))) - part.bottom;
     return part;
   }
 
   void AddGhost(std::size_t slot, const Mechanism& mechanism, int solid_geoms) {
-    // Geoms are found again by their object; effects may have added bodies, so numbers need not agree, but names of the rest do.
+    // Geoms are found again by their object; effects may have added bodies, so numbers need not agree, but names of the
+    // rest do.
     std::map<int, const mjvGeom*> solid;
     for (int g = 0; g < solid_geoms; ++g) {
       if (scene.geoms[g].objtype == mjOBJ_GEOM) solid[scene.geoms[g].objid] = &scene.geoms[g];
@@ -291,7 +314,8 @@ struct Scene::Impl {
     for (int g = begin; g < scene.ngeom; ++g) {
       mjvGeom geom = scene.geoms[g];
       const auto twin = solid.find(geom.objid);
-      const float apart = twin == solid.end() ? kClearAt * static_cast<float>(model->stat.extent) : Apart(geom, *twin->second);
+      const float apart =
+          twin == solid.end() ? kClearAt * static_cast<float>(model->stat.extent) : Apart(geom, *twin->second);
       const float clear = std::min(1.0f, apart / (kClearAt * static_cast<float>(model->stat.extent)));
       if (geom.objtype != mjOBJ_GEOM || clear <= 1e-4f) continue;
       for (int i = 0; i < 3; ++i) geom.rgba[i] = mechanism.ghost_rgb[static_cast<std::size_t>(i)];
@@ -309,7 +333,8 @@ struct Scene::Impl {
   }
 };
 
-Result<std::unique_ptr<Scene>> Scene::Make(const mjModel& model, const Framing& framing, int width, int height, Redraw redraw) {
+Result<std::unique_ptr<Scene>> Scene::Make(const mjModel& model, const Framing& framing, int width, int height,
+                                           Redraw redraw) {
   GS_CHECK(width > 0 && height > 0);
   std::unique_ptr<Scene> made(new Scene);
   made->impl_ = std::make_unique<Impl>();
@@ -322,7 +347,8 @@ Result<std::unique_ptr<Scene>> Scene::Make(const mjModel& model, const Framing& 
   drawn.vis.global.offheight = height;
   // The renderer prepares planes from the model, and draws them where the scene says (LayTable).
   for (int g = 0; g < drawn.ngeom; ++g) {
-    if (drawn.geom_type[g] == mjGEOM_PLANE && !(drawn.geom_size[3 * g] > 0)) drawn.geom_size[3 * g] = drawn.geom_size[3 * g + 1] = framing.ground_m;
+    if (drawn.geom_type[g] == mjGEOM_PLANE && !(drawn.geom_size[3 * g] > 0))
+      drawn.geom_size[3 * g] = drawn.geom_size[3 * g + 1] = framing.ground_m;
   }
   drawn.vis.quality.shadowsize = std::min(drawn.vis.quality.shadowsize, kShadowMap);
   drawn.vis.map.shadowclip = static_cast<float>(1.3 * framing.ground_m / drawn.stat.extent);
@@ -332,7 +358,9 @@ Result<std::unique_ptr<Scene>> Scene::Make(const mjModel& model, const Framing& 
   mjr_makeContext(&drawn, &impl.context, mjFONTSCALE_100);
   mjr_setBuffer(mjFB_OFFSCREEN, &impl.context);
   if (impl.context.currentBuffer != mjFB_OFFSCREEN || mjr_getError() != 0) {
-    return Error{.what = "OpenGL cannot draw off-screen", .where = fmt::format("a picture of {} x {}", width, height), .cure = "try a smaller --size or another --gl"};
+    return Error{.what = "OpenGL cannot draw off-screen",
+                 .where = fmt::format("a picture of {} x {}", width, height),
+                 .cure = "try a smaller --size or another --gl"};
   }
   impl.scene.flags[mjRND_REFLECTION] = 0;
   impl.redraw = framing.view == View::kTracking ? Redraw::kAll : redraw;

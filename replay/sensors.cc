@@ -26,7 +26,8 @@ void Delay(std::span<const double> time, std::span<const double> in, double dela
   }
 }
 
-void LowPass(std::span<const double> time, std::span<const double> in, const LowPassFilter& filter, double value, double slope, std::span<double> out) {
+void LowPass(std::span<const double> time, std::span<const double> in, const LowPassFilter& filter, double value,
+             double slope, std::span<double> out) {
   const double w = filter.cutoff_rad_per_s, z = filter.damping_ratio, lag = 2 * z / w;
   double y = value, dy = slope;
   out[0] = y;

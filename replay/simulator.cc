@@ -11,16 +11,20 @@
 namespace gapscope {
 namespace {
 
-// How far back a window's past reaches: for delays alone; for states whose time constant is nobody's parameter; else so many time constants, at most the last.
+// How far back a window's past reaches: for delays alone; for states whose time constant is nobody's parameter; else so
+// many time constants, at most the last.
 constexpr double kHistory_s = 0.2, kTransmission_s = 0.5, kPreRoll_s = 1.5, kTimeConstants = 5, kLongest_s = 6;
 constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
 
 // Even steps of at most `max_step_s`.
-int StepsOver(double interval_s, double max_step_s) { return std::max(1, static_cast<int>(std::ceil(interval_s / max_step_s - 1e-6))); }
+int StepsOver(double interval_s, double max_step_s) {
+  return std::max(1, static_cast<int>(std::ceil(interval_s / max_step_s - 1e-6)));
+}
 
 ModelPtr CopyForReplay(const mjModel& model) {
   ModelPtr copy(mj_copyModel(nullptr, &model));
-  // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this small.
+  // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this
+  // small.
   copy->opt.disableflags |= mjDSBL_AUTORESET | mjDSBL_SENSOR | mjDSBL_ISLAND;
   return copy;
 }
@@ -39,15 +43,17 @@ bool IsSane(const mjModel& m, const mjData& d) {
   return true;
 }
 
-// Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1], and `earlier` before the first stamp. `row` is a hint that moves with
-// the time.
-double MeanHeld(const std::vector<double>& time, const std::vector<double>& values, double earlier, double from, double to, std::size_t& row) {
+// Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1], and `earlier` before the first
+// stamp. `row` is a hint that moves with the time.
+double MeanHeld(const std::vector<double>& time, const std::vector<double>& values, double earlier, double from,
+                double to, std::size_t& row) {
   if (to <= time.front() && from < time.front()) return earlier;
   while (row > 0 && time[row] > from) --row;
   while (row + 1 < time.size() && time[row + 1] <= from) ++row;
   const double begin = std::max(from, time.front());
   double sum = earlier * (begin - from), t = begin;
-  if (row + 1 >= time.size() || time[row + 1] >= to) return from < begin ? (sum + values[row] * (to - begin)) / (to - from) : values[row];
+  if (row + 1 >= time.size() || time[row + 1] >= to)
+    return from < begin ? (sum + values[row] * (to - begin)) / (to - from) : values[row];
   std::size_t k = row;
   while (t < to) {
     const double next = k + 1 < time.size() ? std::min(time[k + 1], to) : to;
@@ -69,14 +75,16 @@ LocalFit FitLater(const Recording& recording, const Recording::Measured& measure
   const LocalFit b = FitLocally(recording, measured, row + 1, kInitialFitHalfWidth_s);
   const double share = std::clamp((at - time[row]) / (time[row + 1] - time[row]), 0.0, 1.0);
   LocalFit between = a;
-  between.value = (1 - share) * (a.value + a.slope * (at - time[row])) + share * (b.value + b.slope * (at - time[row + 1]));
+  between.value =
+      (1 - share) * (a.value + a.slope * (at - time[row])) + share * (b.value + b.slope * (at - time[row + 1]));
   between.slope = (1 - share) * a.slope + share * b.slope;
   return between;
 }
 
 }  // namespace
 
-InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values) {
+InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row,
+                            std::span<const double> values) {
   const mjModel& m = model.compiled();
   InitialState state;
   state.qpos.assign(m.qpos0, m.qpos0 + m.nq);
@@ -103,8 +111,14 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
 }
 
 Simulator::Simulator(const Model& model, double max_step_s)
-    : model_(model), mujoco_(CopyForReplay(model.compiled())), data_(mj_makeData(mujoco_.get())), writer_(model, mujoco_.get(), data_.get()),
-      max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep), values_(model.Nominal()), earlier_(model.command_actuators().size(), 0), held_(model.command_actuators().size(), 0) {
+    : model_(model),
+      mujoco_(CopyForReplay(model.compiled())),
+      data_(mj_makeData(mujoco_.get())),
+      writer_(model, mujoco_.get(), data_.get()),
+      max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep),
+      values_(model.Nominal()),
+      earlier_(model.command_actuators().size(), 0),
+      held_(model.command_actuators().size(), 0) {
   // Friction rows written for "as stiff as the step allows" (solref -1 -1/h) follow the step that is really used.
   for (int dof = 0; dof < mujoco_->nv; ++dof) {
     mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
@@ -115,11 +129,13 @@ Simulator::Simulator(const Model& model, double max_step_s)
   }
   // A motor's other inputs (supply, enable) are no commands to move: the first one is.
   for (const auto& command : model.experiment().commands) {
-    const int actuator = mj_name2id(mujoco_.get(), mjOBJ_ACTUATOR, command.actuator.c_str()), plugin = mujoco_->actuator_plugin[actuator];
+    const int actuator = mj_name2id(mujoco_.get(), mjOBJ_ACTUATOR, command.actuator.c_str()),
+              plugin = mujoco_->actuator_plugin[actuator];
     moves_.push_back(plugin < 0 || actuator == 0 || plugin != mujoco_->actuator_plugin[actuator - 1]);
   }
   apart_.resize(model.mirrored_joints().size());
-  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nu, [](int plugin) { return plugin >= 0; });
+  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nu,
+                                              [](int plugin) { return plugin >= 0; });
   for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
 }
 
@@ -133,22 +149,29 @@ void Simulator::SetCommands(const Recording& recording, std::size_t row, double 
   const auto& actuators = model_.command_actuators();
   for (std::size_t c = 0; c < actuators.size(); ++c) {
     const auto& values = recording.commands[c].values;
-    data_->ctrl[actuators[c]] = command_delay_s_ == 0 ? values[row] : MeanHeld(recording.time_s, values, earlier_[c], from_s - command_delay_s_, to_s - command_delay_s_, held_[c]);
+    data_->ctrl[actuators[c]] = command_delay_s_ == 0
+                                    ? values[row]
+                                    : MeanHeld(recording.time_s, values, earlier_[c], from_s - command_delay_s_,
+                                               to_s - command_delay_s_, held_[c]);
   }
 }
 
 double Simulator::Read(const SignalSource& source) const {
   switch (source.kind) {
-    case SignalKind::kPosition: return data_->qpos[source.qpos];
-    case SignalKind::kVelocity: return data_->qvel[source.dof];
-    case SignalKind::kTorque: break;
+    case SignalKind::kPosition:
+      return data_->qpos[source.qpos];
+    case SignalKind::kVelocity:
+      return data_->qvel[source.dof];
+    case SignalKind::kTorque:
+      break;
   }
   if (source.estimate >= 0) return data_->plugin_state[source.estimate];
   if (source.dof >= 0) return data_->qfrc_actuator[source.dof];
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
-RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted, std::span<double> qpos) {
+RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,
+                         std::span<double> predicted, std::span<double> qpos) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
   const std::size_t signals = recording.measured.size();
@@ -158,12 +181,14 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   mj_resetData(m, d);
   std::fill(held_.begin(), held_.end(), window.begin);
   from_nothing_ = false;
-  if ((remembers_ || command_delay_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past()) FindEarlierCommands(recording);
+  if ((remembers_ || command_delay_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
+    FindEarlierCommands(recording);
   PreRoll(recording, window);
   // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
   for (std::size_t i = 0; i < apart_.size(); ++i) {
     const auto [joint, of] = model_.mirrored_joints()[i];
-    apart_[i] = {d->qpos[m->jnt_qposadr[joint]] - d->qpos[m->jnt_qposadr[of]], d->qvel[m->jnt_dofadr[joint]] - d->qvel[m->jnt_dofadr[of]]};
+    apart_[i] = {d->qpos[m->jnt_qposadr[joint]] - d->qpos[m->jnt_qposadr[of]],
+                 d->qvel[m->jnt_dofadr[joint]] - d->qvel[m->jnt_dofadr[of]]};
   }
   std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
   std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
@@ -175,7 +200,8 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   d->time = recording.time_s[window.begin];
 
   // Torques cost a pass over the actuators at each stamp: only when this log has one.
-  reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(), [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
+  reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(),
+                              [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
 
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
@@ -191,7 +217,8 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     }
     double* out = predicted.data() + (row - window.begin) * signals;
     for (std::size_t s = 0; s < signals; ++s) out[s] = Read(model_.source(recording.measured[s].index));
-    if (!qpos.empty()) std::copy(d->qpos, d->qpos + nq, qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin) * nq));
+    if (!qpos.empty())
+      std::copy(d->qpos, d->qpos + nq, qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin) * nq));
     if (row + 1 == window.end) break;
 
     const double interval = recording.time_s[row + 1] - now;
@@ -199,7 +226,8 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     m->opt.timestep = interval / steps;
     if (command_delay_s_ == 0) SetCommands(recording, row, now, now);
     for (int step = 0; step < steps; ++step) {
-      if (command_delay_s_ != 0) SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
+      if (command_delay_s_ != 0)
+        SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
       mj_step(m, d);
     }
     result.steps += static_cast<std::size_t>(steps);
@@ -207,7 +235,9 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;
       std::fill(out + signals, predicted.data() + window.rows() * signals, std::numeric_limits<double>::quiet_NaN());
-      if (!qpos.empty()) std::fill(qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin + 1) * nq), qpos.end(), std::numeric_limits<double>::quiet_NaN());
+      if (!qpos.empty())
+        std::fill(qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin + 1) * nq), qpos.end(),
+                  std::numeric_limits<double>::quiet_NaN());
       break;
     }
   }
@@ -230,7 +260,9 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
       if (source.cutoff >= 0) {
         // What the filter held at the window's start is what was logged there.
         const LocalFit held = FitLocally(recording, measured, window.begin, kInitialFitHalfWidth_s);
-        LowPass(time, column, {.cutoff_rad_per_s = values_[source.cutoff], .damping_ratio = values_[source.damping_ratio]}, held.value - offset, held.slope, shaped);
+        LowPass(time, column,
+                {.cutoff_rad_per_s = values_[source.cutoff], .damping_ratio = values_[source.damping_ratio]},
+                held.value - offset, held.slope, shaped);
         std::swap(column, shaped);
       }
       if (delay != 0) {
@@ -248,7 +280,8 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
 double Simulator::Past() const {
   double past_s = mujoco_->na > 0 && time_constants_.empty() ? kPreRoll_s : kHistory_s;
   if (!apart_.empty()) past_s = std::max(past_s, kTransmission_s);
-  for (const std::size_t i : time_constants_) past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
+  for (const std::size_t i : time_constants_)
+    past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
   return std::max(past_s, command_delay_s_);
 }
 
@@ -271,9 +304,9 @@ void Simulator::StandAt(const Recording& recording, std::size_t row) {
   }
 }
 
-// What was commanded before the log began. A mechanism that stands still at the first stamp had been held there: by no command, where the model accelerates
-// less under none than under the first one (a step at the first stamp; a held weight's first command is what holds it). One that moves was driven by nobody
-// knows what: by the first command.
+// What was commanded before the log began. A mechanism that stands still at the first stamp had been held there: by no
+// command, where the model accelerates less under none than under the first one (a step at the first stamp; a held
+// weight's first command is what holds it). One that moves was driven by nobody knows what: by the first command.
 void Simulator::FindEarlierCommands(const Recording& recording) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
@@ -290,7 +323,8 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   if (!measured || !still || !commanded) return;
   const auto acceleration = [&](bool with_first) {
     StandAt(recording, 0);
-    for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
+    for (std::size_t c = 0; c < earlier_.size(); ++c)
+      d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
     mj_forward(m, d);
     const double norm = mju_norm(d->qacc, m->nv);
     mj_resetData(m, d);
@@ -302,8 +336,8 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   }
 }
 
-// Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log for a while, so that they hold what
-// the log says and not nothing.
+// Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log
+// for a while, so that they hold what the log says and not nothing.
 void Simulator::PreRoll(const Recording& recording, Window window) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();

@@ -1,4 +1,5 @@
-// One recording simulated by one worker: commands held from stamp to stamp, the state read at each stamp exactly. No allocation after construction.
+// One recording simulated by one worker: commands held from stamp to stamp, the state read at each stamp exactly. No
+// allocation after construction.
 #ifndef GAPSCOPE_REPLAY_SIMULATOR_H_
 #define GAPSCOPE_REPLAY_SIMULATOR_H_
 
@@ -33,9 +34,11 @@ struct InitialState {
 // Half width of the fit that gives the initial state from a log (see FitLocally).
 inline constexpr double kInitialFitHalfWidth_s = 0.02;
 
-// The initial state at a row: measured joints from a local quadratic fit of their position (less their offset parameter) and its slope, or the
-// measured velocity where only that exists; joints that an effect added start with the joint they belong to.
-InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values);
+// The initial state at a row: measured joints from a local quadratic fit of their position (less their offset
+// parameter) and its slope, or the measured velocity where only that exists; joints that an effect added start with the
+// joint they belong to.
+InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row,
+                            std::span<const double> values);
 
 class Simulator {
  public:
@@ -45,12 +48,15 @@ class Simulator {
   // Writes parameters (see ParameterWriter::Write); false: they make no model.
   bool SetParameters(std::span<const double> values, const Recording& recording);
 
-  // Simulates the window from `start`. `predicted` receives rows() x recording.measured.size() numbers, row by row: at each stamp the value
-  // before that stamp's command acts; NaN after a divergence. A signal's filter, delay and offset are applied.
-  // `qpos`, when it is not empty, receives the pose at each stamp: rows() x model nq numbers; NaN after a divergence.
-  RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted, std::span<double> qpos = {});
+  // Simulates the window from `start`. `predicted` receives rows() x recording.measured.size() numbers, row by row: at
+  // each stamp the value before that stamp's command acts; NaN after a divergence. A signal's filter, delay and offset
+  // are applied. `qpos`, when it is not empty, receives the pose at each stamp: rows() x model nq numbers; NaN after a
+  // divergence.
+  RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted,
+                std::span<double> qpos = {});
 
-  // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next SetParameters.
+  // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next
+  // SetParameters.
   void set_shift_s(double shift) { shift_s_ = shift; }
   const mjModel& mujoco_model() const { return *mujoco_; }
   mjData& data() { return *data_; }
@@ -77,14 +83,15 @@ class Simulator {
   double shift_s_ = 0, command_delay_s_ = 0;
   bool reads_torque_ = false;
   std::vector<std::size_t> time_constants_;  // parameters
-  bool remembers_ = false;            // has states beside position and speed
-  std::vector<std::pair<double, double>> apart_;  // per mirrored joint: angle and speed beside its load at the start of a run
+  bool remembers_ = false;                   // has states beside position and speed
+  std::vector<std::pair<double, double>>
+      apart_;  // per mirrored joint: angle and speed beside its load at the start of a run
   std::vector<double> values_;
   std::vector<double> column_, shaped_;  // scratch of ApplySensors
-  std::vector<bool> moves_;           // per command: drives, and does not supply or enable
-  std::vector<double> earlier_;       // per command: before the log began
-  bool from_nothing_ = false;         // nothing was commanded then, and something is at the first stamp
-  std::vector<std::size_t> held_;     // per command: row held at the start of the step
+  std::vector<bool> moves_;              // per command: drives, and does not supply or enable
+  std::vector<double> earlier_;          // per command: before the log began
+  bool from_nothing_ = false;            // nothing was commanded then, and something is at the first stamp
+  std::vector<std::size_t> held_;        // per command: row held at the start of the step
 };
 
 }  // namespace gapscope

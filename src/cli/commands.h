@@ -1,4 +1,5 @@
-// The subcommands. Each adds itself to the program and says what to run once the arguments are parsed; the callback returns the exit status.
+// The subcommands. Each adds itself to the program and says what to run once the arguments are parsed; the callback
+// returns the exit status.
 #ifndef GAPSCOPE_CLI_COMMANDS_H_
 #define GAPSCOPE_CLI_COMMANDS_H_
 
@@ -19,7 +20,7 @@ void AddDiagnose(CLI::App& program, Run& run);
 void AddReplay(CLI::App& program, Run& run);
 void AddRender(CLI::App& program, Run& run);
 void AddTune(CLI::App& program, Run& run);
-void AddPlan(CLI::App& program, Run& run);   // plan, run and merge: many logs, shared out
+void AddPlan(CLI::App& program, Run& run);  // plan, run and merge: many logs, shared out
 
 }  // namespace gapscope::cli
 

@@ -29,7 +29,9 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   PrintFindings(recordings, flags.common.quiet);
   const auto log_values = recordings.front().values;
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);
-  DiagnoseOptions options{.budget_s = flags.budget_s, .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s, .seed = flags.common.seed};
+  DiagnoseOptions options{.budget_s = flags.budget_s,
+                          .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s,
+                          .seed = flags.common.seed};
   const bool live = !flags.common.quiet && isatty(2);
   if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
   auto diagnosed = Diagnose(experiment, data, options, pool);
@@ -40,10 +42,15 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   if (!flags.common.out.empty()) {
     const std::filesystem::path out = flags.common.out;
     GS_ASSIGN(const auto base, Model::Build(experiment));
-    GS_ASSIGN(const std::string xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
+    GS_ASSIGN(const std::string xml,
+              diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
     GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
     GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
-    GS_RETURN_IF_ERROR(WriteReport(out, json, experiment, {data.train, data.held_out}, {{"nominal", base, base->Nominal()}, {"refitted", diagnosis.refit_model, diagnosis.refit_values}, {"diagnosed", diagnosis.model, diagnosis.values}}, pool));
+    GS_RETURN_IF_ERROR(WriteReport(out, json, experiment, {data.train, data.held_out},
+                                   {{"nominal", base, base->Nominal()},
+                                    {"refitted", diagnosis.refit_model, diagnosis.refit_values},
+                                    {"diagnosed", diagnosis.model, diagnosis.values}},
+                                   pool));
   }
   fmt::print("{}", flags.common.json ? json + "\n" : DiagnosisTable(diagnosis));
   return kDone;
@@ -53,13 +60,17 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
 
 void AddDiagnose(CLI::App& program, Run& run) {
   auto flags = std::make_shared<DiagnoseFlags>();
-  CLI::App* command = program.add_subcommand("diagnose", "Where the gap lies, which unmodelled effect causes it, how far it shrinks");
+  CLI::App* command =
+      program.add_subcommand("diagnose", "Where the gap lies, which unmodelled effect causes it, how far it shrinks");
   AddModelFlags(*command, flags->model, false);
   AddCommonFlags(*command, flags->common, true);
   command->add_option("--hold-out", flags->hold_out, "A log to judge by, not to fit")->allow_extra_args(false);
-  command->add_option("--budget", flags->budget_s, "Seconds; the best verdict so far when they are spent")->check(CLI::PositiveNumber)->capture_default_str();
+  command->add_option("--budget", flags->budget_s, "Seconds; the best verdict so far when they are spent")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(CLI::PositiveNumber);
-  command->footer("Example: gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis");
+  command->footer(
+      "Example: gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis");
   command->callback([flags, &run] { run = [flags] { return RunDiagnose(*flags); }; });
 }
 

@@ -31,11 +31,14 @@ Result<std::complex<double>> ParsePole(const std::string& text) {
     parsed = std::from_chars(at, end, imaginary);
     good = parsed.ec == std::errc() && parsed.ptr + 1 == end && *parsed.ptr == 'i';
   }
-  if (!good || !std::isfinite(real) || !std::isfinite(imaginary)) return Error{.what = "not a pole", .where = "--poles", .actual = "'" + text + "'", .allowed = "-3.5 or -3.5+8.4i"};
+  if (!good || !std::isfinite(real) || !std::isfinite(imaginary))
+    return Error{.what = "not a pole", .where = "--poles", .actual = "'" + text + "'", .allowed = "-3.5 or -3.5+8.4i"};
   return std::complex<double>(real, imaginary);
 }
 
-std::string PoleText(const std::complex<double>& p) { return p.imag() == 0 ? fmt::format("{:.5g}", p.real()) : fmt::format("{:.5g}{:+.5g}i", p.real(), p.imag()); }
+std::string PoleText(const std::complex<double>& p) {
+  return p.imag() == 0 ? fmt::format("{:.5g}", p.real()) : fmt::format("{:.5g}{:+.5g}i", p.real(), p.imag());
+}
 
 nlohmann::ordered_json PolesJson(const std::vector<std::complex<double>>& poles) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -58,7 +61,8 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
     GS_ASSIGN(const auto assignment, ParseAssignment(text, "--value"));
     log_values[assignment.first] = assignment.second;
   }
-  if (experiment.commands.empty()) return Error{.what = "the experiment has no command to drive", .where = flags.experiment};
+  if (experiment.commands.empty())
+    return Error{.what = "the experiment has no command to drive", .where = flags.experiment};
   GS_ASSIGN(const LinearSystem system, Linearize(*model, values, log_values, at, 0));
   const Eigen::Index n = system.a.rows();
   Feedback feedback;
@@ -66,10 +70,14 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
     if (static_cast<Eigen::Index>(flags.q.size()) != n) {
       std::string names;
       for (const auto& state : system.states) names += (names.empty() ? "" : ", ") + state;
-      return Error{.what = "one weight for each state is needed", .where = "--q", .actual = std::to_string(flags.q.size()), .allowed = std::to_string(n) + ": " + names};
+      return Error{.what = "one weight for each state is needed",
+                   .where = "--q",
+                   .actual = std::to_string(flags.q.size()),
+                   .allowed = std::to_string(n) + ": " + names};
     }
     const Eigen::VectorXd weights = Eigen::Map<const Eigen::VectorXd>(flags.q.data(), n);
-    GS_ASSIGN(feedback, Lqr(system.a, system.b, Eigen::MatrixXd(weights.asDiagonal()), Eigen::MatrixXd::Constant(1, 1, flags.r)));
+    GS_ASSIGN(feedback,
+              Lqr(system.a, system.b, Eigen::MatrixXd(weights.asDiagonal()), Eigen::MatrixXd::Constant(1, 1, flags.r)));
   } else {
     std::vector<std::complex<double>> poles;
     for (const auto& text : flags.poles) {
@@ -80,14 +88,19 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
   }
   const auto open = SortedPoles(system.a);
   if (flags.json) {
-    nlohmann::ordered_json json = {{"schema", "gapscope.design.feedback/1"}, {"states", system.states}, {"gain", nlohmann::ordered_json::array()}, {"open_loop_poles", PolesJson(open)}, {"closed_loop_poles", PolesJson(feedback.poles)}};
+    nlohmann::ordered_json json = {{"schema", "gapscope.design.feedback/1"},
+                                   {"states", system.states},
+                                   {"gain", nlohmann::ordered_json::array()},
+                                   {"open_loop_poles", PolesJson(open)},
+                                   {"closed_loop_poles", PolesJson(feedback.poles)}};
     for (Eigen::Index i = 0; i < n; ++i) json["gain"].push_back(feedback.gain(0, i));
     json["versions"] = JsonVersions();
     fmt::print("{}\n", json.dump(2));
     return kDone;
   }
   fmt::print("command = -(sum of gain x state), state from the equilibrium\n\n{:<24} {:>12}\n", "state", "gain");
-  for (Eigen::Index i = 0; i < n; ++i) fmt::print("{:<24} {:>12.5g}\n", system.states[static_cast<std::size_t>(i)], feedback.gain(0, i));
+  for (Eigen::Index i = 0; i < n; ++i)
+    fmt::print("{:<24} {:>12.5g}\n", system.states[static_cast<std::size_t>(i)], feedback.gain(0, i));
   fmt::print("\npoles open  ");
   for (const auto& p : open) fmt::print(" {}", PoleText(p));
   fmt::print("\npoles closed");
@@ -102,20 +115,32 @@ void AddFeedback(CLI::App& design, Run& run) {
   for (const bool lqr : {true, false}) {
     auto flags = std::make_shared<FeedbackFlags>();
     flags->lqr = lqr;
-    CLI::App* command = design.add_subcommand(lqr ? "lqr" : "poles", lqr ? "State feedback by quadratic weights (Riccati)" : "State feedback by pole placement");
+    CLI::App* command =
+        design.add_subcommand(lqr ? "lqr" : "poles", lqr ? "State feedback by quadratic weights (Riccati)"
+                                                         : "State feedback by pole placement");
     command->add_option("experiment", flags->experiment, "Experiment file (YAML)")->required();
-    command->add_option("--at", flags->at, "Equilibrium: JOINT=POSITION (default: the model's initial pose)")->allow_extra_args(false);
+    command->add_option("--at", flags->at, "Equilibrium: JOINT=POSITION (default: the model's initial pose)")
+        ->allow_extra_args(false);
     command->add_option("--set", flags->set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
     command->add_option("--params", flags->params, "YAML file of parameter values")->allow_extra_args(false);
-    command->add_option("--value", flags->value, "A number that a log would bring: NAME=VALUE")->allow_extra_args(false);
+    command->add_option("--value", flags->value, "A number that a log would bring: NAME=VALUE")
+        ->allow_extra_args(false);
     command->add_flag("--json", flags->json, "Print the result as JSON on stdout, nothing else");
     if (lqr) {
-      command->add_option("--q", flags->q, "Weights of the states, positions first, separated by commas")->required()->delimiter(',');
+      command->add_option("--q", flags->q, "Weights of the states, positions first, separated by commas")
+          ->required()
+          ->delimiter(',');
       command->add_option("--r", flags->r, "Weight of the command")->check(FinitePositive())->capture_default_str();
-      command->footer("Example: gapscope design lqr models/qube/experiment.yaml --at pendulum=3.141592653589793 --q 10,10,1,10 --r 1");
+      command->footer(
+          "Example: gapscope design lqr models/qube/experiment.yaml --at pendulum=3.141592653589793 --q 10,10,1,10 --r "
+          "1");
     } else {
-      command->add_option("--poles", flags->poles, "Wanted poles, separated by commas, as --poles=-2,-3+4i,-3-4i")->required()->delimiter(',');
-      command->footer("Example: gapscope design poles models/qube/experiment.yaml --at pendulum=3.141592653589793 --poles=-2,-2.2,-15,-115");
+      command->add_option("--poles", flags->poles, "Wanted poles, separated by commas, as --poles=-2,-3+4i,-3-4i")
+          ->required()
+          ->delimiter(',');
+      command->footer(
+          "Example: gapscope design poles models/qube/experiment.yaml --at pendulum=3.141592653589793 "
+          "--poles=-2,-2.2,-15,-115");
     }
     command->callback([flags, &run] { run = [flags] { return RunFeedback(*flags); }; });
   }

@@ -12,7 +12,9 @@ std::string& Line() {
 
 // In single quotes where a shell would take it apart.
 std::string Quoted(const std::string& word) {
-  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) { return std::isalnum(c) || std::string_view("_-./@=:,+%").find(static_cast<char>(c)) != std::string_view::npos; });
+  const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
+    return std::isalnum(c) || std::string_view("_-./@=:,+%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
   if (plain) return word;
   std::string quoted = "'";
   for (const char c : word) c == '\'' ? quoted += "'\\''" : quoted += c;
@@ -27,21 +29,31 @@ void SetCommandLine(int argc, char** argv) {
 }
 const std::string& CommandLine() { return Line(); }
 
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment, const ReportLogs& logs, std::vector<ReportPrediction> predictions, const Model& model,
+Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
+                   const ReportLogs& logs, std::vector<ReportPrediction> predictions, const Model& model,
                    const std::vector<double>& values, const std::vector<Parameter>& parameters) {
-  ReportSource source{.result_json = json, .command_line = CommandLine(), .experiment = &experiment, .recordings = {}, .held_out = {}, .predictions = std::move(predictions), .model = &model,
-                      .values = values, .parameters = parameters};
+  ReportSource source{.result_json = json,
+                      .command_line = CommandLine(),
+                      .experiment = &experiment,
+                      .recordings = {},
+                      .held_out = {},
+                      .predictions = std::move(predictions),
+                      .model = &model,
+                      .values = values,
+                      .parameters = parameters};
   for (const auto& recording : logs.train) source.recordings.push_back(&recording), source.held_out.push_back(false);
   for (const auto& recording : logs.held_out) source.recordings.push_back(&recording), source.held_out.push_back(true);
   return WriteReportHtml(folder, source);
 }
 
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment, const ReportLogs& logs, const std::vector<ReportModel>& models, ThreadPool& pool) {
+Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
+                   const ReportLogs& logs, const std::vector<ReportModel>& models, ThreadPool& pool) {
   GS_CHECK(!models.empty());
   std::vector<ReportPrediction> predictions;
   for (const auto& model : models) {
     ReportPrediction prediction{.label = model.label, .logs = {}};
-    const ReplayOptions options{.mode = experiment.replay.mode, .window_s = experiment.replay.window_s, .values = model.values};
+    const ReplayOptions options{
+        .mode = experiment.replay.mode, .window_s = experiment.replay.window_s, .values = model.values};
     for (const auto* part : {&logs.train, &logs.held_out}) {
       if (part->empty()) continue;
       ReplayResult result = Replay(*model.model, *part, options, pool);
@@ -49,7 +61,8 @@ Status WriteReport(const std::string& folder, const std::string& json, const Exp
     }
     predictions.push_back(std::move(prediction));
   }
-  return WriteReport(folder, json, experiment, logs, std::move(predictions), *models.front().model, models.front().values, models.back().model->parameters());
+  return WriteReport(folder, json, experiment, logs, std::move(predictions), *models.front().model,
+                     models.front().values, models.back().model->parameters());
 }
 
 }  // namespace gapscope::cli

@@ -28,13 +28,15 @@ struct ReportLogs {
   const std::vector<Recording>& held_out;
 };
 
-// Replays all logs with each model as the experiment says (mode, window) and writes `folder`/report.html. The missing torque is that of the first
-// model, the parameters those of the last.
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment, const ReportLogs& logs, const std::vector<ReportModel>& models, ThreadPool& pool);
+// Replays all logs with each model as the experiment says (mode, window) and writes `folder`/report.html. The missing
+// torque is that of the first model, the parameters those of the last.
+Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
+                   const ReportLogs& logs, const std::vector<ReportModel>& models, ThreadPool& pool);
 
-// The same with traces that are there already: one list a label, in the order of the logs. `model`, `values` and `parameters` as in
-// ReportSource.
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment, const ReportLogs& logs, std::vector<ReportPrediction> predictions, const Model& model,
+// The same with traces that are there already: one list a label, in the order of the logs. `model`, `values` and
+// `parameters` as in ReportSource.
+Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
+                   const ReportLogs& logs, std::vector<ReportPrediction> predictions, const Model& model,
                    const std::vector<double>& values, const std::vector<Parameter>& parameters);
 
 }  // namespace gapscope::cli

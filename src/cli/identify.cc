@@ -30,11 +30,15 @@ Result<int> RunIdentify(IdentifyFlags flags) {
     flags.options.held_out = split.held_out;
   }
   GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
-  if (session.experiment.commands.empty()) return Error{.what = "the experiment has no command", .where = flags.model.experiment, .cure = "add 'commands:'"};
+  if (session.experiment.commands.empty())
+    return Error{.what = "the experiment has no command", .where = flags.model.experiment, .cure = "add 'commands:'"};
   PrintFindings(session.recordings, flags.common.quiet);
-  GS_ASSIGN(const Identification result, flags.method({.model = *session.model, .values = session.values, .recordings = session.recordings}, flags.options));
+  GS_ASSIGN(const Identification result,
+            flags.method({.model = *session.model, .values = session.values, .recordings = session.recordings},
+                         flags.options));
   if (!flags.common.out.empty()) {
-    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json", IdentifyJson(result, session.recordings) + "\n"));
+    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json",
+                                 IdentifyJson(result, session.recordings) + "\n"));
     GS_RETURN_IF_ERROR(WritePoints(flags.common.out, result));
   }
   if (flags.common.json) {
@@ -76,33 +80,53 @@ void AddIdentify(CLI::App& program, Run& run) {
     CLI::App* command = identify->add_subcommand(entry.name, entry.what);
     AddModelFlags(*command, flags->model, true);
     AddCommonFlags(*command, flags->common, true);
-    command->add_option("--cutoff", o.cutoff_hz, "Of the zero-phase low pass, Hz (default: a twelfth of the sample rate, at most 15)")->check(FinitePositive());
+    command
+        ->add_option("--cutoff", o.cutoff_hz,
+                     "Of the zero-phase low pass, Hz (default: a twelfth of the sample rate, at most 15)")
+        ->check(FinitePositive());
     command->add_option("--from", o.from_s, "Use the logs from this time on, s")->check(CLI::Range(0.0, 1e9));
     command->add_option("--to", o.to_s, "Use the logs up to this time, s")->check(FinitePositive());
-    command->add_option("--joint", o.joint, "Which joint (default: the driven one; ring-down, resonance: the swinging one)");
+    command->add_option("--joint", o.joint,
+                        "Which joint (default: the driven one; ring-down, resonance: the swinging one)");
     const std::string name = entry.name;
     if (name == "torque-constant" || name == "resistance" || name == "current-offset") {
       command->add_option("--current-column", o.current_column, "Column of the current")->capture_default_str();
       command->add_option("--current-unit", o.current_unit, "Its unit")->capture_default_str();
     }
     if (name == "pd") {
-      command->add_option("--longest-delay", o.longest_delay_s, "End of the scan, s")->check(FinitePositive())->capture_default_str();
-      command->add_option("--torque-limit", o.torque_limit, "Rows at this torque are left out (default: runs of equal extreme values)")->check(FinitePositive());
+      command->add_option("--longest-delay", o.longest_delay_s, "End of the scan, s")
+          ->check(FinitePositive())
+          ->capture_default_str();
+      command
+          ->add_option("--torque-limit", o.torque_limit,
+                       "Rows at this torque are left out (default: runs of equal extreme values)")
+          ->check(FinitePositive());
     }
     if (name == "tn-curve") {
       command->add_option("--rated-torque", o.rated_torque_n_m, "Data sheet's, N m")->check(FinitePositive());
       command->add_option("--rated-speed-rpm", flags->rated_speed_rpm, "Data sheet's")->check(FinitePositive());
     }
     if (name == "inertia" || name == "friction" || name == "cable") {
-      command->add_option("--torque-delay", o.torque_delay_s, "Of a servo whose torque is logged, s (from identify pd): which target a logged torque has seen")->check(CLI::Range(0.0, 1.0));
+      command
+          ->add_option("--torque-delay", o.torque_delay_s,
+                       "Of a servo whose torque is logged, s (from identify pd): which target a logged torque has seen")
+          ->check(CLI::Range(0.0, 1.0));
     }
-    if (name == "friction" || name == "cable") command->add_flag("--free-inertia", o.free_inertia, "Scale the model's inertial torques to the log: for fast motion, where the model's inertia is not known well");
-    if (name == "steady") command->add_option("--coulomb", o.coulomb_n_m, "Dry friction, N m (default: fitted)")->check(CLI::Range(0.0, 1e6));
+    if (name == "friction" || name == "cable")
+      command->add_flag("--free-inertia", o.free_inertia,
+                        "Scale the model's inertial torques to the log: for fast motion, where the model's inertia is "
+                        "not known well");
+    if (name == "steady")
+      command->add_option("--coulomb", o.coulomb_n_m, "Dry friction, N m (default: fitted)")
+          ->check(CLI::Range(0.0, 1e6));
     if (name == "state-space") {
-      command->add_option("--bounds", o.bounds_share, "Coefficients stay within this share of nominal")->check(FinitePositive())->capture_default_str();
+      command->add_option("--bounds", o.bounds_share, "Coefficients stay within this share of nominal")
+          ->check(FinitePositive())
+          ->capture_default_str();
       command->add_option("--hold-out", flags->hold_out, "Score on this log, do not fit it")->allow_extra_args(false);
     }
-    command->footer(fmt::format("Example: gapscope identify {} models/{}/experiment.yaml log.csv", entry.name, entry.rig));
+    command->footer(
+        fmt::format("Example: gapscope identify {} models/{}/experiment.yaml log.csv", entry.name, entry.rig));
     command->callback([flags, &run] { run = [flags] { return RunIdentify(*flags); }; });
   }
 }

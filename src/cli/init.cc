@@ -21,9 +21,11 @@ Result<int> RunInit(const InitFlags& flags) {
   GS_ASSIGN(const Log log, ReadLog(flags.logs.front(), {}));
   GS_ASSIGN(const Timeline timeline, BuildTimeline(log, {}));
   // The experiment names the model as seen from its own folder.
-  const std::filesystem::path folder = flags.out.empty() ? std::filesystem::current_path() : std::filesystem::absolute(flags.out).parent_path();
+  const std::filesystem::path folder =
+      flags.out.empty() ? std::filesystem::current_path() : std::filesystem::absolute(flags.out).parent_path();
   std::error_code failed;
-  const std::filesystem::path relative = std::filesystem::relative(std::filesystem::absolute(flags.model), folder, failed);
+  const std::filesystem::path relative =
+      std::filesystem::relative(std::filesystem::absolute(flags.model), folder, failed);
   GS_ASSIGN(const Draft draft, DraftExperiment(flags.model, failed ? flags.model : relative.string(), log, timeline));
   if (flags.out.empty()) {
     fmt::print("{}", draft.yaml);
@@ -33,14 +35,17 @@ Result<int> RunInit(const InitFlags& flags) {
   // The draft must hold for every log that was given.
   if (!flags.out.empty()) {
     GS_ASSIGN(const Experiment experiment, LoadExperiment(flags.out));
-    for (const auto& path : flags.logs) GS_RETURN_IF_ERROR([&]() -> Status {
-      GS_ASSIGN(const Recording recording, LoadRecording(experiment, path));
-      return Ok();
-    }());
+    for (const auto& path : flags.logs)
+      GS_RETURN_IF_ERROR([&]() -> Status {
+        GS_ASSIGN(const Recording recording, LoadRecording(experiment, path));
+        return Ok();
+      }());
   }
   if (!flags.quiet) {
     for (const auto& doubt : draft.unsure) fmt::print(stderr, "unsure: {}\n", doubt);
-    if (!flags.out.empty()) fmt::print(stderr, "wrote {}; {} thing{} to check. Next: gapscope replay {} {}\n", flags.out, draft.unsure.size(), draft.unsure.size() == 1 ? "" : "s", flags.out, flags.logs.front());
+    if (!flags.out.empty())
+      fmt::print(stderr, "wrote {}; {} thing{} to check. Next: gapscope replay {} {}\n", flags.out, draft.unsure.size(),
+                 draft.unsure.size() == 1 ? "" : "s", flags.out, flags.logs.front());
   }
   return kDone;
 }

@@ -23,10 +23,16 @@ InspectReport InspectRecording(const Recording& recording, const Experiment& exp
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];
     if (command.column == "constant") continue;
-    channels.push_back({.name = command.actuator, .unit = experiment.commands[c].unit, .role = ChannelRole::kCommand, .values = command.values});
+    channels.push_back({.name = command.actuator,
+                        .unit = experiment.commands[c].unit,
+                        .role = ChannelRole::kCommand,
+                        .values = command.values});
   }
   for (const auto& measured : recording.measured) {
-    channels.push_back({.name = measured.spec.signal, .unit = measured.spec.unit, .role = ChannelRole::kMeasured, .values = measured.values});
+    channels.push_back({.name = measured.spec.signal,
+                        .unit = measured.spec.unit,
+                        .role = ChannelRole::kMeasured,
+                        .values = measured.values});
   }
   return Inspect(recording.timeline, channels, recording.findings, recording.rows_in_log);
 }
@@ -37,15 +43,18 @@ Result<int> RunInspect(const InspectFlags& flags) {
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
   GS_ASSIGN(const auto recordings, LoadRecordings(experiment, flags.model.logs, pool));
   std::vector<InspectReport> reports(recordings.size());
-  pool.ForEach(recordings.size(), [&](std::size_t i, int) { reports[i] = InspectRecording(recordings[i], experiment); });
+  pool.ForEach(recordings.size(),
+               [&](std::size_t i, int) { reports[i] = InspectRecording(recordings[i], experiment); });
   nlohmann::ordered_json json = {{"schema", "gapscope.inspect/1"}, {"logs", nlohmann::ordered_json::array()}};
   for (std::size_t i = 0; i < reports.size(); ++i) json["logs"].push_back(ToJson(reports[i], recordings[i].log_path));
   json["versions"] = JsonVersions();
-  if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json", json.dump(2) + "\n"));
+  if (!flags.common.out.empty())
+    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json", json.dump(2) + "\n"));
   if (flags.common.json) {
     fmt::print("{}\n", json.dump(2));
   } else {
-    for (std::size_t i = 0; i < reports.size(); ++i) fmt::print("{}{}", i > 0 ? "\n" : "", InspectTable(reports[i], recordings[i].log_path));
+    for (std::size_t i = 0; i < reports.size(); ++i)
+      fmt::print("{}{}", i > 0 ? "\n" : "", InspectTable(reports[i], recordings[i].log_path));
   }
   return kDone;
 }
@@ -54,7 +63,8 @@ Result<int> RunInspect(const InspectFlags& flags) {
 
 void AddInspect(CLI::App& program, Run& run) {
   auto flags = std::make_shared<InspectFlags>();
-  CLI::App* command = program.add_subcommand("inspect", "Is this log fit for use: timing, gaps, repairs, saturation, excitation");
+  CLI::App* command =
+      program.add_subcommand("inspect", "Is this log fit for use: timing, gaps, repairs, saturation, excitation");
   AddModelFlags(*command, flags->model, false);
   AddCommonFlags(*command, flags->common, true);
   command->footer("Example: gapscope inspect models/qube/experiment.yaml log.csv");

@@ -16,7 +16,9 @@ int main(int argc, char** argv) {
   CLI::App program{"gapscope finds why a simulated mechanism does not move like the real one.", "gapscope"};
   program.set_version_flag("--version", VersionText());
   program.require_subcommand(1);
-  program.footer("Exit status: 0 done, 1 a threshold asked for was not met, 2 bad input, 3 a bug.\nExample: gapscope replay models/qube/experiment.yaml log.csv");
+  program.footer(
+      "Exit status: 0 done, 1 a threshold asked for was not met, 2 bad input, 3 a bug.\nExample: gapscope replay "
+      "models/qube/experiment.yaml log.csv");
   cli::SetCommandLine(argc, argv);
   cli::Run run;
   cli::AddInit(program, run);
@@ -36,7 +38,8 @@ int main(int argc, char** argv) {
     for (const CLI::App* command : program.get_subcommands({})) names.push_back(command->get_name());
     if (!asked && argc > 1 && argv[1][0] != '-' && std::find(names.begin(), names.end(), argv[1]) == names.end()) {
       const std::string nearest = Nearest(argv[1], names);
-      fmt::print(stderr, "gapscope: no command '{}'{}\n", argv[1], nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
+      fmt::print(stderr, "gapscope: no command '{}'{}\n", argv[1],
+                 nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
     }
     program.exit(e);
     return asked ? cli::kDone : cli::kBadInput;

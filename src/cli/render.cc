@@ -26,7 +26,8 @@ struct RenderFlags {
   double speed = 1, from_s = 0, to_s = -1, at_s = -1, frames_per_s = 30, window_s = 0;
 };
 
-const std::vector<std::string> kViews = {"fixed", "tracking", "top"}, kLayouts = {"overlay", "side"}, kGl = {"auto", "osmesa", "egl"};
+const std::vector<std::string> kViews = {"fixed", "tracking", "top"}, kLayouts = {"overlay", "side"},
+                               kGl = {"auto", "osmesa", "egl"};
 template <class Enum>
 Enum ValueOf(const std::vector<std::string>& names, const std::string& name) {
   return static_cast<Enum>(std::find(names.begin(), names.end(), name) - names.begin());
@@ -38,16 +39,23 @@ void Interrupt(int) { interrupted = true; }
 Status ReadSize(const std::string& text, int& width, int& height) {
   const char* end = text.data() + text.size();
   const auto first = std::from_chars(text.data(), end, width);
-  const auto second = first.ptr < end && *first.ptr == 'x' ? std::from_chars(first.ptr + 1, end, height) : std::from_chars_result{first.ptr, std::errc::invalid_argument};
+  const auto second = first.ptr < end && *first.ptr == 'x'
+                          ? std::from_chars(first.ptr + 1, end, height)
+                          : std::from_chars_result{first.ptr, std::errc::invalid_argument};
   const bool good = first.ec == std::errc() && second.ec == std::errc() && second.ptr == end;
-  if (good && width >= 320 && height >= 240 && width <= 7680 && height <= 4320 && width % 2 == 0 && height % 2 == 0) return Ok();
-  return Error{.what = "not a size of a picture", .where = "--size", .actual = "'" + text + "'", .allowed = "WIDTHxHEIGHT, both even, 320x240 .. 7680x4320"};
+  if (good && width >= 320 && height >= 240 && width <= 7680 && height <= 4320 && width % 2 == 0 && height % 2 == 0)
+    return Ok();
+  return Error{.what = "not a size of a picture",
+               .where = "--size",
+               .actual = "'" + text + "'",
+               .allowed = "WIDTHxHEIGHT, both even, 320x240 .. 7680x4320"};
 }
 
 // "tuned=out/t" is labelled "tuned"; a path alone by its folder's name.
 std::pair<std::string, std::string> LabelAndPath(const std::string& text) {
   const std::size_t equal = text.find('=');
-  if (equal != std::string::npos && equal > 0 && text.find('/') > equal) return {text.substr(0, equal), text.substr(equal + 1)};
+  if (equal != std::string::npos && equal > 0 && text.find('/') > equal)
+    return {text.substr(0, equal), text.substr(equal + 1)};
   std::filesystem::path path = std::filesystem::path(text).lexically_normal();
   if (path.filename().empty()) path = path.parent_path();
   if (path.filename() == "result.json" && path.has_parent_path()) path = path.parent_path();
@@ -73,35 +81,64 @@ Result<std::vector<VideoModel>> ModelsOf(const RenderFlags& flags, const Session
     for (const auto& use : session.model->effects()) label += (label.empty() ? "" : ", ") + use.effect;
     models.push_back({label.empty() ? "changed" : label, session.model, session.values});
   }
-  if (models.size() > 4) return Error{.what = "too many models for one picture", .where = "--compare", .actual = std::to_string(models.size()), .allowed = "four at most"};
+  if (models.size() > 4)
+    return Error{.what = "too many models for one picture",
+                 .where = "--compare",
+                 .actual = std::to_string(models.size()),
+                 .allowed = "four at most"};
   return models;
 }
 
-std::string SummaryJson(const RenderFlags& flags, const std::vector<VideoModel>& models, const VideoOptions& options, const VideoSummary& summary) {
-  nlohmann::ordered_json json = {{"schema", "gapscope.render/1"}, {"out", flags.out}, {"log", flags.log}, {"frames", summary.frames}, {"width", options.width}, {"height", options.height},
-                                 {"frames_per_s", options.frames_per_s}, {"first_s", summary.first_s}, {"last_s", summary.last_s}, {"video_s", summary.length_s},
-                                 {"models", nlohmann::ordered_json::array()}, {"gl", GlBackendName(summary.gl)}, {"wall_s", summary.wall_s}, {"versions", JsonVersions()}};
-  for (std::size_t m = 0; m < models.size(); ++m) json["models"].push_back({{"label", models[m].label}, {"error", JsonNumber(summary.errors[m])}});
+std::string SummaryJson(const RenderFlags& flags, const std::vector<VideoModel>& models, const VideoOptions& options,
+                        const VideoSummary& summary) {
+  nlohmann::ordered_json json = {{"schema", "gapscope.render/1"},
+                                 {"out", flags.out},
+                                 {"log", flags.log},
+                                 {"frames", summary.frames},
+                                 {"width", options.width},
+                                 {"height", options.height},
+                                 {"frames_per_s", options.frames_per_s},
+                                 {"first_s", summary.first_s},
+                                 {"last_s", summary.last_s},
+                                 {"video_s", summary.length_s},
+                                 {"models", nlohmann::ordered_json::array()},
+                                 {"gl", GlBackendName(summary.gl)},
+                                 {"wall_s", summary.wall_s},
+                                 {"versions", JsonVersions()}};
+  for (std::size_t m = 0; m < models.size(); ++m)
+    json["models"].push_back({{"label", models[m].label}, {"error", JsonNumber(summary.errors[m])}});
   return json.dump(2);
 }
 
 Result<int> RunRender(RenderFlags flags) {
-  VideoOptions options{.out = flags.out, .view = ValueOf<View>(kViews, flags.view), .layout = ValueOf<Layout>(kLayouts, flags.layout), .gl = ValueOf<GlBackend>(kGl, flags.gl),
-                       .speed = flags.speed, .from_s = flags.from_s, .to_s = flags.to_s, .at_s = flags.at_s, .frames_per_s = flags.frames_per_s};
+  VideoOptions options{.out = flags.out,
+                       .view = ValueOf<View>(kViews, flags.view),
+                       .layout = ValueOf<Layout>(kLayouts, flags.layout),
+                       .gl = ValueOf<GlBackend>(kGl, flags.gl),
+                       .speed = flags.speed,
+                       .from_s = flags.from_s,
+                       .to_s = flags.to_s,
+                       .at_s = flags.at_s,
+                       .frames_per_s = flags.frames_per_s};
   GS_RETURN_IF_ERROR(ReadSize(flags.size, options.width, options.height));
   flags.model.logs = {flags.log};
   GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
   PrintFindings(session.recordings, flags.common.quiet);
-  options.mode = flags.mode.empty() ? session.experiment.replay.mode : flags.mode == "windows" ? ReplayMode::kWindows : ReplayMode::kFreeRun;
+  options.mode = flags.mode.empty()        ? session.experiment.replay.mode
+                 : flags.mode == "windows" ? ReplayMode::kWindows
+                                           : ReplayMode::kFreeRun;
   options.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s;
   GS_ASSIGN(const auto models, ModelsOf(flags, session));
 
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = Interrupt;
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
   options.stop = &interrupted;
   const bool live = !flags.common.quiet && isatty(2);
-  if (live) options.progress = [](std::size_t done, std::size_t all) { fmt::print(stderr, "\r\033[Kframe {} of {}", done, all); };
+  if (live)
+    options.progress = [](std::size_t done, std::size_t all) {
+      fmt::print(stderr, "\r\033[Kframe {} of {}", done, all);
+    };
   auto rendered = RenderVideo(session.recordings.front(), models, options, *session.pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!rendered.ok()) return rendered.error();
@@ -118,10 +155,12 @@ Result<int> RunRender(RenderFlags flags) {
   }
   fmt::print("{}\n", flags.out);
   if (shown) fmt::print("  shown in {}\n", (out.parent_path() / "report.html").string());
-  for (std::size_t m = 0; m < models.size(); ++m) fmt::print("  {:<32} error {:.4g}\n", models[m].label, summary.errors[m]);
+  for (std::size_t m = 0; m < models.size(); ++m)
+    fmt::print("  {:<32} error {:.4g}\n", models[m].label, summary.errors[m]);
   if (summary.length_s > 0) {
-    fmt::print("  {} frames of {}x{}, {:.2f} s of video for {:.2f} s of the log; {:.1f} s to make ({})\n", summary.frames, options.width, options.height, summary.length_s,
-               summary.last_s - summary.first_s, summary.wall_s, GlBackendName(summary.gl));
+    fmt::print("  {} frames of {}x{}, {:.2f} s of video for {:.2f} s of the log; {:.1f} s to make ({})\n",
+               summary.frames, options.width, options.height, summary.length_s, summary.last_s - summary.first_s,
+               summary.wall_s, GlBackendName(summary.gl));
   } else {
     fmt::print("  {}x{} at {:.3f} s of the log\n", options.width, options.height, summary.first_s);
   }
@@ -132,25 +171,46 @@ Result<int> RunRender(RenderFlags flags) {
 
 void AddRender(CLI::App& program, Run& run) {
   auto flags = std::make_shared<RenderFlags>();
-  CLI::App* command = program.add_subcommand("render", "Draw the measured mechanism against the simulated one: a video, a GIF or a still");
+  CLI::App* command = program.add_subcommand(
+      "render", "Draw the measured mechanism against the simulated one: a video, a GIF or a still");
   command->add_option("experiment", flags->model.experiment, "Experiment file (YAML)")->required();
   command->add_option("log", flags->log, "Hardware log")->required();
   command->add_option("--out", flags->out, "VIDEO.mp4, MOVING.gif or STILL.png")->required();
-  command->add_option("--compare", flags->compare, "A model to show, more than once: nominal, or the folder (or LABEL=FOLDER) that replay, tune or diagnose wrote")->allow_extra_args(false);
+  command
+      ->add_option("--compare", flags->compare,
+                   "A model to show, more than once: nominal, or the folder (or LABEL=FOLDER) that replay, tune or "
+                   "diagnose wrote")
+      ->allow_extra_args(false);
   AddEffectFlags(*command, flags->model);
-  command->add_option("--layout", flags->layout, "overlay: the measured mechanism translucent over the simulated one; side: beside it")->check(CLI::IsMember(kLayouts))->capture_default_str();
-  command->add_option("--view", flags->view, "fixed, tracking or top")->check(CLI::IsMember(kViews))->capture_default_str();
-  command->add_option("--speed", flags->speed, "Seconds of the log per second of video: 0.25 is slow motion")->check(FinitePositive())->capture_default_str();
+  command
+      ->add_option("--layout", flags->layout,
+                   "overlay: the measured mechanism translucent over the simulated one; side: beside it")
+      ->check(CLI::IsMember(kLayouts))
+      ->capture_default_str();
+  command->add_option("--view", flags->view, "fixed, tracking or top")
+      ->check(CLI::IsMember(kViews))
+      ->capture_default_str();
+  command->add_option("--speed", flags->speed, "Seconds of the log per second of video: 0.25 is slow motion")
+      ->check(FinitePositive())
+      ->capture_default_str();
   command->add_option("--from", flags->from_s, "Where to begin, s of the log")->check(CLI::NonNegativeNumber);
   command->add_option("--to", flags->to_s, "Where to end, s of the log (default: its end)")->check(FinitePositive());
-  command->add_option("--at", flags->at_s, "Time of a still, s of the log (default: of the greatest error)")->check(CLI::NonNegativeNumber);
+  command->add_option("--at", flags->at_s, "Time of a still, s of the log (default: of the greatest error)")
+      ->check(CLI::NonNegativeNumber);
   command->add_option("--size", flags->size, "WIDTHxHEIGHT in pixels, even")->capture_default_str();
-  command->add_option("--fps", flags->frames_per_s, "Frames per second")->check(CLI::Range(1.0, 240.0))->capture_default_str();
-  command->add_option("--mode", flags->mode, "free_run or windows (default: the experiment's)")->check(CLI::IsMember({"free_run", "windows"}));
+  command->add_option("--fps", flags->frames_per_s, "Frames per second")
+      ->check(CLI::Range(1.0, 240.0))
+      ->capture_default_str();
+  command->add_option("--mode", flags->mode, "free_run or windows (default: the experiment's)")
+      ->check(CLI::IsMember({"free_run", "windows"}));
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
-  command->add_option("--gl", flags->gl, "OpenGL: osmesa (in memory), egl (without a surface), auto (OSMesa, else EGL)")->check(CLI::IsMember(kGl))->capture_default_str();
+  command->add_option("--gl", flags->gl, "OpenGL: osmesa (in memory), egl (without a surface), auto (OSMesa, else EGL)")
+      ->check(CLI::IsMember(kGl))
+      ->capture_default_str();
   AddCommonFlags(*command, flags->common, false);
-  command->footer("Example: gapscope render models/qube/experiment.yaml log.csv --compare nominal --compare out/tuned --speed 0.5 --out video.mp4");
+  command->footer(
+      "Example: gapscope render models/qube/experiment.yaml log.csv --compare nominal --compare out/tuned --speed 0.5 "
+      "--out video.mp4");
   command->callback([flags, &run] { run = [flags] { return RunRender(*flags); }; });
 }
 

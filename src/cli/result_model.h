@@ -15,7 +15,8 @@ struct ResultModel {
   std::vector<double> values;
 };
 
-// `path`: the folder or its result.json. Errors: not such a file; an effect or a parameter that this experiment does not have.
+// `path`: the folder or its result.json. Errors: not such a file; an effect or a parameter that this experiment does
+// not have.
 Result<ResultModel> LoadResultModel(const Experiment& experiment, const std::string& path, const ScaleTable& scales);
 
 }  // namespace gapscope::cli

@@ -24,14 +24,17 @@ CLI::Validator FinitePositive() {
 void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
   command.add_flag("--json", flags.json, "Print the result as JSON on stdout, nothing else");
   command.add_flag("--quiet", flags.quiet, "No messages on stderr but errors");
-  command.add_option("--jobs", flags.jobs, "Workers; 0: one per processor. The result does not depend on it")->check(CLI::Range(0, 1024));
+  command.add_option("--jobs", flags.jobs, "Workers; 0: one per processor. The result does not depend on it")
+      ->check(CLI::Range(0, 1024));
   command.add_option("--seed", flags.seed, "Seed of everything random");
-  if (writes_folder) command.add_option("--out", flags.out, "Folder for result.json, report.html, traces and model.xml");
+  if (writes_folder)
+    command.add_option("--out", flags.out, "Folder for result.json, report.html, traces and model.xml");
 }
 
 namespace {
 void AddWhileFlag(CLI::App& command, ModelFlags& flags) {
-  command.add_option("--while", flags.while_column, "Use a log's rows until this column falls to zero (\"torque_enable\")");
+  command.add_option("--while", flags.while_column,
+                     "Use a log's rows until this column falls to zero (\"torque_enable\")");
 }
 }  // namespace
 
@@ -52,7 +55,8 @@ void AddEffectFlags(CLI::App& command, ModelFlags& flags) {
   command.add_option("--params", flags.params, "YAML file of parameter values")->allow_extra_args(false);
 }
 
-Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths, ThreadPool& pool) {
+Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,
+                                              ThreadPool& pool) {
   std::vector<std::optional<Result<Recording>>> loaded(paths.size());
   pool.ForEach(paths.size(), [&](std::size_t i, int) { loaded[i] = LoadRecording(experiment, paths[i]); });
   std::vector<Recording> recordings;
@@ -70,12 +74,16 @@ Result<std::pair<std::string, double>> ParseAssignment(const std::string& text, 
   const auto parsed = equal == std::string::npos ? std::from_chars_result{text.data(), std::errc::invalid_argument}
                                                  : std::from_chars(text.data() + equal + 1, end, value);
   if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) {
-    return Error{.what = "not NAME=VALUE", .where = flag, .actual = "'" + text + "'", .allowed = "a parameter's name, '=', a finite number"};
+    return Error{.what = "not NAME=VALUE",
+                 .where = flag,
+                 .actual = "'" + text + "'",
+                 .allowed = "a parameter's name, '=', a finite number"};
   }
   return std::pair{text.substr(0, equal), value};
 }
 
-Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set, std::vector<double>* values) {
+Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set,
+                      std::vector<double>* values) {
   for (const auto& file : params) {
     GS_ASSIGN(const auto numbers, LoadParameterValues(file));
     for (const auto& [name, value] : numbers) {
@@ -117,7 +125,10 @@ Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const s
     if (std::find(hold_out.begin(), hold_out.end(), result.all[i]) != hold_out.end()) result.held_out.push_back(i);
   }
   if (result.held_out.size() == result.all.size()) {
-    return Error{.what = "every log is held out", .where = "--hold-out", .allowed = "at least one log to fit", .cure = "add logs before --hold-out"};
+    return Error{.what = "every log is held out",
+                 .where = "--hold-out",
+                 .allowed = "at least one log to fit",
+                 .cure = "add logs before --hold-out"};
   }
   return result;
 }

@@ -56,12 +56,14 @@ struct Session {
 // "NAME=VALUE" with a finite value. Error: it is not; `flag` is where.
 Result<std::pair<std::string, double>> ParseAssignment(const std::string& text, const std::string& flag);
 // Writes --params files and --set assignments over `values` (as model.Nominal()).
-Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set, std::vector<double>* values);
+Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set,
+                      std::vector<double>* values);
 
 Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common);
 
 // Reads all logs, in parallel; the first error in the order of the arguments.
-Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths, ThreadPool& pool);
+Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,
+                                              ThreadPool& pool);
 
 // The logs of a command with --hold-out: all of them once, and which are held out. Error: nothing is left to fit.
 struct HeldOutLogs {

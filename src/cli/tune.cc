@@ -26,7 +26,8 @@ struct TuneFlags {
 };
 
 // The stages that an actuator model is made of, where the model does not have them already.
-const std::vector<std::string> kActuatorEffects = {"command_delay", "actuator_lag", "torque_speed_curve", "load_friction"};
+const std::vector<std::string> kActuatorEffects = {"command_delay", "actuator_lag", "torque_speed_curve",
+                                                   "load_friction"};
 
 Result<int> RunTune(TuneFlags flags) {
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
@@ -36,23 +37,32 @@ Result<int> RunTune(TuneFlags flags) {
     GS_ASSIGN(const Session base, LoadSession(model, flags.common));
     GS_ASSIGN(const auto possible, base.model->PossibleEffects());
     for (const auto& name : kActuatorEffects) {
-      const auto found = std::find_if(possible.begin(), possible.end(), [&](const EffectUse& use) { return use.effect == name; });
+      const auto found =
+          std::find_if(possible.begin(), possible.end(), [&](const EffectUse& use) { return use.effect == name; });
       if (found != possible.end()) model.with.push_back(found->Text());
     }
-    const auto coulomb = std::find_if(possible.begin(), possible.end(), [&](const EffectUse& use) { return use.effect == "coulomb_friction"; });
+    const auto coulomb = std::find_if(possible.begin(), possible.end(),
+                                      [&](const EffectUse& use) { return use.effect == "coulomb_friction"; });
     if (coulomb != possible.end()) model.with.push_back(coulomb->Text());
   }
   GS_ASSIGN(Session session, LoadSession(model, flags.common));
   PrintFindings(session.recordings, flags.common.quiet);
-  TuneOptions options{.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s, .huber = flags.huber, .time_step_s = flags.time_step_s, .starts = flags.starts,
+  TuneOptions options{.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s,
+                      .huber = flags.huber,
+                      .time_step_s = flags.time_step_s,
+                      .starts = flags.starts,
                       .resume = flags.resume};
   if (flags.normalization == "rms") options.normalization = Normalization::kRootMeanSquare;
   const auto& names = OptimizerNames();
-  options.solve.optimizer = static_cast<Optimizer>(std::find(names.begin(), names.end(), flags.optimizer) - names.begin());
+  options.solve.optimizer =
+      static_cast<Optimizer>(std::find(names.begin(), names.end(), flags.optimizer) - names.begin());
   options.solve.seed = flags.common.seed;
   options.solve.tolerance = flags.tolerance;
-  options.objective = flags.objective == "windows" ? Objective::kWindows : flags.objective == "free_run" ? Objective::kFreeRun : Objective::kBoth;
-  if (session.experiment.replay.mode == ReplayMode::kWindows && flags.objective == "both") options.objective = Objective::kWindows;
+  options.objective = flags.objective == "windows"    ? Objective::kWindows
+                      : flags.objective == "free_run" ? Objective::kFreeRun
+                                                      : Objective::kBoth;
+  if (session.experiment.replay.mode == ReplayMode::kWindows && flags.objective == "both")
+    options.objective = Objective::kWindows;
   for (const auto& nuisance : flags.fixed_nuisances) {
     if (nuisance == "offset") options.fit_offsets = false;
     if (nuisance == "shift") options.fit_shift = false;
@@ -66,7 +76,10 @@ Result<int> RunTune(TuneFlags flags) {
   for (const auto& name : flags.free) {
     GS_ASSIGN(const int index, session.model->Find(name, "--free"));
     const Parameter& p = session.model->parameters()[index];
-    if (!(p.low < p.high)) return Error{.what = "the parameter '" + name + "' has no bounds to tune in", .where = "--free", .cure = "give it 'bounds' in " + session.experiment.path};
+    if (!(p.low < p.high))
+      return Error{.what = "the parameter '" + name + "' has no bounds to tune in",
+                   .where = "--free",
+                   .cure = "give it 'bounds' in " + session.experiment.path};
     free.insert(index);
   }
   for (const auto& name : flags.freeze) {
@@ -74,15 +87,20 @@ Result<int> RunTune(TuneFlags flags) {
     free.erase(index);
   }
   options.free.assign(free.begin(), free.end());
-  if (flags.budget_s > 0) options.solve.deadline = std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<long long>(1e6 * flags.budget_s));
+  if (flags.budget_s > 0)
+    options.solve.deadline =
+        std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<long long>(1e6 * flags.budget_s));
   const std::filesystem::path out = flags.common.out;
   if (!flags.common.out.empty()) options.journal = out / "journal.bin";
-  if (flags.resume && flags.common.out.empty()) return Error{.what = "nothing to resume from", .where = "--resume", .cure = "name the interrupted run's folder with --out"};
+  if (flags.resume && flags.common.out.empty())
+    return Error{
+        .what = "nothing to resume from", .where = "--resume", .cure = "name the interrupted run's folder with --out"};
   const bool live = !flags.common.quiet && isatty(2);
   if (live) {
     options.solve.progress = [begin = std::chrono::steady_clock::now(), budget = flags.budget_s](const Progress& p) {
       const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      fmt::print(stderr, "\r\033[Kcost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, elapsed, budget > 0 ? fmt::format(" of {:.0f} s", budget) : "");
+      fmt::print(stderr, "\r\033[Kcost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, elapsed,
+                 budget > 0 ? fmt::format(" of {:.0f} s", budget) : "");
     };
   }
   const DataSplit data = SplitData(std::move(session.recordings), logs.held_out);
@@ -96,12 +114,19 @@ Result<int> RunTune(TuneFlags flags) {
     GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
     GS_RETURN_IF_ERROR(WriteTraces(out / "traces", {.logs = summary.held_out}, data.held_out));
     GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
-    std::vector<ReportPrediction> predictions = {{"nominal", Evaluate(*session.model, data.train, session.values, 0, session.experiment.replay.mode, options, *session.pool)}, {"tuned", summary.train}};
-    for (auto& log : Evaluate(*session.model, data.held_out, session.values, 0, session.experiment.replay.mode, options, *session.pool)) predictions[0].logs.push_back(std::move(log));
+    std::vector<ReportPrediction> predictions = {
+        {"nominal", Evaluate(*session.model, data.train, session.values, 0, session.experiment.replay.mode, options,
+                             *session.pool)},
+        {"tuned", summary.train}};
+    for (auto& log : Evaluate(*session.model, data.held_out, session.values, 0, session.experiment.replay.mode, options,
+                              *session.pool))
+      predictions[0].logs.push_back(std::move(log));
     predictions[1].logs.insert(predictions[1].logs.end(), summary.held_out.begin(), summary.held_out.end());
-    GS_RETURN_IF_ERROR(WriteReport(out, json, session.experiment, {data.train, data.held_out}, std::move(predictions), *session.model, session.values, session.model->parameters()));
+    GS_RETURN_IF_ERROR(WriteReport(out, json, session.experiment, {data.train, data.held_out}, std::move(predictions),
+                                   *session.model, session.values, session.model->parameters()));
   }
-  fmt::print("{}{}", flags.common.json ? json : TuneTable(summary, *session.model, ConsoleOf(1)), flags.common.json ? "\n" : "");
+  fmt::print("{}{}", flags.common.json ? json : TuneTable(summary, *session.model, ConsoleOf(1)),
+             flags.common.json ? "\n" : "");
   return kDone;
 }
 
@@ -109,29 +134,52 @@ Result<int> RunTune(TuneFlags flags) {
 
 void AddTune(CLI::App& program, Run& run) {
   auto flags = std::make_shared<TuneFlags>();
-  CLI::App* command = program.add_subcommand("tune", "Fit parameters until replayed trajectories match the hardware; score on logs not seen");
+  CLI::App* command = program.add_subcommand(
+      "tune", "Fit parameters until replayed trajectories match the hardware; score on logs not seen");
   AddModelFlags(*command, flags->model, true);
   AddCommonFlags(*command, flags->common, true);
   command->add_option("--hold-out", flags->hold_out, "A log to score on, not to fit")->allow_extra_args(false);
   command->add_option("--free", flags->free, "Tune this parameter although it is frozen")->allow_extra_args(false);
   command->add_option("--freeze", flags->freeze, "Do not tune this parameter")->allow_extra_args(false);
-  command->add_option("--fix", flags->fixed_nuisances, "Do not fit this nuisance: offset (per log and sensor), shift (of the commands, below a sample), state (initial)")
+  command
+      ->add_option("--fix", flags->fixed_nuisances,
+                   "Do not fit this nuisance: offset (per log and sensor), shift (of the commands, below a sample), "
+                   "state (initial)")
       ->check(CLI::IsMember({"offset", "shift", "state"}))
       ->allow_extra_args(false);
-  command->add_option("--optimizer", flags->optimizer, "lm, or NLopt's slsqp, mma, bobyqa, crs2, isres, direct")->check(CLI::IsMember(OptimizerNames()))->capture_default_str();
-  command->add_option("--objective", flags->objective, "windows, free_run or both")->check(CLI::IsMember({"windows", "free_run", "both"}))->capture_default_str();
-  command->add_option("--normalize", flags->normalization, "Residuals are divided by each signal's standard deviation, or by its root mean square (rms)")
+  command->add_option("--optimizer", flags->optimizer, "lm, or NLopt's slsqp, mma, bobyqa, crs2, isres, direct")
+      ->check(CLI::IsMember(OptimizerNames()))
+      ->capture_default_str();
+  command->add_option("--objective", flags->objective, "windows, free_run or both")
+      ->check(CLI::IsMember({"windows", "free_run", "both"}))
+      ->capture_default_str();
+  command
+      ->add_option("--normalize", flags->normalization,
+                   "Residuals are divided by each signal's standard deviation, or by its root mean square (rms)")
       ->check(CLI::IsMember({"deviation", "rms"}))
       ->capture_default_str();
   command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
-  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")->check(FinitePositive());
-  command->add_option("--tolerance", flags->tolerance, "Stop when a step lowers the cost by less than this share")->check(CLI::Range(1e-9, 0.1))->capture_default_str();
-  command->add_option("--huber", flags->huber, "Weigh residuals beyond this many standard deviations down; 0: plain squares")->check(CLI::NonNegativeNumber)->capture_default_str();
-  command->add_option("--starts", flags->starts, "Starting points: the nominal values, then random ones")->check(CLI::Range(1, 1000))->capture_default_str();
-  command->add_option("--budget", flags->budget_s, "Seconds; the best so far is reported when they are spent")->check(FinitePositive());
+  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")
+      ->check(FinitePositive());
+  command->add_option("--tolerance", flags->tolerance, "Stop when a step lowers the cost by less than this share")
+      ->check(CLI::Range(1e-9, 0.1))
+      ->capture_default_str();
+  command
+      ->add_option("--huber", flags->huber,
+                   "Weigh residuals beyond this many standard deviations down; 0: plain squares")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("--starts", flags->starts, "Starting points: the nominal values, then random ones")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_option("--budget", flags->budget_s, "Seconds; the best so far is reported when they are spent")
+      ->check(FinitePositive());
   command->add_flag("--resume", flags->resume, "Go on with the interrupted run in --out, to the same result");
-  command->add_flag("--actuator", flags->actuator, "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none");
-  command->footer("Example: gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm --out tuned");
+  command->add_flag("--actuator", flags->actuator,
+                    "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none");
+  command->footer(
+      "Example: gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm "
+      "--out tuned");
   command->callback([flags, &run] { run = [flags] { return RunTune(*flags); }; });
 }
 

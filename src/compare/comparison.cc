@@ -21,10 +21,12 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
   std::vector<SignalScore> scored;
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
     const SignalTrace& trace = log.signals[s];
-    comparison.signals.push_back(ScoreSignal(trace.signal, log.time_s, trace.measured, trace.predicted, trace.resolution));
+    comparison.signals.push_back(
+        ScoreSignal(trace.signal, log.time_s, trace.measured, trace.predicted, trace.resolution));
     if (!trace.scored) continue;
     scored.push_back(comparison.signals.back());
-    ConditionInput input{.signal = trace.signal, .time_s = log.time_s, .measured = trace.measured, .predicted = trace.predicted};
+    ConditionInput input{
+        .signal = trace.signal, .time_s = log.time_s, .measured = trace.measured, .predicted = trace.predicted};
     std::vector<double> speed;
     if (trace.kind != SignalKind::kTorque) {
       speed = SmoothedSpeed(recording, recording.measured[s]);
@@ -34,7 +36,8 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
     if (!recording.commands.empty()) input.command = recording.commands.front().values;
     for (auto& share : LocateError(input)) comparison.where.push_back(std::move(share));
   }
-  comparison.error = log.outcome == Outcome::kDiverged ? std::numeric_limits<double>::infinity() : CombinedError(scored);
+  comparison.error =
+      log.outcome == Outcome::kDiverged ? std::numeric_limits<double>::infinity() : CombinedError(scored);
   return comparison;
 }
 
@@ -43,7 +46,8 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
 Comparison Compare(const ReplayResult& result, const std::vector<Recording>& recordings, ThreadPool& pool) {
   Comparison comparison;
   comparison.logs.resize(result.logs.size());
-  pool.ForEach(result.logs.size(), [&](std::size_t l, int) { comparison.logs[l] = CompareLog(result.logs[l], recordings[l]); });
+  pool.ForEach(result.logs.size(),
+               [&](std::size_t l, int) { comparison.logs[l] = CompareLog(result.logs[l], recordings[l]); });
   double sum = 0;
   for (const auto& log : comparison.logs) sum += log.error * log.error;
   comparison.error = std::sqrt(sum / static_cast<double>(comparison.logs.size()));

@@ -13,9 +13,9 @@ namespace gapscope {
 
 struct LogComparison {
   std::string log_path;
-  double error = 0;                    // see CombinedError; infinity where the replay diverged
-  std::vector<SignalScore> signals;    // all measured signals, scored or not
-  std::vector<ConditionShare> where;   // shares of error and time of the scored signals
+  double error = 0;                   // see CombinedError; infinity where the replay diverged
+  std::vector<SignalScore> signals;   // all measured signals, scored or not
+  std::vector<ConditionShare> where;  // shares of error and time of the scored signals
 };
 
 struct Comparison {

@@ -17,7 +17,8 @@ using Complex = std::complex<double>;
 constexpr std::size_t kLeastRows = 256, kSegments = 8;
 constexpr double kLeastPower = 1e-3, kLeastCoherence = 0.5, kBand = 0.2;  // octaves
 
-// Without mean and slope. Of the whole record: taken from each segment, a slope would spread a slow sine over the lowest bins.
+// Without mean and slope. Of the whole record: taken from each segment, a slope would spread a slow sine over the
+// lowest bins.
 std::vector<double> Level(std::vector<double> values) {
   const double count = static_cast<double>(values.size()), middle = 0.5 * (count - 1);
   double mean = 0, tilt = 0, spread = 0;
@@ -37,7 +38,8 @@ std::vector<Complex> Transform(Eigen::FFT<double>& fft, std::span<const double> 
   double mean = 0;
   for (const double v : values) mean += v / count;
   std::vector<double> windowed(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) windowed[i] = (values[i] - mean) * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * static_cast<double>(i) / count));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    windowed[i] = (values[i] - mean) * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * static_cast<double>(i) / count));
   std::vector<Complex> spectrum;
   fft.fwd(spectrum, windowed);
   return spectrum;
@@ -49,12 +51,14 @@ struct Band {
   int bins = 0;
 };
 
-double Unwrapped(double phase_deg, double previous_deg) { return phase_deg - 360 * std::round((phase_deg - previous_deg) / 360); }
+double Unwrapped(double phase_deg, double previous_deg) {
+  return phase_deg - 360 * std::round((phase_deg - previous_deg) / 360);
+}
 
 }  // namespace
 
-std::vector<ResponsePoint> EstimateResponse(std::span<const double> time_s, std::span<const double> command, std::span<const double> measured,
-                                            std::span<const double> predicted) {
+std::vector<ResponsePoint> EstimateResponse(std::span<const double> time_s, std::span<const double> command,
+                                            std::span<const double> measured, std::span<const double> predicted) {
   const std::size_t rows = time_s.size();
   std::vector<double> u = FillGaps(command), y = FillGaps(measured), p = FillGaps(predicted);
   if (rows < kLeastRows || u.size() != rows || y.size() != rows || p.size() != rows) return {};
@@ -66,7 +70,8 @@ std::vector<ResponsePoint> EstimateResponse(std::span<const double> time_s, std:
   const std::size_t bins = segment / 2 + 1;
   std::vector<Band> sums(bins);
   for (std::size_t begin = 0; begin + segment <= rows; begin += segment / 2) {
-    const auto su = Transform(fft, std::span(u).subspan(begin, segment)), sy = Transform(fft, std::span(y).subspan(begin, segment)),
+    const auto su = Transform(fft, std::span(u).subspan(begin, segment)),
+               sy = Transform(fft, std::span(y).subspan(begin, segment)),
                sp = Transform(fft, std::span(p).subspan(begin, segment));
     for (std::size_t k = 0; k < bins; ++k) {
       sums[k].uu += std::norm(su[k]);
@@ -82,7 +87,8 @@ std::vector<ResponsePoint> EstimateResponse(std::span<const double> time_s, std:
   if (!(strongest > 0)) return {};
   std::vector<ResponsePoint> points;
   for (std::size_t k = 1; k + 1 < bins;) {
-    const std::size_t last = std::max(k + 1, static_cast<std::size_t>(std::ceil(static_cast<double>(k) * std::exp2(kBand))));
+    const std::size_t last =
+        std::max(k + 1, static_cast<std::size_t>(std::ceil(static_cast<double>(k) * std::exp2(kBand))));
     Band band;
     double coherence = 0;
     for (; k < std::min(last, bins - 1); ++k) {
@@ -97,7 +103,10 @@ std::vector<ResponsePoint> EstimateResponse(std::span<const double> time_s, std:
     if (!(band.uu / band.bins > kLeastPower * strongest)) continue;
     coherence /= band.uu;
     if (!(coherence >= kLeastCoherence)) continue;
-    ResponsePoint point{.hz = band.hz / band.uu, .measured_gain = std::abs(band.uy) / band.uu, .predicted_gain = std::abs(band.up) / band.uu, .coherence = coherence};
+    ResponsePoint point{.hz = band.hz / band.uu,
+                        .measured_gain = std::abs(band.uy) / band.uu,
+                        .predicted_gain = std::abs(band.up) / band.uu,
+                        .coherence = coherence};
     const double m = std::arg(band.uy) * 180 / std::numbers::pi, q = std::arg(band.up) * 180 / std::numbers::pi;
     point.measured_phase_deg = points.empty() ? m : Unwrapped(m, points.back().measured_phase_deg);
     point.predicted_phase_deg = Unwrapped(q, point.measured_phase_deg);

@@ -1,8 +1,7 @@
 #include "src/core/digest.h"
 
-#include <sys/types.h>
-
 #include <sha2.h>
+#include <sys/types.h>
 
 #include "src/core/file.h"
 

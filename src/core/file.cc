@@ -34,10 +34,13 @@ class Descriptor {
 Result<std::string> ReadFile(const std::string& path) {
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) return SystemError("cannot open the file", path);
-  struct stat info {};
+  struct stat info{};
   if (fstat(file.get(), &info) != 0) return SystemError("cannot read the file", path);
   if (S_ISDIR(info.st_mode)) {
-    return Error{.what = "cannot read the file", .where = path, .actual = "a folder", .allowed = "a regular file",
+    return Error{.what = "cannot read the file",
+                 .where = path,
+                 .actual = "a folder",
+                 .allowed = "a regular file",
                  .cure = "name a file in it"};
   }
   std::string bytes;

@@ -59,8 +59,7 @@ inline Status Ok() { return std::monostate{}; }
 
 }  // namespace gapscope
 
-#define GS_CHECK(condition) \
-  ((condition) ? (void)0 : ::gapscope::ContractBroken(#condition, __FILE__, __LINE__))
+#define GS_CHECK(condition) ((condition) ? (void)0 : ::gapscope::ContractBroken(#condition, __FILE__, __LINE__))
 
 // GS_ASSIGN(auto x, Expression()): returns the Error, or assigns the value.
 #define GS_ASSIGN(target, expression) GS_ASSIGN_IMPL_(GS_CONCAT_(gs_result_, __LINE__), target, expression)
@@ -69,9 +68,9 @@ inline Status Ok() { return std::monostate{}; }
   if (!result.ok()) return result.error();          \
   target = std::move(result).value()
 // GS_RETURN_IF_ERROR(Expression()): returns the Error, if any.
-#define GS_RETURN_IF_ERROR(expression)                                                     \
-  do {                                                                                     \
-    if (auto gs_status = (expression); !gs_status.ok()) return gs_status.error();          \
+#define GS_RETURN_IF_ERROR(expression)                                            \
+  do {                                                                            \
+    if (auto gs_status = (expression); !gs_status.ok()) return gs_status.error(); \
   } while (false)
 #define GS_CONCAT_INNER_(a, b) a##b
 #define GS_CONCAT_(a, b) GS_CONCAT_INNER_(a, b)

@@ -4,8 +4,8 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <map>
+#include <numbers>
 #include <vector>
 
 namespace gapscope {
@@ -14,6 +14,7 @@ namespace {
 const std::map<std::string, Unit, std::less<>>& Table() {
   constexpr double kDeg = std::numbers::pi / 180;
   constexpr double kRpm = 2 * std::numbers::pi / 60;
+  // clang-format off
   static const std::map<std::string, Unit, std::less<>> table = {
       {"1", {"1", 1}},          {"%", {"1", 0.01}},
       {"s", {"s", 1}},          {"ms", {"s", 1e-3}},        {"us", {"s", 1e-6}},       {"ns", {"s", 1e-9}},
@@ -26,6 +27,7 @@ const std::map<std::string, Unit, std::less<>>& Table() {
       {"m", {"m", 1}},          {"mm", {"m", 1e-3}},        {"m/s", {"m/s", 1}},       {"N", {"N", 1}},
       {"kg", {"kg", 1}},        {"g", {"kg", 1e-3}},        {"ohm", {"ohm", 1}},       {"degC", {"degC", 1}},
   };
+  // clang-format on
   return table;
 }
 
@@ -39,8 +41,8 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
     row[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
       const std::size_t above = row[j];
-      const bool same = std::tolower(static_cast<unsigned char>(a[i - 1])) ==
-                        std::tolower(static_cast<unsigned char>(b[j - 1]));
+      const bool same =
+          std::tolower(static_cast<unsigned char>(a[i - 1])) == std::tolower(static_cast<unsigned char>(b[j - 1]));
       row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (same ? 0 : 1)});
       diagonal = above;
     }
@@ -60,7 +62,8 @@ Result<Unit> ParseUnit(std::string_view text) {
   const std::string nearest = Nearest(text, names);
   std::string allowed;
   for (const auto& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
-  return Error{.what = "unknown unit", .actual = "'" + std::string(text) + "'",
+  return Error{.what = "unknown unit",
+               .actual = "'" + std::string(text) + "'",
                .allowed = allowed + ", counts/<per revolution>",
                .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
 }

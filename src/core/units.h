@@ -10,8 +10,8 @@
 namespace gapscope {
 
 struct Unit {
-  std::string si;      // the unit used inside: "rad", "rad/s", "s", "V", "A", "N m", "1" ...
-  double factor = 1;   // value in SI = factor * value as written
+  std::string si;     // the unit used inside: "rad", "rad/s", "s", "V", "A", "N m", "1" ...
+  double factor = 1;  // value in SI = factor * value as written
 };
 
 // "deg", "rpm", "ms", "mA", "counts/2048" ... Errors: unknown unit, with the nearest known one.

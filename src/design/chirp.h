@@ -1,4 +1,5 @@
-// The chirp test of a position servo: gains from a wanted natural frequency and damping ratio, and the largest chirp that a speed limit allows.
+// The chirp test of a position servo: gains from a wanted natural frequency and damping ratio, and the largest chirp
+// that a speed limit allows.
 //
 //   w = 2 pi f,  kp = J w^2,  kd = 2 z J w,  settling time 4 / (z w)
 //   bandwidth f sqrt(1 - 2 z^2 + sqrt(4 z^4 - 4 z^2 + 2))        (-3 dB of w^2 / (s^2 + 2 z w s + w^2))
@@ -15,12 +16,12 @@
 namespace gapscope {
 
 struct ChirpRequest {
-  double inertia_kg_m2 = 0;                 // at the joint, > 0
-  double natural_frequency_hz = 0;          // > 0
-  std::vector<double> damping_ratios;       // > 0
-  double speed_limit_rad_per_s = 0;         // > 0
-  double amplitude_factor = 0.8;            // k, in (0, 1]
-  std::vector<double> end_over_bandwidth;   // > 0
+  double inertia_kg_m2 = 0;                // at the joint, > 0
+  double natural_frequency_hz = 0;         // > 0
+  std::vector<double> damping_ratios;      // > 0
+  double speed_limit_rad_per_s = 0;        // > 0
+  double amplitude_factor = 0.8;           // k, in (0, 1]
+  std::vector<double> end_over_bandwidth;  // > 0
 };
 
 struct Chirp {

@@ -20,14 +20,17 @@ Eigen::MatrixXd SolveLyapunov(const Eigen::MatrixXd& a, const Eigen::MatrixXd& q
       }
     }
   }
-  const Eigen::VectorXd right = -Eigen::Map<const Eigen::VectorXd>(q.data(), n * n), solution = system.fullPivLu().solve(right);
+  const Eigen::VectorXd right = -Eigen::Map<const Eigen::VectorXd>(q.data(), n * n),
+                        solution = system.fullPivLu().solve(right);
   const Eigen::MatrixXd x = Eigen::Map<const Eigen::MatrixXd>(solution.data(), n, n);
   return 0.5 * (x + x.transpose());
 }
 
 std::string PoleText(const std::vector<std::complex<double>>& poles) {
   std::string text;
-  for (const auto& p : poles) text += (text.empty() ? "" : ", ") + std::to_string(p.real()) + (p.imag() != 0 ? (p.imag() > 0 ? "+" : "") + std::to_string(p.imag()) + "i" : "");
+  for (const auto& p : poles)
+    text += (text.empty() ? "" : ", ") + std::to_string(p.real()) +
+            (p.imag() != 0 ? (p.imag() > 0 ? "+" : "") + std::to_string(p.imag()) + "i" : "");
   return text;
 }
 
@@ -36,20 +39,30 @@ std::string PoleText(const std::vector<std::complex<double>>& poles) {
 std::vector<std::complex<double>> SortedPoles(const Eigen::MatrixXd& a) {
   const Eigen::VectorXcd values = a.eigenvalues();
   std::vector<std::complex<double>> poles(values.data(), values.data() + values.size());
-  std::sort(poles.begin(), poles.end(), [](const auto& x, const auto& y) { return std::pair(-x.real(), x.imag()) < std::pair(-y.real(), y.imag()); });
+  std::sort(poles.begin(), poles.end(), [](const auto& x, const auto& y) {
+    return std::pair(-x.real(), x.imag()) < std::pair(-y.real(), y.imag());
+  });
   return poles;
 }
 
-Result<LinearSystem> Linearize(const Model& model, const std::vector<double>& values, const std::map<std::string, double>& log_values, const std::map<std::string, double>& at, std::size_t command) {
+Result<LinearSystem> Linearize(const Model& model, const std::vector<double>& values,
+                               const std::map<std::string, double>& log_values, const std::map<std::string, double>& at,
+                               std::size_t command) {
   const mjModel& compiled = model.compiled();
   const ModelPtr m(mj_copyModel(nullptr, &compiled));
   const DataPtr d(mj_makeData(m.get()));
   ParameterWriter writer(model, m.get(), d.get());
-  if (!writer.Write(values, log_values)) return Error{.what = "the parameters make no model", .where = model.experiment().path};
+  if (!writer.Write(values, log_values))
+    return Error{.what = "the parameters make no model", .where = model.experiment().path};
   GS_CHECK(command < model.command_actuators().size());
-  if (m->nq != m->nv || m->na > 0) return Error{.what = "only rigs of hinges and slides without actuator states are linearised", .where = model.experiment().model_path};
+  if (m->nq != m->nv || m->na > 0)
+    return Error{.what = "only rigs of hinges and slides without actuator states are linearised",
+                 .where = model.experiment().model_path};
   for (int dof = 0; dof < m->nv; ++dof) {
-    if (m->dof_frictionloss[dof] > 1e-5) return Error{.what = "dry friction has no linearisation", .where = model.experiment().model_path, .cure = "set it to zero by --set"};
+    if (m->dof_frictionloss[dof] > 1e-5)
+      return Error{.what = "dry friction has no linearisation",
+                   .where = model.experiment().model_path,
+                   .cure = "set it to zero by --set"};
   }
   LinearSystem system;
   std::vector<mjtNum> pose(m->qpos0, m->qpos0 + m->nq);
@@ -62,7 +75,10 @@ Result<LinearSystem> Linearize(const Model& model, const std::vector<double>& va
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end()) {
       const std::string nearest = Nearest(name, names);
-      return Error{.what = "no such joint", .where = "--at", .actual = "'" + name + "'", .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+      return Error{.what = "no such joint",
+                   .where = "--at",
+                   .actual = "'" + name + "'",
+                   .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
     }
     pose[static_cast<std::size_t>(m->jnt_qposadr[found - names.begin()])] = value;
   }
@@ -79,19 +95,27 @@ Result<LinearSystem> Linearize(const Model& model, const std::vector<double>& va
   system.a = Eigen::MatrixXd::Zero(2 * n, 2 * n);
   system.b = Eigen::MatrixXd::Zero(2 * n, 1);
   system.a.topRightCorner(n, n).setIdentity();
-  for (Eigen::Index i = 0; i < 2 * n; ++i) system.a.block(n, i, n, 1) = (acceleration(i, kStep, 0) - acceleration(i, -kStep, 0)) / (2 * kStep);
+  for (Eigen::Index i = 0; i < 2 * n; ++i)
+    system.a.block(n, i, n, 1) = (acceleration(i, kStep, 0) - acceleration(i, -kStep, 0)) / (2 * kStep);
   system.b.bottomRows(n) = (acceleration(-1, 0, kStep) - acceleration(-1, 0, -kStep)) / (2 * kStep);
-  const double scale = std::max(system.a.bottomRows(n).cwiseAbs().maxCoeff(), system.b.cwiseAbs().maxCoeff()), left = acceleration(-1, 0, 0).cwiseAbs().maxCoeff();
-  if (left > 1e-3 * scale) return Error{.what = "the pose is not an equilibrium", .where = "--at", .actual = "accelerations up to " + std::to_string(left) + " rad/s^2"};
+  const double scale = std::max(system.a.bottomRows(n).cwiseAbs().maxCoeff(), system.b.cwiseAbs().maxCoeff()),
+               left = acceleration(-1, 0, 0).cwiseAbs().maxCoeff();
+  if (left > 1e-3 * scale)
+    return Error{.what = "the pose is not an equilibrium",
+                 .where = "--at",
+                 .actual = "accelerations up to " + std::to_string(left) + " rad/s^2"};
   for (const auto& name : names) system.states.push_back(name);
   for (const auto& name : names) system.states.push_back(name + " speed");
   return system;
 }
 
-Result<Feedback> Lqr(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const Eigen::MatrixXd& q, const Eigen::MatrixXd& r) {
+Result<Feedback> Lqr(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const Eigen::MatrixXd& q,
+                     const Eigen::MatrixXd& r) {
   const Eigen::Index n = a.rows();
-  GS_CHECK(a.cols() == n && b.rows() == n && q.rows() == n && q.cols() == n && r.rows() == b.cols() && r.cols() == b.cols());
-  if (!(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(r).eigenvalues().minCoeff() > 0) || !(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(q).eigenvalues().minCoeff() >= -1e-12 * q.norm())) {
+  GS_CHECK(a.cols() == n && b.rows() == n && q.rows() == n && q.cols() == n && r.rows() == b.cols() &&
+           r.cols() == b.cols());
+  if (!(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(r).eigenvalues().minCoeff() > 0) ||
+      !(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(q).eigenvalues().minCoeff() >= -1e-12 * q.norm())) {
     return Error{.what = "the weights are not positive", .where = "--q, --r", .allowed = "r above zero, q not below"};
   }
   const Eigen::MatrixXd g = b * r.ldlt().solve(b.transpose());
@@ -104,7 +128,11 @@ Result<Feedback> Lqr(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const E
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
     if (eigen.eigenvalues()[i].real() < -1e-10 * size && found < n) stable.col(found++) = eigen.eigenvectors().col(i);
   }
-  const auto no_solution = [] { return Error{.what = "no stabilising feedback exists", .where = "--q", .cure = "weigh every position that does not come back by itself"}; };
+  const auto no_solution = [] {
+    return Error{.what = "no stabilising feedback exists",
+                 .where = "--q",
+                 .cure = "weigh every position that does not come back by itself"};
+  };
   if (found < n) return no_solution();
   Eigen::MatrixXd p = (stable.bottomRows(n) * stable.topRows(n).fullPivLu().inverse()).real();
   p = 0.5 * (p + p.transpose()).eval();
@@ -121,10 +149,15 @@ Result<Feedback> Lqr(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const E
   return feedback;
 }
 
-Result<Feedback> PlacePoles(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const std::vector<std::complex<double>>& poles) {
+Result<Feedback> PlacePoles(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
+                            const std::vector<std::complex<double>>& poles) {
   const Eigen::Index n = a.rows();
   if (b.cols() != 1) return Error{.what = "pole placement is for one input"};
-  if (static_cast<Eigen::Index>(poles.size()) != n) return Error{.what = "as many poles as states are needed", .where = "--poles", .actual = std::to_string(poles.size()), .allowed = std::to_string(n)};
+  if (static_cast<Eigen::Index>(poles.size()) != n)
+    return Error{.what = "as many poles as states are needed",
+                 .where = "--poles",
+                 .actual = std::to_string(poles.size()),
+                 .allowed = std::to_string(n)};
   // Coefficients of the product of (s - p), from the highest power down.
   std::vector<std::complex<double>> polynomial = {1};
   for (const auto& p : poles) {
@@ -132,8 +165,10 @@ Result<Feedback> PlacePoles(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, 
     for (std::size_t i = polynomial.size() - 1; i > 0; --i) polynomial[i] -= p * polynomial[i - 1];
   }
   double size = 0, imaginary = 0;
-  for (const auto& c : polynomial) size = std::max(size, std::abs(c)), imaginary = std::max(imaginary, std::abs(c.imag()));
-  if (imaginary > 1e-9 * size) return Error{.what = "complex poles come in pairs", .where = "--poles", .actual = PoleText(poles)};
+  for (const auto& c : polynomial)
+    size = std::max(size, std::abs(c)), imaginary = std::max(imaginary, std::abs(c.imag()));
+  if (imaginary > 1e-9 * size)
+    return Error{.what = "complex poles come in pairs", .where = "--poles", .actual = PoleText(poles)};
   // Time in units of the system's own speed keeps the powers of A of one size.
   const double fastest = a.eigenvalues().cwiseAbs().maxCoeff(), rate = fastest > 0 ? fastest : 1;
   const Eigen::MatrixXd slow = a / rate;
@@ -142,9 +177,12 @@ Result<Feedback> PlacePoles(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, 
   for (Eigen::Index i = 0; i < n; ++i) controllability.col(i) = column, column = slow * column;
   const Eigen::VectorXd lengths = controllability.colwise().norm();
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(controllability * lengths.cwiseInverse().asDiagonal());
-  if (!(lengths.minCoeff() > 0) || svd.singularValues()[n - 1] < 1e-10 * svd.singularValues()[0]) return Error{.what = "the system is not controllable from this input", .where = "--poles"};
+  if (!(lengths.minCoeff() > 0) || svd.singularValues()[n - 1] < 1e-10 * svd.singularValues()[0])
+    return Error{.what = "the system is not controllable from this input", .where = "--poles"};
   Eigen::MatrixXd value = Eigen::MatrixXd::Zero(n, n);
-  for (std::size_t i = 0; i < polynomial.size(); ++i) value = value * slow + Eigen::MatrixXd::Identity(n, n) * (polynomial[i].real() / std::pow(rate, static_cast<double>(i)));
+  for (std::size_t i = 0; i < polynomial.size(); ++i)
+    value = value * slow +
+            Eigen::MatrixXd::Identity(n, n) * (polynomial[i].real() / std::pow(rate, static_cast<double>(i)));
   Eigen::RowVectorXd last = Eigen::RowVectorXd::Zero(n);
   last[n - 1] = 1;
   Feedback feedback;
@@ -153,13 +191,15 @@ Result<Feedback> PlacePoles(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, 
   return feedback;
 }
 
-Result<Feedback> KalmanGain(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& w, const Eigen::MatrixXd& v) {
+Result<Feedback> KalmanGain(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& w,
+                            const Eigen::MatrixXd& v) {
   GS_ASSIGN(Feedback dual, Lqr(a.transpose(), c.transpose(), w, v));
   dual.gain.transposeInPlace();
   return dual;
 }
 
-Result<Feedback> ObserverGain(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const std::vector<std::complex<double>>& poles) {
+Result<Feedback> ObserverGain(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c,
+                              const std::vector<std::complex<double>>& poles) {
   GS_ASSIGN(Feedback dual, PlacePoles(a.transpose(), c.transpose(), poles));
   dual.gain.transposeInPlace();
   return dual;

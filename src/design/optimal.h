@@ -1,14 +1,16 @@
-// The next experiment: of a library of inputs, each as large as the rig's limits allow, the one that says most about named parameters, or that tells
-// named effects apart.
+// The next experiment: of a library of inputs, each as large as the rig's limits allow, the one that says most about
+// named parameters, or that tells named effects apart.
 //
-// Parameters: Fisher information of the predicted signals, F = J' J / (floor^2 n_c), n_c rows to a correlation time of the noise; the other free parameters,
-// a command shift and zero offsets are nuisances with what is known of them beforehand. The covariance's block of the named ones is the Cramer-Rao bound;
-// the input with the smallest mean logarithm of their standard deviations (D-optimal for one parameter) wins. Goodwin and Payne, "Dynamic System
+// Parameters: Fisher information of the predicted signals, F = J' J / (floor^2 n_c), n_c rows to a correlation time of
+// the noise; the other free parameters, a command shift and zero offsets are nuisances with what is known of them
+// beforehand. The covariance's block of the named ones is the Cramer-Rao bound; the input with the smallest mean
+// logarithm of their standard deviations (D-optimal for one parameter) wins. Goodwin and Payne, "Dynamic System
 // Identification", 1977, ch. 6.
 //
-// Effects: each rival's prediction is imitated by every other one (Gauss-Newton over its effect, base parameters, shift, offsets). What is left, in
-// sensor floors, is how well the input separates the two; the input whose least separated pair is farthest apart wins (Hunter and Reiner, "Designs for discriminating
-// between two rival models", Technometrics 7, 1965).
+// Effects: each rival's prediction is imitated by every other one (Gauss-Newton over its effect, base parameters,
+// shift, offsets). What is left, in sensor floors, is how well the input separates the two; the input whose least
+// separated pair is farthest apart wins (Hunter and Reiner, "Designs for discriminating between two rival models",
+// Technometrics 7, 1965).
 #ifndef GAPSCOPE_DESIGN_OPTIMAL_H_
 #define GAPSCOPE_DESIGN_OPTIMAL_H_
 
@@ -20,18 +22,21 @@ namespace gapscope {
 struct OptimalOptions {
   RehearsalOptions rehearsal;
   double duration_s = 6;
-  double margin = 0.9;       // share of every limit that may be used
-  double amplitude = 0;      // largest command, SI; 0: the command's limit
-  std::size_t refined = 2;   // inputs whose rivals are fitted with several Jacobians by replays; the rest with one and Broyden's corrections
+  double margin = 0.9;      // share of every limit that may be used
+  double amplitude = 0;     // largest command, SI; 0: the command's limit
+  std::size_t refined = 2;  // inputs whose rivals are fitted with several Jacobians by replays; the rest with one and
+                            // Broyden's corrections
 };
 
 struct InputScore {
   Waveform wave;
-  double amplitude = 0;             // of the command, SI
-  double score = 0;                 // larger is better: floors between the least separated pair, or minus the mean logarithm of the standard deviations
-  std::vector<double> per_target;   // parameters: standard deviation over |value|; effects: floors per ordered pair (truth, imitation)
+  double amplitude = 0;  // of the command, SI
+  double score = 0;  // larger is better: floors between the least separated pair, or minus the mean logarithm of the
+                     // standard deviations
+  std::vector<double>
+      per_target;  // parameters: standard deviation over |value|; effects: floors per ordered pair (truth, imitation)
   bool refined = false;
-  Rehearsal rehearsal;              // under the base model
+  Rehearsal rehearsal;  // under the base model
 };
 
 struct OptimalDesign {
@@ -47,11 +52,14 @@ struct LibraryInput {
 };
 std::vector<LibraryInput> InputLibrary(double duration_s, double rate_hz);
 
-// `parameters`: indices in base.model. Errors: none of the library's inputs keeps the limits; a parameter that is frozen.
-Result<OptimalDesign> DesignForParameters(const Hypothesis& base, const std::vector<int>& parameters, const OptimalOptions& options, ThreadPool& pool);
+// `parameters`: indices in base.model. Errors: none of the library's inputs keeps the limits; a parameter that is
+// frozen.
+Result<OptimalDesign> DesignForParameters(const Hypothesis& base, const std::vector<int>& parameters,
+                                          const OptimalOptions& options, ThreadPool& pool);
 
 // `rivals`: at least two. Errors: as above, and a rival that cannot be simulated.
-Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<Hypothesis>& rivals, const OptimalOptions& options, ThreadPool& pool);
+Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<Hypothesis>& rivals,
+                                      const OptimalOptions& options, ThreadPool& pool);
 
 }  // namespace gapscope
 

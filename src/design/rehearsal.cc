@@ -42,9 +42,12 @@ double LargestMagnitude(const std::vector<double>& values) {
 Experiment WithLimitSignals(Experiment experiment) {
   std::vector<MeasuredSpec> added;
   for (const auto& limit : experiment.limits) {
-    if (limit.position > 0) added.push_back(LimitSignal(limit.joint + " angle", SignalKind::kPosition, limit.joint, "rad"));
-    if (limit.speed > 0) added.push_back(LimitSignal(limit.joint + " speed", SignalKind::kVelocity, limit.joint, "rad/s"));
-    if (limit.torque > 0) added.push_back(LimitSignal(limit.actuator + " torque", SignalKind::kTorque, limit.actuator, "N m"));
+    if (limit.position > 0)
+      added.push_back(LimitSignal(limit.joint + " angle", SignalKind::kPosition, limit.joint, "rad"));
+    if (limit.speed > 0)
+      added.push_back(LimitSignal(limit.joint + " speed", SignalKind::kVelocity, limit.joint, "rad/s"));
+    if (limit.torque > 0)
+      added.push_back(LimitSignal(limit.actuator + " torque", SignalKind::kTorque, limit.actuator, "N m"));
   }
   experiment.measured.insert(experiment.measured.end(), added.begin(), added.end());
   return experiment;
@@ -58,25 +61,36 @@ double CommandLimit(const Experiment& experiment, const std::string& actuator) {
 }
 
 Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalOptions& options) {
-  if (experiment.commands.empty()) return Error{.what = "the experiment has no command to drive", .where = experiment.path};
+  if (experiment.commands.empty())
+    return Error{.what = "the experiment has no command to drive", .where = experiment.path};
   std::vector<std::string> names;
   for (const auto& command : experiment.commands) names.push_back(command.actuator);
   for (const auto& [name, value] : options.hold) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) return Error{.what = "no command drives that actuator", .where = "--hold", .actual = "'" + name + "'", .cure = "did you mean '" + Nearest(name, names) + "'?"};
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      return Error{.what = "no command drives that actuator",
+                   .where = "--hold",
+                   .actual = "'" + name + "'",
+                   .cure = "did you mean '" + Nearest(name, names) + "'?"};
   }
   for (const auto& limit : experiment.limits) {
     if (!limit.actuator.empty() && std::find(names.begin(), names.end(), limit.actuator) == names.end()) {
-      return Error{.what = "a limit on an actuator that no command drives", .where = experiment.path, .actual = "'" + limit.actuator + "'"};
+      return Error{.what = "a limit on an actuator that no command drives",
+                   .where = experiment.path,
+                   .actual = "'" + limit.actuator + "'"};
     }
   }
   if (options.actuator.empty()) return std::size_t{0};
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == options.actuator) return i;
   }
-  return Error{.what = "no command drives that actuator", .where = "--actuator", .actual = "'" + options.actuator + "'", .cure = "did you mean '" + Nearest(options.actuator, names) + "'?"};
+  return Error{.what = "no command drives that actuator",
+               .where = "--actuator",
+               .actual = "'" + options.actuator + "'",
+               .cure = "did you mean '" + Nearest(options.actuator, names) + "'?"};
 }
 
-Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions& options, const std::vector<double>& values) {
+Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions& options,
+                            const std::vector<double>& values) {
   GS_ASSIGN(const std::size_t driven, DrivenCommand(experiment, options));
   Recording input;
   input.log_path = "designed";
@@ -90,12 +104,15 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
     } else if (spec.fallback) {
       input.values[spec.name] = *spec.fallback;
     } else {
-      return Error{.what = "a log would bring '" + spec.name + "', and there is no log", .where = experiment.path, .cure = "add --value " + spec.name + "=NUMBER"};
+      return Error{.what = "a log would bring '" + spec.name + "', and there is no log",
+                   .where = experiment.path,
+                   .cure = "add --value " + spec.name + "=NUMBER"};
     }
   }
   for (std::size_t c = 0; c < experiment.commands.size(); ++c) {
     const CommandSpec& spec = experiment.commands[c];
-    Recording::Command command{.actuator = spec.actuator, .column = spec.columns.empty() ? "constant" : spec.columns.front()};
+    Recording::Command command{.actuator = spec.actuator,
+                               .column = spec.columns.empty() ? "constant" : spec.columns.front()};
     if (c == driven) {
       command.values = values;
     } else {
@@ -103,14 +120,18 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
       if (const auto held = options.hold.find(spec.actuator); held != options.hold.end()) {
         constant = held->second;
       } else {
-        GS_ASSIGN(constant, EvaluateOnce(spec.fallback, input.values, experiment.path + ": default of command '" + spec.actuator + "'"));
+        GS_ASSIGN(constant, EvaluateOnce(spec.fallback, input.values,
+                                         experiment.path + ": default of command '" + spec.actuator + "'"));
       }
       command.values.assign(values.size(), constant);
     }
     input.commands.push_back(std::move(command));
   }
   for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
-    input.measured.push_back({.spec = experiment.measured[i], .index = i, .column = experiment.measured[i].columns.front(), .values = std::vector<double>(values.size(), kNan)});
+    input.measured.push_back({.spec = experiment.measured[i],
+                              .index = i,
+                              .column = experiment.measured[i].columns.front(),
+                              .values = std::vector<double>(values.size(), kNan)});
   }
   return input;
 }
@@ -124,7 +145,9 @@ Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, co
   rest.qvel.assign(m.nv, 0.0);
   const std::size_t signals = recording.measured.size();
   std::vector<double> predicted(recording.rows() * signals, kNan);
-  const bool simulated = simulator.SetParameters(values, recording) && simulator.Run(recording, {0, recording.rows()}, rest, predicted).outcome == Outcome::kCompleted;
+  const bool simulated =
+      simulator.SetParameters(values, recording) &&
+      simulator.Run(recording, {0, recording.rows()}, rest, predicted).outcome == Outcome::kCompleted;
   for (std::size_t s = 0; s < signals; ++s) {
     for (std::size_t r = 0; r < recording.rows(); ++r) recording.measured[s].values[r] = predicted[r * signals + s];
   }
@@ -142,7 +165,9 @@ Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, co
   for (const auto& limit : experiment.limits) {
     if (limit.command > 0) {
       for (std::size_t c = 0; c < experiment.commands.size(); ++c) {
-        if (experiment.commands[c].actuator == limit.actuator) add(limit.actuator + " command", experiment.commands[c].unit, LargestMagnitude(recording.commands[c].values), limit.command);
+        if (experiment.commands[c].actuator == limit.actuator)
+          add(limit.actuator + " command", experiment.commands[c].unit, LargestMagnitude(recording.commands[c].values),
+              limit.command);
       }
     }
     if (limit.torque > 0) add(limit.actuator + " torque", "N m", reached(limit.actuator + " torque"), limit.torque);
@@ -153,7 +178,8 @@ Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, co
   return rehearsal;
 }
 
-Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const RehearsalOptions& options, const std::vector<double>& unit_wave, double highest, double margin) {
+Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const RehearsalOptions& options,
+                                const std::vector<double>& unit_wave, double highest, double margin) {
   const auto worst_at = [&](double amplitude) -> Result<double> {
     std::vector<double> values(unit_wave);
     for (double& value : values) value *= amplitude;
@@ -179,7 +205,10 @@ Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const
     amplitude = std::min(highest, safe > 0 && unsafe > 0 ? 0.5 * (safe + unsafe) : by_ratio);
     if (safe > 0 && unsafe > 0 && unsafe - safe < 0.03 * safe) break;
   }
-  if (!(safe > 0)) return Error{.what = "the limits are passed at every amplitude that was tried", .where = "limits", .actual = fmt::format("down to {:.3g}", amplitude)};
+  if (!(safe > 0))
+    return Error{.what = "the limits are passed at every amplitude that was tried",
+                 .where = "limits",
+                 .actual = fmt::format("down to {:.3g}", amplitude)};
   return safe;
 }
 
@@ -207,7 +236,8 @@ std::string InputCsv(const Experiment& experiment, const Rehearsal& rehearsal) {
     fmt::format_to(std::back_inserter(text), "{:.10g}", recording.time_s[r] * per_second);
     for (const std::size_t c : commands) {
       const CommandSpec& spec = experiment.commands[c];
-      fmt::format_to(std::back_inserter(text), ",{:.10g}", (recording.commands[c].values[r] - spec.offset) / spec.factor);
+      fmt::format_to(std::back_inserter(text), ",{:.10g}",
+                     (recording.commands[c].values[r] - spec.offset) / spec.factor);
     }
     for (const auto& measured : recording.measured) {
       if (!IsLimitSignal(measured.spec)) fmt::format_to(std::back_inserter(text), ",{:.8g}", measured.values[r]);

@@ -38,9 +38,12 @@ double FloorOf(const MeasuredSpec& spec, const std::vector<double>& values) {
   constexpr double kPosition = 5e-4, kSpeed = 0.02, kTorqueShare = 0.01;
   const double quantisation = spec.resolution * spec.resolution / 12;
   switch (spec.kind) {
-    case SignalKind::kPosition: return std::sqrt(kPosition * kPosition + quantisation);
-    case SignalKind::kVelocity: return std::sqrt(kSpeed * kSpeed + quantisation);
-    case SignalKind::kTorque: break;
+    case SignalKind::kPosition:
+      return std::sqrt(kPosition * kPosition + quantisation);
+    case SignalKind::kVelocity:
+      return std::sqrt(kSpeed * kSpeed + quantisation);
+    case SignalKind::kTorque:
+      break;
   }
   double largest = 0;
   for (const double value : values) {
@@ -55,9 +58,11 @@ std::vector<double> FloorsOf(const Recording& predicted) {
   return floors;
 }
 
-Predictor::Predictor(const Hypothesis& hypothesis, double time_step_s) : hypothesis_(hypothesis), simulator_(*hypothesis.model, time_step_s) {}
+Predictor::Predictor(const Hypothesis& hypothesis, double time_step_s)
+    : hypothesis_(hypothesis), simulator_(*hypothesis.model, time_step_s) {}
 
-Eigen::VectorXd Predictor::Predict(const Recording& input, const std::vector<double>& values, double shift_s, const std::vector<double>& floors) {
+Eigen::VectorXd Predictor::Predict(const Recording& input, const std::vector<double>& values, double shift_s,
+                                   const std::vector<double>& floors) {
   const mjModel& m = hypothesis_.model->compiled();
   InitialState rest;
   rest.qpos.assign(m.qpos0, m.qpos0 + m.nq);
@@ -65,7 +70,9 @@ Eigen::VectorXd Predictor::Predict(const Recording& input, const std::vector<dou
   const std::size_t signals = input.measured.size(), rows = input.rows();
   buffer_.resize(rows * signals);
   simulator_.set_shift_s(shift_s);
-  if (!simulator_.SetParameters(values, input) || simulator_.Run(input, {0, rows}, rest, buffer_).outcome != Outcome::kCompleted) return {};
+  if (!simulator_.SetParameters(values, input) ||
+      simulator_.Run(input, {0, rows}, rest, buffer_).outcome != Outcome::kCompleted)
+    return {};
   std::size_t scored = 0;
   for (const auto& measured : input.measured) scored += measured.spec.scored ? 1 : 0;
   Eigen::VectorXd out(static_cast<Eigen::Index>(rows * scored));
@@ -77,7 +84,8 @@ Eigen::VectorXd Predictor::Predict(const Recording& input, const std::vector<dou
   return out.allFinite() ? out : Eigen::VectorXd();
 }
 
-Eigen::MatrixXd Predictor::Jacobian(const Recording& input, const std::vector<double>& values, double shift_s, const std::vector<double>& floors, const Eigen::VectorXd& at) {
+Eigen::MatrixXd Predictor::Jacobian(const Recording& input, const std::vector<double>& values, double shift_s,
+                                    const std::vector<double>& floors, const Eigen::VectorXd& at) {
   std::vector<std::size_t> positions;  // block of each scored position signal
   std::size_t scored = 0;
   for (const auto& measured : input.measured) {
@@ -85,8 +93,10 @@ Eigen::MatrixXd Predictor::Jacobian(const Recording& input, const std::vector<do
     if (measured.spec.kind == SignalKind::kPosition) positions.push_back(scored);
     ++scored;
   }
-  const Eigen::Index rows = static_cast<Eigen::Index>(input.rows()), parameters = static_cast<Eigen::Index>(hypothesis_.free.size());
-  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(at.size(), parameters + 1 + static_cast<Eigen::Index>(positions.size()));
+  const Eigen::Index rows = static_cast<Eigen::Index>(input.rows()),
+                     parameters = static_cast<Eigen::Index>(hypothesis_.free.size());
+  Eigen::MatrixXd jacobian =
+      Eigen::MatrixXd::Zero(at.size(), parameters + 1 + static_cast<Eigen::Index>(positions.size()));
   std::vector<double> moved(values);
   for (Eigen::Index i = 0; i < parameters; ++i) {
     const auto& free = hypothesis_.free[static_cast<std::size_t>(i)];
@@ -108,7 +118,9 @@ Eigen::MatrixXd Predictor::Jacobian(const Recording& input, const std::vector<do
     if (input.measured[s].spec.scored) scored_floors.push_back(floors[s]);
   }
   for (const std::size_t block : positions) {
-    jacobian.col(parameters + 1 + static_cast<Eigen::Index>(column++)).segment(static_cast<Eigen::Index>(block) * rows, rows).setConstant(1 / scored_floors[block]);
+    jacobian.col(parameters + 1 + static_cast<Eigen::Index>(column++))
+        .segment(static_cast<Eigen::Index>(block) * rows, rows)
+        .setConstant(1 / scored_floors[block]);
   }
   return jacobian;
 }

@@ -30,10 +30,12 @@ struct Hypothesis {
 // Standard deviation that a nominal value is known by, where a prior is asked for: 20 % (contract of the rigs).
 inline constexpr double kNominalShare = 0.2;
 
-// Frees the parameters that are not frozen (those of `known_beforehand` by a prior about their value), all effect parameters without.
+// Frees the parameters that are not frozen (those of `known_beforehand` by a prior about their value), all effect
+// parameters without.
 Hypothesis MakeHypothesis(std::string name, std::shared_ptr<const Model> model, std::vector<double> values);
 
-// Standard deviation of one reading, SI: half a milliradian and the quantisation of a position; 0.02 rad/s of a speed; 1 % of a torque's largest value, at least 1e-9.
+// Standard deviation of one reading, SI: half a milliradian and the quantisation of a position; 0.02 rad/s of a speed;
+// 1 % of a torque's largest value, at least 1e-9.
 double FloorOf(const MeasuredSpec& spec, const std::vector<double>& values);
 // Readings closer than this carry the same noise: sensors' noise is coloured.
 inline constexpr double kNoiseCorrelation_s = 0.01;
@@ -43,9 +45,12 @@ class Predictor {
  public:
   Predictor(const Hypothesis& hypothesis, double time_step_s);
   // `shift_s`: commands act later.
-  Eigen::VectorXd Predict(const Recording& input, const std::vector<double>& values, double shift_s, const std::vector<double>& floors);
-  // Columns: the hypothesis's free parameters, the shift in half samples, one zero offset per position signal. Empty after a divergence.
-  Eigen::MatrixXd Jacobian(const Recording& input, const std::vector<double>& values, double shift_s, const std::vector<double>& floors, const Eigen::VectorXd& at);
+  Eigen::VectorXd Predict(const Recording& input, const std::vector<double>& values, double shift_s,
+                          const std::vector<double>& floors);
+  // Columns: the hypothesis's free parameters, the shift in half samples, one zero offset per position signal. Empty
+  // after a divergence.
+  Eigen::MatrixXd Jacobian(const Recording& input, const std::vector<double>& values, double shift_s,
+                           const std::vector<double>& floors, const Eigen::VectorXd& at);
   Simulator& simulator() { return simulator_; }
 
  private:

@@ -24,7 +24,8 @@ bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
 constexpr double kPriorShare = 0.15;
 // Sensors are zeroed by hand or at start: what a rest angle could explain as well is the rest angle's.
 constexpr double kPriorOffset_rad = 0.03;
-// Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known beforehand.
+// Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known
+// beforehand.
 constexpr double kCorrelated = 10;
 
 }  // namespace
@@ -36,8 +37,15 @@ std::string Candidate::Name() const {
 }
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
-  FitOptions options{.window_s = window_s, .max_windows = train ? max_windows : 0, .time_step_s = time_step_s, .shift_range_s = sample_s, .weights = weights, .prior_share = kPriorShare / std::sqrt(kCorrelated),
-                     .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated), .linear_terms = true, .huber = 0};
+  FitOptions options{.window_s = window_s,
+                     .max_windows = train ? max_windows : 0,
+                     .time_step_s = time_step_s,
+                     .shift_range_s = sample_s,
+                     .weights = weights,
+                     .prior_share = kPriorShare / std::sqrt(kCorrelated),
+                     .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated),
+                     .linear_terms = true,
+                     .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
@@ -54,7 +62,8 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   Candidate candidate{.effects = effects};
   GS_ASSIGN(candidate.model, Model::Build(bench.experiment, effects, bench.scales));
   candidate.values = candidate.model->Nominal();
-  candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train, bench.Options(*candidate.model, true), candidate.values, bench.pool);
+  candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train,
+                                                   bench.Options(*candidate.model, true), candidate.values, bench.pool);
   for (const auto& use : effects) {
     GS_ASSIGN(const auto placed, candidate.model->EffectParameters(use, bench.scales));
     for (const auto& p : placed) candidate.parameters += !p.shape;
@@ -62,8 +71,14 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   return candidate;
 }
 
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, GiveUp give_up) {
-  const SolveOptions options{.max_iterations = iterations, .tolerance = tolerance, .coarse_step = 0.03, .fine_step = 0.01, .give_up = std::move(give_up), .deadline = bench.deadline};
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
+                  GiveUp give_up) {
+  const SolveOptions options{.max_iterations = iterations,
+                             .tolerance = tolerance,
+                             .coarse_step = 0.03,
+                             .fine_step = 0.01,
+                             .give_up = std::move(give_up),
+                             .deadline = bench.deadline};
   const SolveResult solved = Solve(*candidate->problem, start, options);
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
@@ -82,8 +97,14 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   problem->CentrePrior(candidate->model->Nominal());
   problem->ScalePrior(std::max(1.0, candidate->held_out_floors * candidate->held_out_floors));
   const FitPoint start = problem->FromParent(*candidate->problem, candidate->point, candidate->values, {});
-  const SolveOptions options{.max_iterations = 8, .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0), .coarse_step = 0.01, .fine_step = 0.01, .damping = 1e-8, .central = true,
-                             .secant = false, .deadline = bench.deadline};
+  const SolveOptions options{.max_iterations = 8,
+                             .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0),
+                             .coarse_step = 0.01,
+                             .fine_step = 0.01,
+                             .damping = 1e-8,
+                             .central = true,
+                             .secant = false,
+                             .deadline = bench.deadline};
   const SolveResult solved = Solve(*problem, start, options);
   if (!std::isfinite(solved.cost)) return;
   candidate->problem = std::move(problem);
@@ -95,21 +116,26 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
 
 namespace {
 
-// The candidate on the held-out logs as `options` score them: its parameters held, initial states and zero offsets fitted. Null where it cannot be simulated there.
-std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& candidate, FitOptions options, FitPoint* point) {
+// The candidate on the held-out logs as `options` score them: its parameters held, initial states and zero offsets
+// fitted. Null where it cannot be simulated there.
+std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& candidate, FitOptions options,
+                                      FitPoint* point) {
   options.fit_shift = false;
   options.shift_s = candidate.shift_s;
-  auto problem = std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
+  auto problem =
+      std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
   *point = problem->Start();
   if (!std::isfinite(problem->Cost(*point))) return nullptr;
-  *point = Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
+  *point =
+      Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
   return problem;
 }
 
 }  // namespace
 
 void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
-  candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors = std::numeric_limits<double>::infinity();
+  candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors =
+      std::numeric_limits<double>::infinity();
   candidate->at_bound = LastEffectAtBound(bench, *candidate);
   candidate->held_out_blocks.clear();
   candidate->train_blocks = candidate->problem->BlockCosts(candidate->point);

@@ -1,4 +1,5 @@
-// One explanation of the logs: the base model with a set of effects, refitted on the training logs and scored on the held-out ones.
+// One explanation of the logs: the base model with a set of effects, refitted on the training logs and scored on the
+// held-out ones.
 #ifndef GAPSCOPE_DIAGNOSE_CANDIDATE_H_
 #define GAPSCOPE_DIAGNOSE_CANDIDATE_H_
 
@@ -13,21 +14,21 @@ namespace gapscope {
 struct Candidate {
   std::vector<EffectUse> effects;
   std::shared_ptr<const Model> model;
-  std::unique_ptr<FitProblem> problem;   // on the training logs
+  std::unique_ptr<FitProblem> problem;  // on the training logs
   FitPoint point;
   double train_cost = 0;
   bool converged = false;
-  bool at_bound = false;                 // a parameter of its last effect ended on a bound that does not mean "no effect"
+  bool at_bound = false;  // a parameter of its last effect ended on a bound that does not mean "no effect"
   std::vector<double> values;
   double shift_s = 0;
-  std::vector<double> train_blocks;      // cost per half second, of the training logs
-  std::vector<double> held_out_blocks;   // likewise held out; empty: cannot be simulated there
-  double block_floor = 1;                // what noise alone costs in such a block
+  std::vector<double> train_blocks;     // cost per half second, of the training logs
+  std::vector<double> held_out_blocks;  // likewise held out; empty: cannot be simulated there
+  double block_floor = 1;               // what noise alone costs in such a block
   double held_out_cost = 0;
-  double held_out_floors = 0;            // root mean square of residual over noise
-  double held_out_error = 0;             // normalised: see ReplayError; in windows
-  std::vector<LogReplay> held_out;       // predictions there
-  std::size_t parameters = 0;            // of the effects
+  double held_out_floors = 0;       // root mean square of residual over noise
+  double held_out_error = 0;        // normalised: see ReplayError; in windows
+  std::vector<LogReplay> held_out;  // predictions there
+  std::size_t parameters = 0;       // of the effects
   std::string Name() const;
 };
 
@@ -37,13 +38,13 @@ struct Workbench {
   const DataSplit& data;
   const ScaleTable& scales;
   ThreadPool& pool;
-  std::vector<double> weights;   // per experiment signal: 1 / noise
+  std::vector<double> weights;  // per experiment signal: 1 / noise
   double window_s = 1;
   double time_step_s = 0;
-  double sample_s = 0;           // of the logs as they are: what a delay must exceed
+  double sample_s = 0;  // of the logs as they are: what a delay must exceed
   std::size_t max_windows = 0;
   Deadline deadline;
-  bool by_windows = false;       // train and held-out logs are the same: every third window is held out
+  bool by_windows = false;  // train and held-out logs are the same: every third window is held out
 
   FitOptions Options(const Model& model, bool train) const;
   bool Late() const { return deadline && std::chrono::steady_clock::now() >= *deadline; }
@@ -52,13 +53,15 @@ struct Workbench {
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
 // Fits from `start` on the training logs, until `give_up` says to.
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance, GiveUp give_up = {});
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
+                  GiveUp give_up = {});
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
 void PolishCandidate(const Workbench& bench, Candidate* candidate);
 // Fills the blocks and the held-out fields.
 void ScoreCandidate(const Workbench& bench, Candidate* candidate);
 
-// Error on the held-out logs when each is one free run (see ReplayError), with zero offsets and the initial state fitted; infinity where that diverges.
+// Error on the held-out logs when each is one free run (see ReplayError), with zero offsets and the initial state
+// fitted; infinity where that diverges.
 double FreeRunError(const Workbench& bench, const Candidate& candidate);
 
 }  // namespace gapscope

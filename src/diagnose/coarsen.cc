@@ -6,12 +6,14 @@ namespace gapscope {
 
 Recording Coarsen(const Recording& recording, double least_step_s) {
   // A drive's torque follows its command at once: under the mean of a few commands it would seem to be late.
-  const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) { return m.spec.scored && m.spec.kind == SignalKind::kTorque; });
+  const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(),
+                                  [](const auto& m) { return m.spec.scored && m.spec.kind == SignalKind::kTorque; });
   if (torque) return recording;
   constexpr double kSlack = 0.95;  // of the step: stamps jitter
   std::vector<std::size_t> kept;
   for (std::size_t row = 0; row < recording.rows(); ++row) {
-    if (kept.empty() || recording.time_s[row] - recording.time_s[kept.back()] >= kSlack * least_step_s) kept.push_back(row);
+    if (kept.empty() || recording.time_s[row] - recording.time_s[kept.back()] >= kSlack * least_step_s)
+      kept.push_back(row);
   }
   if (kept.size() == recording.rows() || kept.size() < 2) return recording;
   Recording coarse = recording;
@@ -27,7 +29,8 @@ Recording Coarsen(const Recording& recording, double least_step_s) {
     command.values = pick(fine);
     for (std::size_t k = 0; k + 1 < kept.size(); ++k) {
       double sum = 0;
-      for (std::size_t row = kept[k]; row < kept[k + 1]; ++row) sum += fine[row] * (recording.time_s[row + 1] - recording.time_s[row]);
+      for (std::size_t row = kept[k]; row < kept[k + 1]; ++row)
+        sum += fine[row] * (recording.time_s[row + 1] - recording.time_s[row]);
       command.values[k] = sum / (coarse.time_s[k + 1] - coarse.time_s[k]);
     }
   }

@@ -24,11 +24,13 @@ std::vector<std::size_t> Leaders(const Layer& layer, const Model& model, std::si
   for (std::size_t i = 0; i < layer.screen.size() && order.size() < refits; ++i) {
     if (layer.screen[i].trial.visible) order.push_back(i);
   }
-  for (std::size_t leader = 0, leaders = std::min<std::size_t>(2, order.size()); leader < leaders; ++leader) AddPartners(layer, layer.screen[order[leader]].use, model, &order);
+  for (std::size_t leader = 0, leaders = std::min<std::size_t>(2, order.size()); leader < leaders; ++leader)
+    AddPartners(layer, layer.screen[order[leader]].use, model, &order);
   return order;
 }
 
-// What explained much alone beside the first effect is tried beside it too, from where it ended: where much is missing, a step of the score test says little.
+// What explained much alone beside the first effect is tried beside it too, from where it ended: where much is missing,
+// a step of the score test says little.
 void AddStrongSingles(const Candidate& base, const Candidates& singles, const Candidate& parent, Layer* layer) {
   constexpr Limits kStrong{.share = 0.3, .z = 3.0};
   constexpr std::size_t kMost = 2, kPlace = 2;
@@ -36,14 +38,25 @@ void AddStrongSingles(const Candidate& base, const Candidates& singles, const Ca
   const bool much_left = parent.held_out_floors > kUnknownFloors;
   std::size_t added = 0;
   for (const auto& child : singles) {
-    if (added == kMost || child->held_out_blocks.empty() || child->effects == parent.effects || Contains(*child, parent) || Contains(parent, *child) ||
-        (!much_left && ArePartners(child->effects.back(), parent.effects.back(), *parent.model)) || !Convincing(Compare(base, *child), kStrong)) {
+    if (added == kMost || child->held_out_blocks.empty() || child->effects == parent.effects ||
+        Contains(*child, parent) || Contains(parent, *child) ||
+        (!much_left && ArePartners(child->effects.back(), parent.effects.back(), *parent.model)) ||
+        !Convincing(Compare(base, *child), kStrong)) {
       continue;
     }
-    const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) { return s.use == child->effects.back() && s.left_out.empty(); });
+    const auto entry = std::find_if(layer->screen.begin(), layer->screen.end(), [&](const Screened& s) {
+      return s.use == child->effects.back() && s.left_out.empty();
+    });
     if (entry == layer->screen.end()) continue;
     ++added;
-    Trial start{.drop = entry->trial.drop, .absorbed = entry->trial.absorbed, .trial = {}, .values = entry->child.model->Nominal(), .dy = {}, .visible = true, .valid = true, .others = {}};
+    Trial start{.drop = entry->trial.drop,
+                .absorbed = entry->trial.absorbed,
+                .trial = {},
+                .values = entry->child.model->Nominal(),
+                .dy = {},
+                .visible = true,
+                .valid = true,
+                .others = {}};
     for (std::size_t i = 0; i < start.values.size(); ++i) {
       const std::string& name = entry->child.model->parameters()[i].name;
       if (name.starts_with(entry->use.Text() + ".")) start.values[i] = child->values[child->model->IndexOf(name)];
@@ -51,20 +64,26 @@ void AddStrongSingles(const Candidate& base, const Candidates& singles, const Ca
     entry->trial.others.push_back(std::move(start));
     const auto index = static_cast<std::size_t>(entry - layer->screen.begin());
     if (std::find(layer->leaders.begin(), layer->leaders.end(), index) == layer->leaders.end()) {
-      layer->leaders.insert(layer->leaders.begin() + static_cast<std::ptrdiff_t>(std::min(kPlace, layer->leaders.size())), index);
+      layer->leaders.insert(
+          layer->leaders.begin() + static_cast<std::ptrdiff_t>(std::min(kPlace, layer->leaders.size())), index);
     }
   }
 }
 
 }  // namespace
 
-bool AreRivals(const Candidate& a, const Candidate& b) { return std::max(a.held_out_floors, b.held_out_floors) < kAtNoise || !Convincing(Compare(b, a), kTold); }
+bool AreRivals(const Candidate& a, const Candidate& b) {
+  return std::max(a.held_out_floors, b.held_out_floors) < kAtNoise || !Convincing(Compare(b, a), kTold);
+}
 
 void SortByMisfit(const Candidate& parent, Candidates* children) {
-  std::stable_sort(children->begin(), children->end(), [](const auto& a, const auto& b) { return LogMisfit(*a) < LogMisfit(*b); });
+  std::stable_sort(children->begin(), children->end(),
+                   [](const auto& a, const auto& b) { return LogMisfit(*a) < LogMisfit(*b); });
   if (children->empty() || !children->front()->at_bound) return;
   const double most = Compare(parent, *children->front()).gain;
-  const auto sound = std::find_if(children->begin(), children->end(), [&](const auto& c) { return !c->at_bound && Compare(parent, *c).gain > kNearly * most; });
+  const auto sound = std::find_if(children->begin(), children->end(), [&](const auto& c) {
+    return !c->at_bound && Compare(parent, *c).gain > kNearly * most;
+  });
   if (sound != children->end()) std::rotate(children->begin(), sound, sound + 1);
 }
 
@@ -72,7 +91,8 @@ Workbench Hurried(const Workbench& bench, double share) {
   Workbench hurried = bench;
   if (bench.deadline) {
     const auto now = std::chrono::steady_clock::now();
-    hurried.deadline = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(share * (*bench.deadline - now));
+    hurried.deadline =
+        now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(share * (*bench.deadline - now));
   }
   return hurried;
 }
@@ -89,7 +109,8 @@ void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Laye
     tasted.push_back({&entry, std::make_unique<Candidate>(std::move(entry.child))});
     TasteChild(bench, parent, entry.trial, tasted.back().child.get());
   }
-  std::stable_sort(tasted.begin(), tasted.end(), [](const Tasted& a, const Tasted& b) { return a.child->train_cost < b.child->train_cost; });
+  std::stable_sort(tasted.begin(), tasted.end(),
+                   [](const Tasted& a, const Tasted& b) { return a.child->train_cost < b.child->train_cost; });
   double best_cost = parent.train_cost;
   for (const auto& other : layer->children) best_cost = std::min(best_cost, other->train_cost);
   for (auto& [entry, child] : tasted) {
@@ -103,7 +124,8 @@ void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Laye
   }
 }
 
-void Explore(const Workbench& bench, const Candidate& base, Candidate& parent, std::size_t refits, double share, const Say& say, Layer* layer, const Candidates* singles) {
+void Explore(const Workbench& bench, const Candidate& base, Candidate& parent, std::size_t refits, double share,
+             const Say& say, Layer* layer, const Candidates* singles) {
   const Workbench hurried = Hurried(bench, share);
   const auto possible = parent.model->PossibleEffects();
   if (!possible.ok()) return;
@@ -148,7 +170,8 @@ double RemovedExcess(double floors_before, double floors_after) {
 bool Pays(const Candidate& richer, const Candidate& simpler, const Candidate& parent) {
   const Evidence more = Compare(simpler, richer);
   if (more.held_out > kSureNested.share && more.z > kSureNested.z) return true;
-  const bool much = more.gain > kNestedShare * Compare(parent, richer).gain || RemovedExcess(simpler.held_out_floors, richer.held_out_floors) > kNestedExcess;
+  const bool much = more.gain > kNestedShare * Compare(parent, richer).gain ||
+                    RemovedExcess(simpler.held_out_floors, richer.held_out_floors) > kNestedExcess;
   return much && Convincing(more, kNested);
 }
 
@@ -163,7 +186,8 @@ Candidate* Simplest(const Layer& layer, const Candidate& parent, const Limits& l
     const Evidence more = Compare(*child, *best);
     if (Contains(*best, *child)) {
       if (!Pays(*best, *child, parent)) best = child.get();
-    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z && !Convincing(more, kNested) && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
+    } else if (child->parameters < best->parameters && !child->at_bound && more.z < kNested.z &&
+               !Convincing(more, kNested) && Compare(parent, *child).gain > kNearly * Compare(parent, *best).gain) {
       best = child.get();
     } else if (IsLessLikely(*best, *child) && AreRivals(*best, *child)) {
       best = child.get();

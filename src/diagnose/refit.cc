@@ -46,7 +46,8 @@ void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& star
   candidate->shift_s = candidate->problem->Shift(before);
 }
 
-// The trial's values with as much of the parent's answer as pays: far outside of where it was linear it leads along valleys that take many Jacobians back.
+// The trial's values with as much of the parent's answer as pays: far outside of where it was linear it leads along
+// valleys that take many Jacobians back.
 FitPoint StartFrom(const FitProblem& parent, const FitPoint& at, const Trial& trial, FitProblem* child) {
   FitPoint best;
   double least = std::numeric_limits<double>::infinity();
@@ -63,24 +64,32 @@ FitPoint StartFrom(const FitProblem& parent, const FitPoint& at, const Trial& tr
 }  // namespace
 
 void TasteChild(const Workbench& bench, const Candidate& parent, const Trial& trial, Candidate* child) {
-  FitCandidate(bench, child, StartFrom(*parent.problem, parent.point, trial, child->problem.get()), kTasteIterations, kFirstTolerance);
+  FitCandidate(bench, child, StartFrom(*parent.problem, parent.point, trial, child->problem.get()), kTasteIterations,
+               kFirstTolerance);
   for (const Trial& other : trial.others) {
-    if (!bench.Late()) TryStart(bench, child, StartFrom(*parent.problem, parent.point, other, child->problem.get()), kTasteIterations, kFirstTolerance);
+    if (!bench.Late())
+      TryStart(bench, child, StartFrom(*parent.problem, parent.point, other, child->problem.get()), kTasteIterations,
+               kFirstTolerance);
   }
 }
 
-void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial, double best_cost, Candidate* child) {
-  if (!child->converged && !(child->train_cost > kFarBehind * best_cost)) FitCandidate(bench, child, child->point, kFirstIterations, kFirstTolerance, FarBehind(best_cost));
+void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUse& use, const Trial& trial,
+                 double best_cost, Candidate* child) {
+  if (!child->converged && !(child->train_cost > kFarBehind * best_cost))
+    FitCandidate(bench, child, child->point, kFirstIterations, kFirstTolerance, FarBehind(best_cost));
   if (child->train_cost <= parent.train_cost * 1.0005 || bench.Late()) return;
   const auto placed = child->model->EffectParameters(use, bench.scales);
   if (!placed.ok()) return;
   std::vector<double> neutral = trial.values;
-  for (const auto& p : placed.value()) neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
-  TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations, kFirstTolerance);
+  for (const auto& p : placed.value())
+    neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
+  TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations,
+           kFirstTolerance);
 }
 
 void StartFromValues(const Workbench& bench, const std::vector<double>& values, Candidate* candidate) {
-  TryStart(bench, candidate, candidate->problem->At(values, candidate->problem->Start()), kFirstIterations, kFirstTolerance);
+  TryStart(bench, candidate, candidate->problem->At(values, candidate->problem->Start()), kFirstIterations,
+           kFirstTolerance);
 }
 
 void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
@@ -93,7 +102,9 @@ void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   std::size_t tried = 0;
   for (std::size_t i = 1; i < layer->children.size() && tried < kMost && !bench.Late(); ++i) {
     Candidate& rival = *layer->children[i];
-    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) || (rival.train_cost < 1.02 * leader.train_cost && !Contains(rival, leader))) continue;
+    if (!ArePartners(leader.effects.back(), rival.effects.back(), *parent.model) ||
+        (rival.train_cost < 1.02 * leader.train_cost && !Contains(rival, leader)))
+      continue;
     const Trial trial = TryEffect(bench, rival, rival.effects.back(), *parent.problem, at, snapshot);
     if (!trial.valid) continue;
     ++tried;
@@ -114,11 +125,14 @@ void StartSagFromLimit(const Workbench& bench, const Candidate& limit, Layer* la
     for (const double time_constant_s : {0.15, 0.8}) {
       if (bench.Late()) return;
       std::vector<double> values = sag->model->Nominal();
-      const auto set = [&](const char* key, double value) { values[sag->model->IndexOf("supply_sag@" + on + "." + key)] = value; };
+      const auto set = [&](const char* key, double value) {
+        values[sag->model->IndexOf("supply_sag@" + on + "." + key)] = value;
+      };
       set("time_constant_s", time_constant_s);
       set("sag_fraction", kFalls);
       set("limit_n_m", kHigher * limit.values[limit.model->IndexOf("torque_limit@" + on + ".limit_n_m")]);
-      TryStart(bench, sag.get(), sag->problem->FromParent(*limit.problem, limit.point, values, {}), kFirstIterations, kFirstTolerance);
+      TryStart(bench, sag.get(), sag->problem->FromParent(*limit.problem, limit.point, values, {}), kFirstIterations,
+               kFirstTolerance);
     }
     ScoreCandidate(bench, sag.get());
   }
@@ -136,18 +150,22 @@ void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candi
     std::vector<double> values = candidate->values;
     if (p.trials.empty()) {
       // On the other side of the middle.
-      const double found = values[index], middle = p.low > 0 && p.high > 20 * p.low ? std::sqrt(p.low * p.high) : 0.5 * (p.low + p.high);
+      const double found = values[index],
+                   middle = p.low > 0 && p.high > 20 * p.low ? std::sqrt(p.low * p.high) : 0.5 * (p.low + p.high);
       values[index] = found > middle ? p.low + 0.4 * (middle - p.low) : middle + 0.4 * (p.high - middle);
-      if (!bench.Late()) TryStart(bench, candidate, candidate->problem->At(values, candidate->point), kFirstIterations, kFirstTolerance);
+      if (!bench.Late())
+        TryStart(bench, candidate, candidate->problem->At(values, candidate->point), kFirstIterations, kFirstTolerance);
     } else if (placed.value().front().name == p.name && p.trials.size() < kScan) {
-      // Of another order of size, from the parent: with this one the base parameters may have gone where no step leads back.
+      // Of another order of size, from the parent: with this one the base parameters may have gone where no step leads
+      // back.
       for (const double trial : p.trials) {
         const double ratio = trial / candidate->values[index];
         if (bench.Late() || (ratio > 1 / kFar && ratio < kFar)) continue;
         values = candidate->model->Nominal();
         for (const auto& q : placed.value()) values[candidate->model->IndexOf(q.name)] = q.start;
         values[index] = trial;
-        TryStart(bench, candidate, candidate->problem->FromParent(*parent.problem, parent.point, values, {}), kTasteIterations, kFirstTolerance);
+        TryStart(bench, candidate, candidate->problem->FromParent(*parent.problem, parent.point, values, {}),
+                 kTasteIterations, kFirstTolerance);
       }
     }
   }
@@ -173,15 +191,21 @@ void StartFromSimpler(const Workbench& bench, Layer* layer) {
     const std::string on = simple->effects.back().on;
     const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
     for (const auto& rich : layer->children) {
-      if (rich->effects.back().on != on || !Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost || bench.Late()) continue;
+      if (rich->effects.back().on != on || !Contains(*rich, *simple) ||
+          rich->train_cost < kClearlyBetter * simple->train_cost || bench.Late())
+        continue;
       const auto placed = rich->model->EffectParameters(rich->effects.back(), bench.scales);
       if (!placed.ok()) continue;
       const bool hump = rich->effects.back().effect == "stribeck_friction";
       std::vector<double> values = rich->model->Nominal();
       for (const auto& p : placed.value()) {
-        values[rich->model->IndexOf(p.name)] = p.unit != "N m" ? p.start : !hump ? level : p.key == "breakaway_n_m" ? kHump * level : kSliding * level;
+        values[rich->model->IndexOf(p.name)] = p.unit != "N m"            ? p.start
+                                               : !hump                    ? level
+                                               : p.key == "breakaway_n_m" ? kHump * level
+                                                                          : kSliding * level;
       }
-      TryStart(bench, rich.get(), rich->problem->FromParent(*simple->problem, simple->point, values, {}), kFirstIterations, kFirstTolerance);
+      TryStart(bench, rich.get(), rich->problem->FromParent(*simple->problem, simple->point, values, {}),
+               kFirstIterations, kFirstTolerance);
       ScoreCandidate(bench, rich.get());
     }
   }

@@ -23,23 +23,29 @@ std::vector<std::vector<double>> Trials(const std::vector<PlacedParameter>& para
   return all;
 }
 
-// Where the test asks the parameters that carry the effect's size to go; a place (rest, phase, periods) stays on its trial value.
+// Where the test asks the parameters that carry the effect's size to go; a place (rest, phase, periods) stays on its
+// trial value.
 double StepTo(const PlacedParameter& p, double trial, double scale) {
   constexpr double kLeastScale = 0.3, kMostScale = 2;
-  const bool place = p.key.find("rest") != std::string::npos || p.key.find("phase") != std::string::npos || p.key.find("periods") != std::string::npos;
+  const bool place = p.key.find("rest") != std::string::npos || p.key.find("phase") != std::string::npos ||
+                     p.key.find("periods") != std::string::npos;
   if (p.trials.empty() || place || p.neutral == p.high) return trial;
   return std::clamp(p.neutral + std::clamp(scale, kLeastScale, kMostScale) * (trial - p.neutral), p.low, p.high);
 }
 
 constexpr std::size_t kOthers = 3;
 
-// The best of `trials` (one per value of the scanned parameter `scanned`), with the next best that are no neighbours of it or each other.
+// The best of `trials` (one per value of the scanned parameter `scanned`), with the next best that are no neighbours of
+// it or each other.
 Trial BestOfScan(std::vector<Trial> trials, int scanned) {
   std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.drop > b.drop; });
   constexpr double kNeighbour = 1.5, kFarBehind = 0.4;
   Trial best = trials.front();
-  for (std::size_t i = 1; i < trials.size() && best.others.size() < kOthers && trials[i].drop > kFarBehind * best.drop; ++i) {
-    const auto near = [&](const Trial& t) { return std::abs(t.values[scanned] - trials[i].values[scanned]) < kNeighbour; };
+  for (std::size_t i = 1; i < trials.size() && best.others.size() < kOthers && trials[i].drop > kFarBehind * best.drop;
+       ++i) {
+    const auto near = [&](const Trial& t) {
+      return std::abs(t.values[scanned] - trials[i].values[scanned]) < kNeighbour;
+    };
     if (!near(best) && std::none_of(best.others.begin(), best.others.end(), near)) best.others.push_back(trials[i]);
   }
   return best;
@@ -52,24 +58,34 @@ struct Tests {
   bool visible = false;
 };
 
-void Test(Candidate& child, const std::vector<PlacedParameter>& placed, const std::vector<std::vector<double>>& trials, const FitProblem& parent, const FitPoint& point, const Snapshot& base,
-          Tests* tests) {
+void Test(Candidate& child, const std::vector<PlacedParameter>& placed, const std::vector<std::vector<double>>& trials,
+          const FitProblem& parent, const FitPoint& point, const Snapshot& base, Tests* tests) {
   const Model& model = *child.model;
   const std::vector<double> nominal = model.Nominal();
   tests->best.clear();
   for (const auto& trial : trials) {
     std::vector<double> tried = nominal;
     for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed[i].name)] = trial[i];
-    const ColumnTest test = child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
+    const ColumnTest test =
+        child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
     if (!test.valid) continue;
-    constexpr double kAllAbsorbed = 0.999, kPromises = 0.05;  // little of a column may be its own and yet be what is missing
+    constexpr double kAllAbsorbed = 0.999,
+                     kPromises = 0.05;  // little of a column may be its own and yet be what is missing
     tests->visible = tests->visible || test.absorbed < kAllAbsorbed || test.drop > kPromises * base.cost;
     for (std::size_t i = 0; i < trial.size(); ++i) {
       tried[model.IndexOf(placed[i].name)] = StepTo(placed[i], trial[i], test.scale);
       if (placed[i].trials.size() >= kScan) tests->scan = model.IndexOf(placed[i].name);
     }
-    Trial found{.drop = test.drop / base.cost, .absorbed = test.absorbed, .trial = trial, .values = std::move(tried), .dy = test.dy, .valid = true, .others = {}};
-    const auto same = std::find_if(tests->best.begin(), tests->best.end(), [&](const Trial& t) { return tests->scan < 0 || t.values[tests->scan] == found.values[tests->scan]; });
+    Trial found{.drop = test.drop / base.cost,
+                .absorbed = test.absorbed,
+                .trial = trial,
+                .values = std::move(tried),
+                .dy = test.dy,
+                .valid = true,
+                .others = {}};
+    const auto same = std::find_if(tests->best.begin(), tests->best.end(), [&](const Trial& t) {
+      return tests->scan < 0 || t.values[tests->scan] == found.values[tests->scan];
+    });
     if (same == tests->best.end()) {
       tests->best.push_back(std::move(found));
     } else if (found.drop > same->drop) {
@@ -80,14 +96,17 @@ void Test(Candidate& child, const std::vector<PlacedParameter>& placed, const st
 
 }  // namespace
 
-Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, FitProblem& parent, const FitPoint& point, const Snapshot& base) {
+Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, FitProblem& parent,
+                const FitPoint& point, const Snapshot& base) {
   const auto placed = child.model->EffectParameters(use, bench.scales);
   if (!placed.ok()) return {};
   constexpr std::size_t kFewWindows = 8, kThin = 4;
   std::vector<std::vector<double>> trials = Trials(placed.value());
   Tests tests;
-  if (std::any_of(placed.value().begin(), placed.value().end(), [](const PlacedParameter& p) { return p.trials.size() >= kScan; })) {
-    Test(child, placed.value(), trials, parent, point, parent.Thin(base, point, std::max(kFewWindows, parent.windows() / kThin)), &tests);
+  if (std::any_of(placed.value().begin(), placed.value().end(),
+                  [](const PlacedParameter& p) { return p.trials.size() >= kScan; })) {
+    Test(child, placed.value(), trials, parent, point,
+         parent.Thin(base, point, std::max(kFewWindows, parent.windows() / kThin)), &tests);
     if (tests.best.empty()) return {};
     const Trial best = BestOfScan(std::move(tests.best), tests.scan);
     trials = {best.trial};

@@ -26,36 +26,47 @@ bool IsZeroOffset(const SearchResult& found, const std::string& joint) {
   constexpr double kImitated = 0.9999;
   const EffectUse bias{"torque_bias", joint};
   if (!IsFinding(bias, *found.base->model)) return !found.torque;
-  return std::any_of(found.first.screen.begin(), found.first.screen.end(), [&](const Screened& s) { return s.use == bias && s.trial.valid && s.trial.absorbed > kImitated; });
+  return std::any_of(found.first.screen.begin(), found.first.screen.end(),
+                     [&](const Screened& s) { return s.use == bias && s.trial.valid && s.trial.absorbed > kImitated; });
 }
 
-// What could stand in the place of `use`, one of the chosen effects: rivals among `field`, and what is the same motion by definition.
-void AddGroup(const SearchResult& found, const Candidates& field, const EffectUse& use, std::vector<std::vector<EffectUse>>* groups) {
+// What could stand in the place of `use`, one of the chosen effects: rivals among `field`, and what is the same motion
+// by definition.
+void AddGroup(const SearchResult& found, const Candidates& field, const EffectUse& use,
+              std::vector<std::vector<EffectUse>>* groups) {
   const Candidate& chosen = *found.chosen;
   std::vector<EffectUse> group = {use};
   for (const auto& rival : field) {
-    const bool same = std::is_permutation(rival->effects.begin(), rival->effects.end(), chosen.effects.begin(), chosen.effects.end());
-    if (!same && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival)) group.push_back(rival->effects.back());
+    const bool same =
+        std::is_permutation(rival->effects.begin(), rival->effects.end(), chosen.effects.begin(), chosen.effects.end());
+    if (!same && !rival->held_out_blocks.empty() && MayBeRivals(*rival, chosen) && AreRivals(chosen, *rival))
+      group.push_back(rival->effects.back());
   }
   for (const auto& other : found.first.screen) {
     const bool known = std::find(group.begin(), group.end(), other.use) != group.end();
-    const bool same = (found.one_signal && IsSameDelay(use, other.use)) || (IsSameFriction(use, other.use) && IsZeroOffset(found, use.on));
+    const bool same = (found.one_signal && IsSameDelay(use, other.use)) ||
+                      (IsSameFriction(use, other.use) && IsZeroOffset(found, use.on));
     if (!known && same) group.push_back(other.use);
   }
   if (group.size() > 1) groups->push_back(std::move(group));
 }
 
-// Probability that the verdict is right as a whole: logistic in what the banks of twin cases of seeds 910, 911 and 912 showed to matter (scripts/blind/calibrate.py;
-// 179 cases, so the weights are rounded).
+// Probability that the verdict is right as a whole: logistic in what the banks of twin cases of seeds 910, 911 and 912
+// showed to matter (scripts/blind/calibrate.py; 179 cases, so the weights are rounded).
 double Confidence(Verdict verdict, const VerdictEvidence& e, std::size_t effects) {
   const double excess = std::log(std::max(e.floors_left, 1.0));
   switch (verdict) {
     case Verdict::kNone:
-    case Verdict::kParameters: return Sigmoid(3.5);
-    case Verdict::kEffects: return Sigmoid(1.7 + 2.0 * std::clamp(e.rival_lead, 0.0, 0.5) - 1.2 * excess - (effects > 1 ? 1.0 : 0));
-    case Verdict::kAmbiguous: return Sigmoid(1.8 - 1.6 * excess);
-    // A gap a hundred times the noise says no more than one of ten: bank 913 had two that were known effects which no fit reached.
-    case Verdict::kUnknown: return Sigmoid(0.7 * std::min(excess, 2.3) - std::max(e.removed, 0.0));
+    case Verdict::kParameters:
+      return Sigmoid(3.5);
+    case Verdict::kEffects:
+      return Sigmoid(1.7 + 2.0 * std::clamp(e.rival_lead, 0.0, 0.5) - 1.2 * excess - (effects > 1 ? 1.0 : 0));
+    case Verdict::kAmbiguous:
+      return Sigmoid(1.8 - 1.6 * excess);
+    // A gap a hundred times the noise says no more than one of ten: bank 913 had two that were known effects which no
+    // fit reached.
+    case Verdict::kUnknown:
+      return Sigmoid(0.7 * std::min(excess, 2.3) - std::max(e.removed, 0.0));
   }
   return 0;
 }
@@ -76,7 +87,8 @@ Judgement Judge(const SearchResult& found) {
   e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
   e.free_run_before = found.free_run_before;
   e.free_run_left = found.free_run_left;
-  if (std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0) e.free_run_removed = 1 - e.free_run_left / e.free_run_before;
+  if (std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0)
+    e.free_run_removed = 1 - e.free_run_left / e.free_run_before;
   const Candidate* best = &chosen != &base ? &chosen : field.empty() ? nullptr : field.front().get();
   if (best) {
     const Evidence gain = Compare(parent, *best);
@@ -103,7 +115,8 @@ Judgement Judge(const SearchResult& found) {
     result.verdict = result.groups.empty() ? Verdict::kEffects : Verdict::kAmbiguous;
   }
   result.probability = Confidence(result.verdict, e, chosen.effects.size());
-  // Of bank 917's verdicts at the end of the budget as many were right as of the others like them; but of leaders that no fit has looked at nothing is known.
+  // Of bank 917's verdicts at the end of the budget as many were right as of the others like them; but of leaders that
+  // no fit has looked at nothing is known.
   if (found.first.refitted < found.first.leaders.size()) result.probability *= 0.8;
 
   // Single explanations share the verdict's probability by how close they come to the leader.
@@ -121,7 +134,8 @@ Judgement Judge(const SearchResult& found) {
   const bool told = result.verdict != Verdict::kUnknown && result.verdict != Verdict::kAmbiguous;
   const double own = told ? std::max(result.probability, 1 / (1 + others)) : 1 / (1 + others);
   for (std::size_t i = 0; i < odds.size(); ++i) {
-    result.probabilities.push_back(result.explanations[i] == leader ? (others > 0 ? own : 1) : odds[i] / others * (1 - own));
+    result.probabilities.push_back(result.explanations[i] == leader ? (others > 0 ? own : 1)
+                                                                    : odds[i] / others * (1 - own));
   }
   return result;
 }

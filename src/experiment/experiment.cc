@@ -20,7 +20,8 @@ std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, do
   if (!parsed.ok()) map.Fail(node, parsed.error());
   *factor = (parsed.ok() ? parsed.value().factor : 1) * map.Number("scale", 1);
   *offset = map.Number("add", 0);
-  if (!std::isfinite(*factor) || *factor == 0) map.Fail(node, {.what = "'scale' makes every value zero or infinite", .allowed = "a finite number other than 0"});
+  if (!std::isfinite(*factor) || *factor == 0)
+    map.Fail(node, {.what = "'scale' makes every value zero or infinite", .allowed = "a finite number other than 0"});
   return parsed.ok() ? parsed.value().si : "1";
 }
 
@@ -38,7 +39,8 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
   }
   for (const YAML::Node& item : map.List("companions")) {
     YamlMap companion(item, path, "a companion");
-    experiment->read.companions.push_back({companion.Text("find"), companion.Text("replace"), companion.Text("prefix", "")});
+    experiment->read.companions.push_back(
+        {companion.Text("find"), companion.Text("replace"), companion.Text("prefix", "")});
     if (experiment->read.companions.back().find.empty()) {
       companion.Fail(item, {.what = "'find' of a companion is empty"});
     }
@@ -52,7 +54,8 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
     experiment->timeline.reversed = kTime[policy.Choice("reversed", {"drop_rows", "error"}, 0)];
     experiment->timeline.missing = kMissing[policy.Choice("missing", {"hold", "drop_rows", "error"}, 0)];
     experiment->timeline.gap_factor = policy.Number("gap_factor", experiment->timeline.gap_factor);
-    if (!(experiment->timeline.gap_factor > 1)) policy.Fail(repair, {.what = "'gap_factor' is in median steps", .allowed = "> 1"});
+    if (!(experiment->timeline.gap_factor > 1))
+      policy.Fail(repair, {.what = "'gap_factor' is in median steps", .allowed = "> 1"});
     GS_RETURN_IF_ERROR(policy.Finish());
   }
   return map.Finish();
@@ -99,7 +102,8 @@ Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& pat
     if (command.columns.empty()) command.optional = true;
     command.unit = ReadScaling(map, item, &command.factor, &command.offset);
     for (const auto& other : experiment->commands) {
-      if (other.actuator == command.actuator) map.Fail(item, {.what = "two commands drive the actuator '" + command.actuator + "'", .cure = "delete one"});
+      if (other.actuator == command.actuator)
+        map.Fail(item, {.what = "two commands drive the actuator '" + command.actuator + "'", .cure = "delete one"});
     }
     GS_RETURN_IF_ERROR(map.Finish());
     experiment->commands.push_back(std::move(command));
@@ -109,7 +113,9 @@ Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& pat
 
 Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment* experiment) {
   if (!node.IsDefined() || !node.IsSequence() || node.size() == 0) {
-    return Error{.what = "nothing is measured", .where = YamlPlace(path, node), .allowed = "a list under 'measured:'",
+    return Error{.what = "nothing is measured",
+                 .where = YamlPlace(path, node),
+                 .allowed = "a list under 'measured:'",
                  .cure = "add '- {signal: NAME, column: NAME, joint: NAME}'"};
   }
   for (const auto& item : node) {
@@ -123,14 +129,16 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     const std::string joint = map.Text("joint", ""), actuator = map.Text("actuator", "");
     spec.on = spec.kind == SignalKind::kTorque ? actuator : joint;
     if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
-      map.Fail(item, {.what = "the signal '" + spec.signal + "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
+      map.Fail(item, {.what = "the signal '" + spec.signal +
+                              "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
     }
     spec.unit = ReadScaling(map, item, &spec.factor, &spec.offset);
     // "1": the column is in SI already.
     const std::array<const char*, 3> fits[] = {{"rad", "m", "1"}, {"rad/s", "m/s", "1"}, {"N m", "N", "1"}};
     const auto& units = fits[static_cast<std::size_t>(spec.kind)];
     if (std::find(units.begin(), units.end(), spec.unit) == units.end()) {
-      map.Fail(item, {.what = "the unit of the signal '" + spec.signal + "' does not fit its kind", .actual = "'" + map.Text("unit", "1") + "'",
+      map.Fail(item, {.what = "the unit of the signal '" + spec.signal + "' does not fit its kind",
+                      .actual = "'" + map.Text("unit", "1") + "'",
                       .allowed = std::string("units of ") + units[0] + " or " + units[1]});
     }
     spec.resolution = map.Number("resolution", 0);
@@ -149,7 +157,8 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     }
     if (spec.resolution < 0) map.Fail(item, {.what = "'resolution' is negative", .allowed = ">= 0"});
     for (const auto& other : experiment->measured) {
-      if (other.signal == spec.signal) map.Fail(item, {.what = "the signal '" + spec.signal + "' stands twice", .cure = "rename one"});
+      if (other.signal == spec.signal)
+        map.Fail(item, {.what = "the signal '" + spec.signal + "' stands twice", .cure = "rename one"});
     }
     GS_RETURN_IF_ERROR(map.Finish());
     experiment->measured.push_back(std::move(spec));
@@ -166,9 +175,16 @@ Status ReadParameters(const YAML::Node& node, const std::string& path, Experimen
     if (names.failed()) break;
     YamlMap map(names.Child(name.c_str()), path, "the parameter '" + name + "'");
     for (const auto& value : experiment->values) {
-      if (value.name == name) map.Fail(pair.first, {.what = "the name '" + name + "' stands twice: a log value and a parameter", .cure = "rename one"});
+      if (value.name == name)
+        map.Fail(pair.first,
+                 {.what = "the name '" + name + "' stands twice: a log value and a parameter", .cure = "rename one"});
     }
-    Parameter parameter{.name = name, .unit = map.Text("unit"), .doc = map.Text("doc", ""), .nominal = map.Number("nominal"), .low = 0, .high = 0,
+    Parameter parameter{.name = name,
+                        .unit = map.Text("unit"),
+                        .doc = map.Text("doc", ""),
+                        .nominal = map.Number("nominal"),
+                        .low = 0,
+                        .high = 0,
                         .frozen = map.Flag("frozen", false)};
     const std::vector<double> bounds = map.NumberList("bounds", 2);
     parameter.low = bounds.size() == 2 ? bounds[0] : parameter.nominal;
@@ -177,7 +193,8 @@ Status ReadParameters(const YAML::Node& node, const std::string& path, Experimen
       map.Fail(pair.second, {.what = "the parameter '" + name + "' has no bounds",
                              .cure = "add 'bounds: [low, high]' or 'frozen: true'"});
     } else if (!(parameter.low <= parameter.nominal && parameter.nominal <= parameter.high)) {
-      map.Fail(pair.second, {.what = "the nominal value of '" + name + "' is outside its bounds", .actual = std::to_string(parameter.nominal),
+      map.Fail(pair.second, {.what = "the nominal value of '" + name + "' is outside its bounds",
+                             .actual = std::to_string(parameter.nominal),
                              .allowed = std::to_string(parameter.low) + " to " + std::to_string(parameter.high)});
     }
     GS_RETURN_IF_ERROR(map.Finish());
@@ -191,8 +208,11 @@ Status ReadSettings(const YAML::Node& node, const std::string& path, Experiment*
   YamlMap fields(node, path, "'set'");
   for (const auto& pair : node) {
     if (!pair.first.IsScalar()) break;
-    FieldSetting setting{.field = pair.first.Scalar(), .expressions = fields.TextList(pair.first.Scalar().c_str()), .where = YamlPlace(path, pair.first)};
-    if (setting.expressions.empty()) fields.Fail(pair.first, {.what = "the field '" + setting.field + "' has no expression"});
+    FieldSetting setting{.field = pair.first.Scalar(),
+                         .expressions = fields.TextList(pair.first.Scalar().c_str()),
+                         .where = YamlPlace(path, pair.first)};
+    if (setting.expressions.empty())
+      fields.Fail(pair.first, {.what = "the field '" + setting.field + "' has no expression"});
     experiment->settings.push_back(std::move(setting));
   }
   return fields.Finish();
@@ -201,12 +221,20 @@ Status ReadSettings(const YAML::Node& node, const std::string& path, Experiment*
 Status ReadLimits(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment) {
   for (const YAML::Node& item : items) {
     YamlMap map(item, path, "a limit");
-    Limit limit{.joint = map.Text("joint", ""), .actuator = map.Text("actuator", ""), .position = map.Number("angle_rad", 0), .speed = map.Number("speed_rad_per_s", 0),
-                .command = map.Number("command", 0), .torque = map.Number("torque_n_m", 0)};
+    Limit limit{.joint = map.Text("joint", ""),
+                .actuator = map.Text("actuator", ""),
+                .position = map.Number("angle_rad", 0),
+                .speed = map.Number("speed_rad_per_s", 0),
+                .command = map.Number("command", 0),
+                .torque = map.Number("torque_n_m", 0)};
     const bool of_joint = !limit.joint.empty();
-    if (of_joint != limit.actuator.empty()) map.Fail(item, {.what = "a limit needs exactly one of 'joint' or 'actuator'"});
+    if (of_joint != limit.actuator.empty())
+      map.Fail(item, {.what = "a limit needs exactly one of 'joint' or 'actuator'"});
     if (of_joint ? limit.command != 0 || limit.torque != 0 : limit.position != 0 || limit.speed != 0) {
-      map.Fail(item, {.what = "a joint is limited by 'angle_rad' and 'speed_rad_per_s', an actuator by 'command' and 'torque_n_m'"});
+      map.Fail(
+          item,
+          {.what =
+               "a joint is limited by 'angle_rad' and 'speed_rad_per_s', an actuator by 'command' and 'torque_n_m'"});
     }
     for (const double value : {limit.position, limit.speed, limit.command, limit.torque}) {
       if (!(value >= 0)) map.Fail(item, {.what = "a limit is a magnitude about zero", .allowed = "> 0"});

@@ -18,7 +18,7 @@ struct LogValue {
   std::string name;    // as expressions use it: "log.kp"
   std::string header;  // name in the log's header; empty: `column`
   std::string column;
-  double factor = 1;   // to SI
+  double factor = 1;               // to SI
   std::optional<double> fallback;  // when the log has neither
 };
 
@@ -35,7 +35,8 @@ struct CommandSpec {
 enum class SignalKind { kPosition, kVelocity, kTorque };
 
 // A column that is compared with the model.
-// Second-order low-pass that the rig applies to a signal before it is logged, w^2 / (s^2 + 2 z w s + w^2): names of parameters; empty: none.
+// Second-order low-pass that the rig applies to a signal before it is logged, w^2 / (s^2 + 2 z w s + w^2): names of
+// parameters; empty: none.
 struct SensorFilter {
   std::string cutoff, damping_ratio;
 };
@@ -44,23 +45,24 @@ struct MeasuredSpec {
   std::string signal;                // name in results: "arm_rad"
   std::vector<std::string> columns;  // the first one that the log has
   SignalKind kind = SignalKind::kPosition;
-  std::string on;                    // joint, or actuator for kTorque
-  std::string unit;                  // SI unit: "rad", "rad/s", "N m"
-  double factor = 1, offset = 0;     // measured in SI = factor * column + offset
-  double resolution = 0;             // size of one sensor count, SI; 0: unknown
+  std::string on;                 // joint, or actuator for kTorque
+  std::string unit;               // SI unit: "rad", "rad/s", "N m"
+  double factor = 1, offset = 0;  // measured in SI = factor * column + offset
+  double resolution = 0;          // size of one sensor count, SI; 0: unknown
   SensorFilter filter;
   bool optional = false;
-  bool scored = true;                // counts in the error
+  bool scored = true;  // counts in the error
   WrapRepair wrap = WrapRepair::kKeep;
   double wrap_period = 0;
-  std::string offset_parameter;      // predicted = model + this parameter; empty: none
+  std::string offset_parameter;  // predicted = model + this parameter; empty: none
 };
 
 struct Parameter {
   std::string name, unit, doc;
   double nominal = 0, low = 0, high = 0;
   bool frozen = false;  // not tuned unless freed by name
-  // Another parameter, a size, with which this one acts linearly though not alone: kAngle: size * (cos, sin) of this; kRest: size * this. Empty: none.
+  // Another parameter, a size, with which this one acts linearly though not alone: kAngle: size * (cos, sin) of this;
+  // kRest: size * this. Empty: none.
   enum class With { kNone, kAngle, kRest } with = With::kNone;
   std::string size;
 };
@@ -72,7 +74,8 @@ struct FieldSetting {
   std::string where;  // file:line:column, for errors
 };
 
-// How far an experiment on the rig may go, as magnitudes about zero; 0: no limit is stated. Exactly one of joint and actuator is named.
+// How far an experiment on the rig may go, as magnitudes about zero; 0: no limit is stated. Exactly one of joint and
+// actuator is named.
 struct Limit {
   std::string joint, actuator;
   double position = 0, speed = 0;  // of the joint: rad and rad/s (m and m/s)
@@ -84,8 +87,9 @@ enum class ReplayMode { kFreeRun, kWindows, kClosedLoop };
 struct ReplayDefaults {
   ReplayMode mode = ReplayMode::kFreeRun;
   double window_s = 1.0;
-  std::string while_column;  // rows from the first one where this column is zero or missing on are left out; empty: all rows
-  double start_s = 0;        // rows before this are left out (a rig that is still handled by hand, say)
+  std::string
+      while_column;    // rows from the first one where this column is zero or missing on are left out; empty: all rows
+  double start_s = 0;  // rows before this are left out (a rig that is still handled by hand, say)
 };
 
 struct Experiment {

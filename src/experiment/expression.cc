@@ -52,10 +52,12 @@ Expression::Expression(Expression&&) noexcept = default;
 Expression& Expression::operator=(Expression&&) noexcept = default;
 Expression::~Expression() = default;
 
-Result<Expression> Expression::Parse(const std::string& text, const std::vector<std::string>& names, double* variables, const std::string& where) {
+Result<Expression> Expression::Parse(const std::string& text, const std::vector<std::string>& names, double* variables,
+                                     const std::string& where) {
   auto impl = std::make_unique<Impl>();
   if (const auto number = AsNumber(text)) {
-    if (!std::isfinite(*number)) return Error{.what = "bad expression '" + text + "': not a finite number", .where = where};
+    if (!std::isfinite(*number))
+      return Error{.what = "bad expression '" + text + "': not a finite number", .where = where};
     impl->constant = *number;
     return Expression(std::move(impl));
   }
@@ -64,10 +66,13 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
     return Expression(std::move(impl));
   }
   if (text.size() > kMaxLength || std::count(text.begin(), text.end(), '(') > 64) {
-    return Error{.what = "the expression is too long", .where = where, .allowed = std::to_string(kMaxLength) + " characters"};
+    return Error{
+        .what = "the expression is too long", .where = where, .allowed = std::to_string(kMaxLength) + " characters"};
   }
   if (Assigns(text)) {
-    return Error{.what = "bad expression " + Quoted(text) + ": it assigns", .where = where, .cure = "compare with '==', or delete the '='"};
+    return Error{.what = "bad expression " + Quoted(text) + ": it assigns",
+                 .where = where,
+                 .cure = "compare with '==', or delete the '='"};
   }
   impl->parser = std::make_unique<mu::Parser>();
   try {
@@ -76,11 +81,14 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
     for (std::size_t i = 0; i < names.size(); ++i) impl->parser->DefineVar(names[i], variables + i);
     impl->parser->SetExpr(text);
     impl->parser->Eval();
-    if (impl->parser->GetNumResults() != 1) return Error{.what = "bad expression " + Quoted(text) + ": several values", .where = where, .allowed = "one"};
+    if (impl->parser->GetNumResults() != 1)
+      return Error{.what = "bad expression " + Quoted(text) + ": several values", .where = where, .allowed = "one"};
   } catch (const mu::Parser::exception_type& e) {
     const std::string nearest = e.GetCode() == mu::ecUNASSIGNABLE_TOKEN ? Nearest(e.GetToken(), names) : "";
     const std::string message = Quoted(e.GetMsg(), 200);
-    return Error{.what = "bad expression " + Quoted(text, 120) + ": " + message.substr(1, message.size() - 2), .where = where, .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+    return Error{.what = "bad expression " + Quoted(text, 120) + ": " + message.substr(1, message.size() - 2),
+                 .where = where,
+                 .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
   }
   return Expression(std::move(impl));
 }
@@ -95,7 +103,8 @@ double Expression::Evaluate() const {
   }
 }
 
-Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values, const std::string& where) {
+Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values,
+                            const std::string& where) {
   std::vector<std::string> names;
   std::vector<double> numbers;
   for (const auto& [name, value] : values) {

@@ -14,9 +14,10 @@ namespace gapscope {
 // One expression bound to an array of variables. Not thread-safe: one per worker.
 class Expression {
  public:
-  // `names[i]` reads `variables[i]`, which must outlive the expression and not move. `where` is for errors. Errors: syntax, unknown name
-  // (with the nearest one), an assignment, several values, a number that is not finite.
-  static Result<Expression> Parse(const std::string& text, const std::vector<std::string>& names, double* variables, const std::string& where);
+  // `names[i]` reads `variables[i]`, which must outlive the expression and not move. `where` is for errors. Errors:
+  // syntax, unknown name (with the nearest one), an assignment, several values, a number that is not finite.
+  static Result<Expression> Parse(const std::string& text, const std::vector<std::string>& names, double* variables,
+                                  const std::string& where);
 
   Expression(Expression&&) noexcept;
   Expression& operator=(Expression&&) noexcept;
@@ -32,7 +33,8 @@ class Expression {
 };
 
 // The value of an expression of `values`. Errors as Parse, and a result that is not finite.
-Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values, const std::string& where);
+Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values,
+                            const std::string& where);
 
 }  // namespace gapscope
 

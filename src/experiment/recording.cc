@@ -22,11 +22,15 @@ Error MissingColumn(const Log& log, const std::vector<std::string>& names, const
   std::string all;
   for (const auto& name : log.ColumnNames()) all += (all.empty() ? "" : ", ") + name;
   const std::string nearest = Nearest(names.front(), log.ColumnNames());
-  return Error{.what = "no column '" + names.front() + "' for " + purpose, .where = log.path + ":1", .actual = "columns " + all,
-               .cure = nearest.empty() ? "name the right column in the experiment file" : "did you mean '" + nearest + "'?"};
+  return Error{
+      .what = "no column '" + names.front() + "' for " + purpose,
+      .where = log.path + ":1",
+      .actual = "columns " + all,
+      .cure = nearest.empty() ? "name the right column in the experiment file" : "did you mean '" + nearest + "'?"};
 }
 
-// Leaves out what the experiment does not want: the first seconds, and what follows after the `while` column falls to zero. Time starts anew.
+// Leaves out what the experiment does not want: the first seconds, and what follows after the `while` column falls to
+// zero. Time starts anew.
 Status CutTimeline(const Experiment& experiment, const Log& log, Timeline* timeline) {
   const ReplayDefaults& replay = experiment.replay;
   std::size_t first = 0, last = timeline->time_s.size();
@@ -39,18 +43,30 @@ Status CutTimeline(const Experiment& experiment, const Log& log, Timeline* timel
     last = row;
   }
   if (last < first + 2) {
-    return Error{.what = "the log has fewer than two rows left", .where = log.path, .actual = std::to_string(timeline->time_s.back()) + " s in all",
+    return Error{.what = "the log has fewer than two rows left",
+                 .where = log.path,
+                 .actual = std::to_string(timeline->time_s.back()) + " s in all",
                  .cure = "see 'start_s' and 'while' of the experiment"};
   }
   if (first > 0) {
-    timeline->findings.push_back({.kind = "cut", .column = "", .count = first, .first_row = timeline->rows[0], .text = std::to_string(first) + " rows before 'start_s' are left out"});
+    timeline->findings.push_back({.kind = "cut",
+                                  .column = "",
+                                  .count = first,
+                                  .first_row = timeline->rows[0],
+                                  .text = std::to_string(first) + " rows before 'start_s' are left out"});
   }
   if (last < timeline->time_s.size()) {
-    timeline->findings.push_back({.kind = "cut", .column = replay.while_column, .count = timeline->time_s.size() - last, .first_row = timeline->rows[last],
-                                  .text = std::to_string(timeline->time_s.size() - last) + " rows after '" + replay.while_column + "' fell to zero are left out"});
+    timeline->findings.push_back({.kind = "cut",
+                                  .column = replay.while_column,
+                                  .count = timeline->time_s.size() - last,
+                                  .first_row = timeline->rows[last],
+                                  .text = std::to_string(timeline->time_s.size() - last) + " rows after '" +
+                                          replay.while_column + "' fell to zero are left out"});
   }
-  timeline->time_s = std::vector<double>(timeline->time_s.begin() + static_cast<std::ptrdiff_t>(first), timeline->time_s.begin() + static_cast<std::ptrdiff_t>(last));
-  timeline->rows = std::vector<std::size_t>(timeline->rows.begin() + static_cast<std::ptrdiff_t>(first), timeline->rows.begin() + static_cast<std::ptrdiff_t>(last));
+  timeline->time_s = std::vector<double>(timeline->time_s.begin() + static_cast<std::ptrdiff_t>(first),
+                                         timeline->time_s.begin() + static_cast<std::ptrdiff_t>(last));
+  timeline->rows = std::vector<std::size_t>(timeline->rows.begin() + static_cast<std::ptrdiff_t>(first),
+                                            timeline->rows.begin() + static_cast<std::ptrdiff_t>(last));
   const double shift = timeline->time_s.front();
   for (double& t : timeline->time_s) t -= shift;
   return Ok();
@@ -75,8 +91,11 @@ Result<std::map<std::string, double>> BindValues(const Experiment& experiment, c
       }
     }
     if (!spec.fallback) {
-      return Error{.what = "the log has no " + (spec.header.empty() ? "column '" + spec.column : "header value '" + spec.header) + "', which gives '" + spec.name + "'",
-                   .where = log.path + ":1", .cure = "add 'default:' to it in the experiment file"};
+      return Error{.what = "the log has no " +
+                           (spec.header.empty() ? "column '" + spec.column : "header value '" + spec.header) +
+                           "', which gives '" + spec.name + "'",
+                   .where = log.path + ":1",
+                   .cure = "add 'default:' to it in the experiment file"};
     }
     values[spec.name] = *spec.fallback;
   }
@@ -111,7 +130,8 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
       const ColumnOptions options{.factor = spec.factor, .offset = spec.offset, .missing = experiment.timeline.missing};
       GS_ASSIGN(command.values, ExtractColumn(log, timeline, *column, options, &recording.findings));
     } else if (spec.optional) {
-      GS_ASSIGN(const double constant, EvaluateOnce(spec.fallback, recording.values, experiment.path + ": default of command '" + spec.actuator + "'"));
+      GS_ASSIGN(const double constant, EvaluateOnce(spec.fallback, recording.values,
+                                                    experiment.path + ": default of command '" + spec.actuator + "'"));
       command.values.assign(recording.rows(), constant);
     } else {
       return MissingColumn(log, spec.columns, "the actuator '" + spec.actuator + "'");
@@ -124,12 +144,18 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
     if (!column && spec.optional) continue;
     if (!column) return MissingColumn(log, spec.columns, "the signal '" + spec.signal + "'");
     Recording::Measured measured{.spec = spec, .index = index, .column = column->name};
-    const ColumnOptions options{.factor = spec.factor, .offset = spec.offset, .missing = experiment.timeline.missing, .wrap = spec.wrap, .wrap_period = spec.wrap_period};
+    const ColumnOptions options{.factor = spec.factor,
+                                .offset = spec.offset,
+                                .missing = experiment.timeline.missing,
+                                .wrap = spec.wrap,
+                                .wrap_period = spec.wrap_period};
     GS_ASSIGN(measured.values, ExtractColumn(log, timeline, *column, options, &recording.findings));
     recording.measured.push_back(std::move(measured));
   }
   if (std::none_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) { return m.spec.scored; })) {
-    return Error{.what = "the log has none of the signals that are scored", .where = log_path, .cure = "see 'measured:' in " + experiment.path};
+    return Error{.what = "the log has none of the signals that are scored",
+                 .where = log_path,
+                 .cure = "see 'measured:' in " + experiment.path};
   }
   recording.timeline = std::move(timeline);
   return recording;
@@ -137,15 +163,17 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
 
 namespace {
 
-// A log that begins at rest: nothing leaves the first sample's count for the first 10 ms, or so much more of the way is made in the 40 ms after them (24 times at
-// a constant acceleration from rest, 4 times at a constant speed) that the motion had only begun.
+// A log that begins at rest: nothing leaves the first sample's count for the first 10 ms, or so much more of the way is
+// made in the 40 ms after them (24 times at a constant acceleration from rest, 4 times at a constant speed) that the
+// motion had only begun.
 bool StartsAtRest(const Recording& recording, const Recording::Measured& measured) {
   constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
   const auto& t = recording.time_s;
   const auto& values = measured.values;
   std::size_t k = 1;
   bool stays = true;
-  for (; k < t.size() && (k < 3 || t[k] - t[0] <= kBegin_s); ++k) stays = stays && std::abs(values[k] - values[0]) <= 1.01 * measured.spec.resolution;
+  for (; k < t.size() && (k < 3 || t[k] - t[0] <= kBegin_s); ++k)
+    stays = stays && std::abs(values[k] - values[0]) <= 1.01 * measured.spec.resolution;
   if (stays) return true;
   std::size_t begin = 1, end = 1;
   while (begin + 1 < t.size() && t[begin] - t[0] < kBegin_s) ++begin;
@@ -167,8 +195,10 @@ Moments MomentsOf(const std::vector<double>& values) {
   return {mean, std::sqrt(square / count)};
 }
 
-LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row, double half_width_s) {
-  if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured)) return {measured.values[0], 0};
+LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
+                    double half_width_s) {
+  if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured))
+    return {measured.values[0], 0};
   const auto& t = recording.time_s;
   std::size_t first = row, last = row;
   while (first > 0 && t[row] - t[first - 1] <= half_width_s) --first;
@@ -201,7 +231,8 @@ LocalFit FitLocally(const Recording& recording, const Recording::Measured& measu
   const double slope_error = std::sqrt(std::max(scatter, quantisation) * inverse(1, 1));
   // A slope that the samples cannot tell from rest is rest: at a log's first row the fit is one-sided and weak.
   constexpr double kSignificant = 2;
-  if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(measured.values[row])) return {measured.values[row], 0};
+  if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(measured.values[row]))
+    return {measured.values[row], 0};
   return {fit[0], fit[1] / scale};
 }
 

@@ -18,7 +18,7 @@ struct Recording {
   };
   struct Measured {
     MeasuredSpec spec;
-    std::size_t index = 0;       // in experiment.measured
+    std::size_t index = 0;  // in experiment.measured
     std::string column;
     std::vector<double> values;  // one per stamp; NaN where the log has no value and the policy keeps that
   };
@@ -47,8 +47,9 @@ struct Moments {
 Moments MomentsOf(const std::vector<double>& values);
 
 // The value and slope of a measured signal at `row`, from a local quadratic least-squares fit over +-`half_width_s`
-// (one-sided at the ends): the initial state of a replay. Slope in SI per second; a slope within two standard errors of zero is zero, and the value
-// then the sample itself; so is that of a first row that is followed by 10 ms within one count, or by so little way beside the next 40 ms that motion had only begun.
+// (one-sided at the ends): the initial state of a replay. Slope in SI per second; a slope within two standard errors of
+// zero is zero, and the value then the sample itself; so is that of a first row that is followed by 10 ms within one
+// count, or by so little way beside the next 40 ms that motion had only begun.
 struct LocalFit {
   double value = 0, slope = 0;
 };

@@ -47,8 +47,8 @@ bool NestsTooDeep(const std::string& bytes) {
     const std::size_t end = std::min(bytes.find('\n', line_start), bytes.size());
     const std::size_t first = std::min(bytes.find_first_not_of(" -?\t", line_start), end);
     indent_levels = std::max(indent_levels, first - line_start);
-    dashes = std::max<std::size_t>(
-        dashes, std::count_if(bytes.begin() + line_start, bytes.begin() + first, [](char c) { return c == '-' || c == '?'; }));
+    dashes = std::max<std::size_t>(dashes, std::count_if(bytes.begin() + line_start, bytes.begin() + first,
+                                                         [](char c) { return c == '-' || c == '?'; }));
     line_start = end + 1;
   }
   return deepest > kMaxNesting || indent_levels > 4 * kMaxNesting || dashes > kMaxNesting;
@@ -61,7 +61,8 @@ std::size_t SecondDocument(const std::string& bytes) {
   for (std::size_t begin = 0; begin < bytes.size(); ++line) {
     const std::size_t end = std::min(bytes.find('\n', begin), bytes.size());
     const std::string_view text = std::string_view(bytes).substr(begin, end - begin);
-    const bool marker = text.starts_with("---") && (text.size() == 3 || text[3] == ' ' || text[3] == '\t' || text[3] == '\r');
+    const bool marker =
+        text.starts_with("---") && (text.size() == 3 || text[3] == ' ' || text[3] == '\t' || text[3] == '\r');
     if (marker && content) return line;
     const std::size_t first = text.find_first_not_of(" \t\r");
     content = content || marker || (first != std::string_view::npos && text[first] != '#' && text[0] != '%');
@@ -81,26 +82,32 @@ std::string YamlPlace(const std::string& file, const YAML::Node& node) {
 Result<YAML::Node> ReadYaml(const std::string& path) {
   GS_ASSIGN(const std::string bytes, ReadFile(path));
   if (bytes.size() > kMaxBytes) {
-    return Error{.what = "too large for a YAML file", .where = path + ":1", .actual = std::to_string(bytes.size()) + " bytes",
-                 .allowed = "at most " + std::to_string(kMaxBytes), .cure = "is this a log?"};
+    return Error{.what = "too large for a YAML file",
+                 .where = path + ":1",
+                 .actual = std::to_string(bytes.size()) + " bytes",
+                 .allowed = "at most " + std::to_string(kMaxBytes),
+                 .cure = "is this a log?"};
   }
   if (bytes.find('\0') != std::string::npos) {
     return Error{.what = "not a YAML file", .where = path + ":1", .actual = "binary data", .allowed = "text"};
   }
   if (NestsTooDeep(bytes)) {
-    return Error{.what = "nested too deep", .where = path + ":1",
-                 .allowed = std::to_string(kMaxNesting) + " levels"};
+    return Error{.what = "nested too deep", .where = path + ":1", .allowed = std::to_string(kMaxNesting) + " levels"};
   }
   try {
     // Not YAML::LoadAll: some broken files make it yield documents for ever.
     YAML::Node node = YAML::Load(bytes);
-    if (!node.IsDefined() || node.IsNull()) return Error{.what = "the file holds no keys", .where = path + ":1", .allowed = "key: value pairs"};
+    if (!node.IsDefined() || node.IsNull())
+      return Error{.what = "the file holds no keys", .where = path + ":1", .allowed = "key: value pairs"};
     if (const std::size_t line = SecondDocument(bytes); line > 0) {
-      return Error{.what = "more than one document in the file", .where = path + ":" + std::to_string(line) + ":1", .cure = "delete what follows '---'"};
+      return Error{.what = "more than one document in the file",
+                   .where = path + ":" + std::to_string(line) + ":1",
+                   .cure = "delete what follows '---'"};
     }
     return node;
   } catch (const YAML::Exception& e) {
-    const std::string place = e.mark.is_null() ? ":1:1" : ":" + std::to_string(e.mark.line + 1) + ":" + std::to_string(e.mark.column + 1);
+    const std::string place =
+        e.mark.is_null() ? ":1:1" : ":" + std::to_string(e.mark.line + 1) + ":" + std::to_string(e.mark.column + 1);
     return Error{.what = "not valid YAML: " + OneLine(e.msg), .where = path + place};
   }
 }
@@ -108,7 +115,8 @@ Result<YAML::Node> ReadYaml(const std::string& path) {
 YamlMap::YamlMap(const YAML::Node& node, std::string file, std::string what)
     : node_(node), file_(std::move(file)), what_(std::move(what)) {
   if (!node.IsMap()) {
-    Fail(node, {.what = what_ + " is not a map", .actual = node.IsScalar() ? "'" + node.Scalar() + "'" : "",
+    Fail(node, {.what = what_ + " is not a map",
+                .actual = node.IsScalar() ? "'" + node.Scalar() + "'" : "",
                 .allowed = "key: value pairs"});
     node_ = YAML::Node(YAML::NodeType::Map);
     return;
@@ -120,7 +128,8 @@ YamlMap::YamlMap(const YAML::Node& node, std::string file, std::string what)
       continue;
     }
     if (std::find(seen.begin(), seen.end(), pair.first.Scalar()) != seen.end()) {
-      Fail(pair.first, {.what = "the key '" + pair.first.Scalar() + "' stands twice in " + what_, .cure = "delete one"});
+      Fail(pair.first,
+           {.what = "the key '" + pair.first.Scalar() + "' stands twice in " + what_, .cure = "delete one"});
     }
     seen.push_back(pair.first.Scalar());
   }
@@ -141,8 +150,7 @@ std::string YamlMap::Text(const char* key, std::optional<std::string> fallback) 
   const YAML::Node node = Take(key);
   if (!node.IsDefined() || node.IsNull()) {
     if (!fallback) {
-      Fail(node_, {.what = what_ + " has no '" + key + "'",
-                   .cure = std::string("add '") + key + ": ...'"});
+      Fail(node_, {.what = what_ + " has no '" + key + "'", .cure = std::string("add '") + key + ": ...'"});
     }
     return fallback.value_or("");
   }
@@ -157,7 +165,8 @@ double YamlMap::Number(const char* key, std::optional<double> fallback) {
   const YAML::Node node = Take(key);
   if (!node.IsDefined()) {
     if (!fallback) {
-      Fail(node_, {.what = what_ + " has no '" + key + "'", .allowed = "a number",
+      Fail(node_, {.what = what_ + " has no '" + key + "'",
+                   .allowed = "a number",
                    .cure = std::string("add '") + key + ": ...'"});
     }
     return fallback.value_or(0);
@@ -170,9 +179,7 @@ double YamlMap::Number(const char* key, std::optional<double> fallback) {
   return value.value_or(0);
 }
 
-bool YamlMap::Flag(const char* key, bool fallback) {
-  return Choice(key, {"false", "true"}, fallback ? 1 : 0) == 1;
-}
+bool YamlMap::Flag(const char* key, bool fallback) { return Choice(key, {"false", "true"}, fallback ? 1 : 0) == 1; }
 
 std::size_t YamlMap::Choice(const char* key, const std::vector<std::string>& allowed, std::size_t fallback) {
   const YAML::Node node = Take(key);
@@ -181,8 +188,10 @@ std::size_t YamlMap::Choice(const char* key, const std::vector<std::string>& all
   const auto found = std::find(allowed.begin(), allowed.end(), text);
   if (found == allowed.end()) {
     const std::string nearest = Nearest(text, allowed);
-    Fail(node, {.what = std::string("'") + key + "' of " + what_, .actual = "'" + text + "'",
-                .allowed = Join(allowed), .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"});
+    Fail(node, {.what = std::string("'") + key + "' of " + what_,
+                .actual = "'" + text + "'",
+                .allowed = Join(allowed),
+                .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"});
     return fallback;
   }
   return static_cast<std::size_t>(found - allowed.begin());
@@ -216,7 +225,7 @@ std::vector<double> YamlMap::NumberList(const char* key, std::size_t size) {
   }
   if (!node.IsSequence() || numbers.size() != size || node.size() != size) {
     Fail(node, {.what = std::string("'") + key + "' of " + what_ + " is not a list of " + std::to_string(size) +
-                            " finite numbers"});
+                        " finite numbers"});
     return {};
   }
   return numbers;
@@ -235,10 +244,12 @@ std::vector<YAML::Node> YamlMap::List(const char* key) {
 std::string YamlMap::Name(const YAML::Node& key) {
   const std::string name = key.IsScalar() ? key.Scalar() : "";
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
-  const bool good = !name.empty() && is_letter(name[0]) && name != "pi" &&
-                    std::all_of(name.begin(), name.end(), [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '.'; });
+  const bool good =
+      !name.empty() && is_letter(name[0]) && name != "pi" &&
+      std::all_of(name.begin(), name.end(), [&](char c) { return is_letter(c) || (c >= '0' && c <= '9') || c == '.'; });
   if (!good) {
-    Fail(key, {.what = "not a name in " + what_, .actual = "'" + name + "'",
+    Fail(key, {.what = "not a name in " + what_,
+               .actual = "'" + name + "'",
                .allowed = "letters, digits, '_' and '.', a letter first, not 'pi': expressions use it"});
   }
   return name;
@@ -258,8 +269,10 @@ Status YamlMap::Finish() {
     for (const auto& pair : node_) {
       if (std::find(known_.begin(), known_.end(), pair.first.Scalar()) != known_.end()) continue;
       const std::string nearest = Nearest(pair.first.Scalar(), known_);
-      Fail(pair.first, {.what = "unknown key in " + what_, .actual = "'" + pair.first.Scalar() + "'",
-                        .allowed = Join(known_), .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"});
+      Fail(pair.first, {.what = "unknown key in " + what_,
+                        .actual = "'" + pair.first.Scalar() + "'",
+                        .allowed = Join(known_),
+                        .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"});
       break;
     }
   }

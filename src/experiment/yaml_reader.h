@@ -22,12 +22,12 @@ class YamlMap {
   std::string Text(const char* key, std::optional<std::string> fallback = std::nullopt);
   double Number(const char* key, std::optional<double> fallback = std::nullopt);
   bool Flag(const char* key, bool fallback);
-  std::vector<std::string> TextList(const char* key);    // a scalar or a list of scalars; empty when absent
+  std::vector<std::string> TextList(const char* key);  // a scalar or a list of scalars; empty when absent
   std::vector<double> NumberList(const char* key, std::size_t size);
   // One of `allowed`; the index is returned.
   std::size_t Choice(const char* key, const std::vector<std::string>& allowed, std::size_t fallback);
-  YAML::Node Child(const char* key);                     // undefined node when absent
-  std::vector<YAML::Node> List(const char* key);         // the items; empty when absent, an error when it is no list
+  YAML::Node Child(const char* key);              // undefined node when absent
+  std::vector<YAML::Node> List(const char* key);  // the items; empty when absent, an error when it is no list
   // A key of this map that expressions use as a name; an error when they cannot.
   std::string Name(const YAML::Node& key);
   bool Has(const char* key);
@@ -49,7 +49,8 @@ class YamlMap {
 // "file:line:column" of a node.
 std::string YamlPlace(const std::string& file, const YAML::Node& node);
 
-// Parses a file of at most 1 MB. Errors: unreadable, not YAML (with line and column), empty, several documents, nested too deep.
+// Parses a file of at most 1 MB. Errors: unreadable, not YAML (with line and column), empty, several documents, nested
+// too deep.
 Result<YAML::Node> ReadYaml(const std::string& path);
 
 }  // namespace gapscope

@@ -1,6 +1,8 @@
-// Resistance and sensor offset from voltages and currents at standstill: current = voltage / R + offset. The current is regressed on the voltage, since it is the
-// current that is noisy. Source: "Quanser Qube 2 - Report", 2.2, which fits all points, those of positive and those of negative voltage (8.8, 8.3, 8.1 ohm): a current offset
-// alone makes the three differ where the line is forced through the origin; it is a value here. And the torque constant from torque against current.
+// Resistance and sensor offset from voltages and currents at standstill: current = voltage / R + offset. The current is
+// regressed on the voltage, since it is the current that is noisy. Source: "Quanser Qube 2 - Report", 2.2, which fits
+// all points, those of positive and those of negative voltage (8.8, 8.3, 8.1 ohm): a current offset alone makes the
+// three differ where the line is forced through the origin; it is a value here. And the torque constant from torque
+// against current.
 #include <algorithm>
 #include <cmath>
 
@@ -22,7 +24,9 @@ Result<std::vector<std::vector<double>>> Currents(const IdentifyInput& input, co
 Status NeedsUnit(const IdentifyInput& input, const char* unit, const char* what) {
   const auto& commands = input.model.experiment().commands;
   if (!commands.empty() && commands.front().unit == unit) return Ok();
-  return Error{.what = what, .where = input.model.experiment().path, .actual = commands.empty() ? "no command" : "a command in " + commands.front().unit};
+  return Error{.what = what,
+               .where = input.model.experiment().path,
+               .actual = commands.empty() ? "no command" : "a command in " + commands.front().unit};
 }
 
 }  // namespace
@@ -41,7 +45,8 @@ Result<Identification> IdentifyResistance(const IdentifyInput& input, const Iden
     return moves || !std::isfinite(p.current);
   });
   for (const auto& p : points) table.rows.push_back({p.command, p.current, p.speed});
-  Identification result{.method = "resistance", .relation = "current = voltage / resistance + offset, rotor held", .unit = "A"};
+  Identification result{
+      .method = "resistance", .relation = "current = voltage / resistance + offset, rotor held", .unit = "A"};
   // Each plateau is one reading: its rows share the drive's errors. So its own classical interval, and no blocks.
   const auto line = [&](const char* name, int sign, bool all) -> Status {
     double n = 0, sv = 0, si = 0, vv = 0, vi = 0, ii = 0;
@@ -49,18 +54,32 @@ Result<Identification> IdentifyResistance(const IdentifyInput& input, const Iden
       if (sign != 0 && p.command * sign <= 0) continue;
       n += 1, sv += p.command, si += p.current;
     }
-    if (n < 4) return Error{.what = "fewer than four standing voltages to put a line through", .where = input.recordings.front().log_path, .actual = std::to_string(static_cast<int>(n)) + (moving > 0 ? ", and " + std::to_string(moving) + " at which the rotor turns" : ""),
-                            .cure = "hold the rotor and step the voltage, 0.2 s or more a step"};
+    if (n < 4)
+      return Error{.what = "fewer than four standing voltages to put a line through",
+                   .where = input.recordings.front().log_path,
+                   .actual = std::to_string(static_cast<int>(n)) +
+                             (moving > 0 ? ", and " + std::to_string(moving) + " at which the rotor turns" : ""),
+                   .cure = "hold the rotor and step the voltage, 0.2 s or more a step"};
     for (const auto& p : points) {
       if (sign != 0 && p.command * sign <= 0) continue;
       const double dv = p.command - sv / n, di = p.current - si / n;
       vv += dv * dv, vi += dv * di, ii += di * di;
     }
-    const double slope = vi / vv, offset = (si - slope * sv) / n, rest = std::max(0.0, ii - slope * vi), scatter = rest / (n - 2);
-    const double t = StudentQuantile(n - 2), slope_error = t * std::sqrt(scatter / vv), offset_error = t * std::sqrt(scatter * (1 / n + sv * sv / (n * n) / vv));
-    result.values.push_back({.name = name, .unit = "ohm", .value = 1 / slope, .low = 1 / (slope + slope_error), .high = slope > slope_error ? 1 / (slope - slope_error) : INFINITY});
+    const double slope = vi / vv, offset = (si - slope * sv) / n, rest = std::max(0.0, ii - slope * vi),
+                 scatter = rest / (n - 2);
+    const double t = StudentQuantile(n - 2), slope_error = t * std::sqrt(scatter / vv),
+                 offset_error = t * std::sqrt(scatter * (1 / n + sv * sv / (n * n) / vv));
+    result.values.push_back({.name = name,
+                             .unit = "ohm",
+                             .value = 1 / slope,
+                             .low = 1 / (slope + slope_error),
+                             .high = slope > slope_error ? 1 / (slope - slope_error) : INFINITY});
     if (all) {
-      result.values.push_back({.name = "current_offset", .unit = "A", .value = offset, .low = offset - offset_error, .high = offset + offset_error});
+      result.values.push_back({.name = "current_offset",
+                               .unit = "A",
+                               .value = offset,
+                               .low = offset - offset_error,
+                               .high = offset + offset_error});
       result.r2 = ii > 0 ? 1 - rest / ii : 0;
       result.rmse = std::sqrt(rest / n);
       result.rows = static_cast<std::size_t>(n);
@@ -68,9 +87,13 @@ Result<Identification> IdentifyResistance(const IdentifyInput& input, const Iden
     return Ok();
   };
   GS_RETURN_IF_ERROR(line("resistance", 0, true));
-  if (!line("resistance_positive", 1, false).ok()) result.remarks.push_back("too few positive voltages for a line of their own");
-  if (!line("resistance_negative", -1, false).ok()) result.remarks.push_back("too few negative voltages for a line of their own");
-  if (moving > 0) result.remarks.push_back(std::to_string(moving) + " steps at which the rotor turns are left out: back-EMF would count as resistance");
+  if (!line("resistance_positive", 1, false).ok())
+    result.remarks.push_back("too few positive voltages for a line of their own");
+  if (!line("resistance_negative", -1, false).ok())
+    result.remarks.push_back("too few negative voltages for a line of their own");
+  if (moving > 0)
+    result.remarks.push_back(std::to_string(moving) +
+                             " steps at which the rotor turns are left out: back-EMF would count as resistance");
   result.tables.push_back(std::move(table));
   return result;
 }
@@ -85,19 +108,32 @@ Result<Identification> IdentifyCurrentOffset(const IdentifyInput& input, const I
     const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
     const auto& t = recording.time_s;
     for (std::size_t k = 0; k < t.size(); ++k) {
-      if (recording.commands.front().values[k] != 0 || t[k] < options.from_s || (options.to_s > 0 && t[k] > options.to_s)) continue;
+      if (recording.commands.front().values[k] != 0 || t[k] < options.from_s ||
+          (options.to_s > 0 && t[k] > options.to_s))
+        continue;
       // Still over a tenth of a second, so that no back-EMF drives a current.
       bool still = true;
-      for (std::size_t r = k; angle && still && r > 0 && t[k] - t[r - 1] <= 0.1; --r) still = std::abs(angle->values[r - 1] - angle->values[k]) <= kStill_rad && recording.commands.front().values[r - 1] == 0;
+      for (std::size_t r = k; angle && still && r > 0 && t[k] - t[r - 1] <= 0.1; --r)
+        still = std::abs(angle->values[r - 1] - angle->values[k]) <= kStill_rad &&
+                recording.commands.front().values[r - 1] == 0;
       if (still) rows.Add(static_cast<int>(log), t[k], currents[log][k], {1});
     }
   }
   auto fit = Regress(rows, input.recordings.front().timeline.median_step_s);
   if (!fit.ok()) {
-    return Error{.what = "the log does not stand still without a command", .where = input.recordings.front().log_path, .actual = std::to_string(rows.size()) + " such rows", .allowed = "at least 20",
+    return Error{.what = "the log does not stand still without a command",
+                 .where = input.recordings.front().log_path,
+                 .actual = std::to_string(rows.size()) + " such rows",
+                 .allowed = "at least 20",
                  .cure = "log a second of zero command at rest"};
   }
-  Identification result{.method = "current-offset", .relation = "current = offset at zero command and rest", .values = {ToEstimate(fit.value(), 0, "current_offset", "A")}, .r2 = NAN, .rmse = fit.value().rmse, .unit = "A", .rows = rows.size()};
+  Identification result{.method = "current-offset",
+                        .relation = "current = offset at zero command and rest",
+                        .values = {ToEstimate(fit.value(), 0, "current_offset", "A")},
+                        .r2 = NAN,
+                        .rmse = fit.value().rmse,
+                        .unit = "A",
+                        .rows = rows.size()};
   return result;
 }
 
@@ -114,12 +150,16 @@ Result<Identification> IdentifyTorqueConstant(const IdentifyInput& input, const 
   for (std::size_t log = 0; log < input.recordings.size(); ++log) {
     const Recording& recording = input.recordings[log];
     const auto* torque = FindSignal(input.model, recording, SignalKind::kTorque, joint);
-    if (!torque) return Error{.what = "a torque constant needs a measured torque", .where = recording.log_path, .cure = "a measured signal of 'kind: torque' in " + input.model.experiment().path};
+    if (!torque)
+      return Error{.what = "a torque constant needs a measured torque",
+                   .where = recording.log_path,
+                   .cure = "a measured signal of 'kind: torque' in " + input.model.experiment().path};
     const SmoothLog smooth(recording, options);
     dt = smooth.dt_s();
     std::vector<double> squares;
     for (const double c : currents[log]) squares.push_back(c * std::abs(c));
-    const std::vector<double> i = smooth.Sampled(currents[log], 0), square = smooth.Sampled(squares, 0), y = smooth.Sampled(torque->values, 0);
+    const std::vector<double> i = smooth.Sampled(currents[log], 0), square = smooth.Sampled(squares, 0),
+                              y = smooth.Sampled(torque->values, 0);
     for (std::size_t k = 0; k < smooth.size(); ++k) {
       if (!std::isfinite(i[k]) || !std::isfinite(y[k])) continue;
       samples.push_back({static_cast<int>(log), smooth.time_s(k), i[k], square[k], y[k]});
@@ -133,20 +173,28 @@ Result<Identification> IdentifyTorqueConstant(const IdentifyInput& input, const 
   }
   GS_ASSIGN(const Regression line, Regress(straight, dt));
   GS_ASSIGN(const Regression curve, Regress(bent, dt));
-  Identification result{.method = "torque-constant", .relation = "torque = kt current (1 - loss_at_peak |current| / peak) + offset", .r2 = curve.r2, .rmse = curve.rmse, .unit = "N m", .rows = curve.rows};
+  Identification result{.method = "torque-constant",
+                        .relation = "torque = kt current (1 - loss_at_peak |current| / peak) + offset",
+                        .r2 = curve.r2,
+                        .rmse = curve.rmse,
+                        .unit = "N m",
+                        .rows = curve.rows};
   result.values.push_back(ToEstimate(curve, 0, "kt", "N m/A"));
   // loss = -b2 peak / b1, by the delta method.
   const double loss = -curve.value[1] * peak / curve.value[0];
   const Eigen::Vector2d gradient(curve.value[1] * peak / (curve.value[0] * curve.value[0]), -peak / curve.value[0]);
-  const double error = curve.quantile * std::sqrt(std::max(0.0, gradient.dot(curve.covariance.topLeftCorner(2, 2) * gradient)));
-  result.values.push_back({.name = "loss_at_peak", .unit = "1", .value = loss, .low = loss - error, .high = loss + error});
+  const double error =
+      curve.quantile * std::sqrt(std::max(0.0, gradient.dot(curve.covariance.topLeftCorner(2, 2) * gradient)));
+  result.values.push_back(
+      {.name = "loss_at_peak", .unit = "1", .value = loss, .low = loss - error, .high = loss + error});
   result.values.push_back({.name = "peak_current", .unit = "A", .value = peak, .low = NAN, .high = NAN});
   result.values.push_back(ToEstimate(curve, 2, "offset", "N m"));
   result.values.push_back(ToEstimate(line, 0, "kt_straight", "N m/A"));
   result.values.push_back({.name = "r2_straight", .unit = "1", .value = line.r2, .low = NAN, .high = NAN});
   if (loss - error <= 0) result.remarks.push_back("no bend is seen up to the peak current of this log");
   PointTable table{.name = "points", .columns = {"current_a", "torque_n_m"}, .rows = {}};
-  for (std::size_t k = 0; k < samples.size(); k += std::max<std::size_t>(1, samples.size() / 500)) table.rows.push_back({samples[k].current, samples[k].torque});
+  for (std::size_t k = 0; k < samples.size(); k += std::max<std::size_t>(1, samples.size() / 500))
+    table.rows.push_back({samples[k].current, samples[k].torque});
   result.tables.push_back(std::move(table));
   return result;
 }

@@ -12,17 +12,19 @@ namespace gapscope {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-// Standard deviations of the Gaussian that are summed. Cut at 4.5 the weights of a second derivative would add up to -1.4e-4 / sigma^2 instead of zero: times an angle, and an
-// inertia, that looks like a spring.
+// Standard deviations of the Gaussian that are summed. Cut at 4.5 the weights of a second derivative would add up to
+// -1.4e-4 / sigma^2 instead of zero: times an angle, and an inertia, that looks like a spring.
 constexpr double kReach = 6;
 
 // Variance of a sensor's noise behind the filter and a derivative: its density integrated.
 double Through(const NoiseFloor& noise, double dt, int order, double cutoff_hz) {
-  const double white = std::max(noise.white_std, noise.quantisation_std), coloured = noise.coloured_std, tau = coloured > 0 ? noise.correlation_time_s : dt;
+  const double white = std::max(noise.white_std, noise.quantisation_std), coloured = noise.coloured_std,
+               tau = coloured > 0 ? noise.correlation_time_s : dt;
   const double step = cutoff_hz / 50, sigma = std::sqrt(std::log(2.0)) / (2 * std::numbers::pi * cutoff_hz);
   double sum = 0;
   for (double hz = 0.5 * step; hz < 4 * cutoff_hz; hz += step) {
-    const double w = 2 * std::numbers::pi * hz, density = 2 * white * white * dt + coloured * coloured * 4 * tau / (1 + w * w * tau * tau);
+    const double w = 2 * std::numbers::pi * hz,
+                 density = 2 * white * white * dt + coloured * coloured * 4 * tau / (1 + w * w * tau * tau);
     sum += density * std::pow(w, 2 * order) * std::exp(-w * w * sigma * sigma) * step;
   }
   return sum;
@@ -87,14 +89,17 @@ std::vector<double> SmoothLog::HeldBefore(const std::vector<double>& values, dou
 }
 
 std::vector<double> SmoothLog::OnGrid(const std::vector<double>& grid, int order, double late_s) const {
-  const std::ptrdiff_t reach = static_cast<std::ptrdiff_t>(reach_) + static_cast<std::ptrdiff_t>(std::ceil(std::abs(late_s) / dt_));
+  const std::ptrdiff_t reach =
+      static_cast<std::ptrdiff_t>(reach_) + static_cast<std::ptrdiff_t>(std::ceil(std::abs(late_s) / dt_));
   // weight[k]: of the sample k rows after this one.
   std::vector<double> weights(static_cast<std::size_t>(2 * reach + 1));
   const double scale = dt_ / (sigma_ * std::sqrt(2 * std::numbers::pi));
   for (std::ptrdiff_t k = -reach; k <= reach; ++k) {
     // The filtered signal at t - late is the sum of x(t_j) g(t - late - t_j); u is that argument over sigma.
     const double u = (-late_s - static_cast<double>(k) * dt_) / sigma_, g = scale * std::exp(-0.5 * u * u);
-    weights[static_cast<std::size_t>(k + reach)] = order == 0 ? g : order == 1 ? -u / sigma_ * g : (u * u - 1) / (sigma_ * sigma_) * g;
+    weights[static_cast<std::size_t>(k + reach)] = order == 0   ? g
+                                                   : order == 1 ? -u / sigma_ * g
+                                                                : (u * u - 1) / (sigma_ * sigma_) * g;
   }
   // What is left of it: a derivative of a constant is zero, a mean of one is one.
   double sum_of_weights = 0;
@@ -111,17 +116,22 @@ std::vector<double> SmoothLog::OnGrid(const std::vector<double>& grid, int order
   return out;
 }
 
-std::vector<double> SmoothLog::Sampled(const std::vector<double>& values, int order, double late_s) const { return OnGrid(GridOf(values, false), order, late_s); }
+std::vector<double> SmoothLog::Sampled(const std::vector<double>& values, int order, double late_s) const {
+  return OnGrid(GridOf(values, false), order, late_s);
+}
 
 // A held sample stands for the interval after its stamp: its middle is half a step later.
-std::vector<double> SmoothLog::Held(const std::vector<double>& values, double late_s) const { return OnGrid(GridOf(values, true), 0, late_s + 0.5 * dt_); }
+std::vector<double> SmoothLog::Held(const std::vector<double>& values, double late_s) const {
+  return OnGrid(GridOf(values, true), 0, late_s + 0.5 * dt_);
+}
 
 double NoiseVariance(const IdentifyInput& input, int joint, int order, const IdentifyOptions& options) {
   double sum = 0, logs = 0;
   for (const Recording& recording : input.recordings) {
     const auto* signal = FindSignal(input.model, recording, SignalKind::kPosition, joint);
     if (!signal) continue;
-    const NoiseFloor noise = EstimateNoise(recording.time_s, signal->values, {.resolution = signal->spec.resolution, .motion_band_hz = 0});
+    const NoiseFloor noise =
+        EstimateNoise(recording.time_s, signal->values, {.resolution = signal->spec.resolution, .motion_band_hz = 0});
     if (!std::isfinite(noise.total_std)) continue;
     sum += Through(noise, recording.timeline.median_step_s, order, SmoothLog(recording, options).cutoff_hz());
     logs += 1;
@@ -135,7 +145,8 @@ double QuietCutoff(const IdentifyInput& input, int joint, int order, double shar
   for (const Recording& recording : input.recordings) {
     const auto* signal = FindSignal(input.model, recording, SignalKind::kPosition, joint);
     if (!signal) continue;
-    const NoiseFloor noise = EstimateNoise(recording.time_s, signal->values, {.resolution = signal->spec.resolution, .motion_band_hz = 0});
+    const NoiseFloor noise =
+        EstimateNoise(recording.time_s, signal->values, {.resolution = signal->spec.resolution, .motion_band_hz = 0});
     if (!std::isfinite(noise.total_std)) continue;
     const double dt = recording.timeline.median_step_s;
     double own = SmoothLog(recording, options).cutoff_hz();
@@ -173,7 +184,10 @@ Result<int> DrivenJoint(const Model& model, const std::string& name) {
     std::vector<std::string> names;
     for (int j = 0; j < m.njnt; ++j) names.push_back(JointName(model, j));
     const std::string nearest = Nearest(name, names);
-    return Error{.what = "no such joint", .where = "--joint", .actual = "'" + name + "'", .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+    return Error{.what = "no such joint",
+                 .where = "--joint",
+                 .actual = "'" + name + "'",
+                 .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
   }
   for (const auto& command : model.experiment().commands) {
     const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
@@ -182,16 +196,20 @@ Result<int> DrivenJoint(const Model& model, const std::string& name) {
   return Error{.what = "no command drives a joint", .where = model.experiment().path};
 }
 
-Result<std::vector<double>> ExtraColumn(const Model& model, const Recording& recording, const std::string& column, const std::string& unit) {
+Result<std::vector<double>> ExtraColumn(const Model& model, const Recording& recording, const std::string& column,
+                                        const std::string& unit) {
   const Experiment& experiment = model.experiment();
   GS_ASSIGN(const Unit parsed, ParseUnit(unit));
   GS_ASSIGN(const Log log, ReadLog(recording.log_path, experiment.read));
   const Column* found = log.Find(column);
   if (!found) {
     const std::string nearest = Nearest(column, log.ColumnNames());
-    return Error{.what = "no column '" + column + "'", .where = recording.log_path, .cure = nearest.empty() ? "name it by --current-column" : "did you mean '" + nearest + "'?"};
+    return Error{.what = "no column '" + column + "'",
+                 .where = recording.log_path,
+                 .cure = nearest.empty() ? "name it by --current-column" : "did you mean '" + nearest + "'?"};
   }
-  return ExtractColumn(log, recording.timeline, *found, {.factor = parsed.factor, .offset = 0, .missing = MissingRepair::kHold}, nullptr);
+  return ExtractColumn(log, recording.timeline, *found,
+                       {.factor = parsed.factor, .offset = 0, .missing = MissingRepair::kHold}, nullptr);
 }
 
 }  // namespace gapscope

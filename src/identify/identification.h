@@ -23,12 +23,12 @@ struct PointTable {
 };
 
 struct Identification {
-  std::string method;               // "pd"
-  std::string relation;             // the equation, in the names of `values`
+  std::string method;    // "pd"
+  std::string relation;  // the equation, in the names of `values`
   std::vector<Estimate> values;
-  double r2 = 0, rmse = 0;          // of the relation, over the rows used
-  std::string unit;                 // of rmse
-  std::size_t rows = 0;             // used
+  double r2 = 0, rmse = 0;           // of the relation, over the rows used
+  std::string unit;                  // of rmse
+  std::size_t rows = 0;              // used
   std::vector<std::string> remarks;  // one sentence each: what to beware of
   std::vector<PointTable> tables;
 
@@ -42,23 +42,23 @@ struct Identification {
 
 struct IdentifyInput {
   const Model& model;
-  const std::vector<double>& values;             // of the model's parameters
-  const std::vector<Recording>& recordings;      // at least one
+  const std::vector<double>& values;         // of the model's parameters
+  const std::vector<Recording>& recordings;  // at least one
 };
 
 struct IdentifyOptions {
-  double cutoff_hz = 0;          // of the zero-phase low pass; 0: a twelfth of the sample rate, at most 15 Hz
-  double from_s = 0, to_s = 0;   // part of the logs; to 0: their end
-  std::string joint;             // empty: the method's own choice
+  double cutoff_hz = 0;         // of the zero-phase low pass; 0: a twelfth of the sample rate, at most 15 Hz
+  double from_s = 0, to_s = 0;  // part of the logs; to 0: their end
+  std::string joint;            // empty: the method's own choice
   std::string current_column = "current_a", current_unit = "A";
-  double longest_delay_s = 0.05;                     // pd
-  double torque_limit = 0;                           // pd: rows at or above it are left out; 0: runs of equal extreme values
-  double torque_delay_s = 0;                         // of a servo whose torque is logged (identify pd): which target a logged torque has seen
-  double coulomb_n_m = -1;                           // steady: held at this; below zero: fitted
-  bool free_inertia = false;                         // friction, cable: scale the model's inertial torques to the log instead of trusting them
+  double longest_delay_s = 0.05;  // pd
+  double torque_limit = 0;        // pd: rows at or above it are left out; 0: runs of equal extreme values
+  double torque_delay_s = 0;  // of a servo whose torque is logged (identify pd): which target a logged torque has seen
+  double coulomb_n_m = -1;    // steady: held at this; below zero: fitted
+  bool free_inertia = false;  // friction, cable: scale the model's inertial torques to the log instead of trusting them
   double rated_torque_n_m = 0, rated_speed_rad_per_s = 0;  // tn-curve: a data sheet's point to compare with
-  double bounds_share = 0.5;                         // state-space: coefficients within this share of nominal
-  std::vector<std::size_t> held_out;                 // state-space: logs that are scored, not fitted
+  double bounds_share = 0.5;                               // state-space: coefficients within this share of nominal
+  std::vector<std::size_t> held_out;                       // state-space: logs that are scored, not fitted
 };
 
 // torque = kp (target - q) - kd dq, all of it `delay_s` late. Needs a servo's target, position and torque (or duty).

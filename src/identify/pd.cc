@@ -1,5 +1,6 @@
-// Gains of a position servo: torque(t) = kp e(t - d) - kd w(t - d) + c, e = target - angle, by regression behind one low pass, the delay d found by scanning and
-// refined together with the gains. Source: "Motor System Identification", section 8, where a delay of 5 ms makes the difference.
+// Gains of a position servo: torque(t) = kp e(t - d) - kd w(t - d) + c, e = target - angle, by regression behind one
+// low pass, the delay d found by scanning and refined together with the gains. Source: "Motor System Identification",
+// section 8, where a delay of 5 ms makes the difference.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -32,18 +33,22 @@ std::vector<char> Clipped(const std::vector<double>& torque, double limit) {
       continue;
     }
     std::size_t end = k;
-    while (end < torque.size() && torque[end] == torque[k] && (torque[k] == *lowest || torque[k] == *highest) && *lowest < *highest) ++end;
+    while (end < torque.size() && torque[end] == torque[k] && (torque[k] == *lowest || torque[k] == *highest) &&
+           *lowest < *highest)
+      ++end;
     for (std::size_t r = k; end >= k + 3 && r < end; ++r) clipped[r] = 1;
     if (end > k) k = end - 1;
   }
   return clipped;
 }
 
-// How a logged torque relates to a target that is held from row to row. kStamped: read at the stamps, so just before each new target; seen a delay later it is one row's target or
-// another's. kAveraged: read at any phase, so that on average the target is half a row old.
+// How a logged torque relates to a target that is held from row to row. kStamped: read at the stamps, so just before
+// each new target; seen a delay later it is one row's target or another's. kAveraged: read at any phase, so that on
+// average the target is half a row old.
 enum class Reading { kStamped, kAveraged };
 
-Rows MakeRows(const Servo& servo, double delay_s, Reading reading, bool with_delay_column, const Eigen::VectorXd& gains) {
+Rows MakeRows(const Servo& servo, double delay_s, Reading reading, bool with_delay_column,
+              const Eigen::VectorXd& gains) {
   std::vector<std::string> columns = {"error", "speed", "constant"};
   if (servo.has_feedforward) columns.push_back("feedforward");
   if (with_delay_column) columns.push_back("delay");
@@ -51,17 +56,22 @@ Rows MakeRows(const Servo& servo, double delay_s, Reading reading, bool with_del
   for (std::size_t log = 0; log < servo.smooth.size(); ++log) {
     const SmoothLog& smooth = servo.smooth[log];
     const auto held = [&](const std::vector<double>& values, int order) {
-      return reading == Reading::kStamped ? smooth.OnGrid(smooth.HeldBefore(values, delay_s), order) : smooth.OnGrid(smooth.GridOf(values, true), order, delay_s + 0.5 * smooth.dt_s());
+      return reading == Reading::kStamped
+                 ? smooth.OnGrid(smooth.HeldBefore(values, delay_s), order)
+                 : smooth.OnGrid(smooth.GridOf(values, true), order, delay_s + 0.5 * smooth.dt_s());
     };
-    const std::vector<double> torque = smooth.OnGrid(servo.torque[log], 0), target = held(servo.target[log], 0), angle = smooth.OnGrid(servo.angle[log], 0, delay_s),
+    const std::vector<double> torque = smooth.OnGrid(servo.torque[log], 0), target = held(servo.target[log], 0),
+                              angle = smooth.OnGrid(servo.angle[log], 0, delay_s),
                               speed = smooth.OnGrid(servo.angle[log], 1, delay_s);
     const std::vector<double> forward = servo.has_feedforward ? held(servo.feedforward[log], 0) : std::vector<double>();
     std::vector<double> target_rate, acceleration;
     std::vector<double> ripple(smooth.size(), 0.0);
     if (reading == Reading::kStamped && servo.ripple > 0) {
-      // The staircase of targets makes the speed ripple between rows: at a phase s of a row it is off its mean by kp / J target' (s dt/2 - s^2/2 - dt^2/12). Angles at the stamps give the
-      // mean speed, the law sees the one at t - delay, whose row began a delay earlier still.
-      const double dt = smooth.dt_s(), s = dt - std::fmod(2 * std::max(delay_s, 0.0), dt), size = servo.ripple * (s * dt / 2 - s * s / 2 - dt * dt / 12);
+      // The staircase of targets makes the speed ripple between rows: at a phase s of a row it is off its mean by kp /
+      // J target' (s dt/2 - s^2/2 - dt^2/12). Angles at the stamps give the mean speed, the law sees the one at t -
+      // delay, whose row began a delay earlier still.
+      const double dt = smooth.dt_s(), s = dt - std::fmod(2 * std::max(delay_s, 0.0), dt),
+                   size = servo.ripple * (s * dt / 2 - s * s / 2 - dt * dt / 12);
       ripple = held(servo.target[log], 1);
       for (double& r : ripple) r *= size;
     }
@@ -72,12 +82,15 @@ Rows MakeRows(const Servo& servo, double delay_s, Reading reading, bool with_del
     }
     std::vector<char> near_missed(smooth.size(), 0);
     for (const std::size_t m : servo.missed[log]) {
-      for (std::size_t i = m - std::min(m, smooth.reach()); i <= std::min(m + smooth.reach(), smooth.size() - 1); ++i) near_missed[i] = 1;
+      for (std::size_t i = m - std::min(m, smooth.reach()); i <= std::min(m + smooth.reach(), smooth.size() - 1); ++i)
+        near_missed[i] = 1;
     }
     for (std::size_t i = 0; i < smooth.size(); ++i) {
       if (!std::isfinite(torque[i]) || near_missed[i]) continue;
       bool clipped = false;
-      for (std::size_t k = i - std::min(i, smooth.reach()); k < std::min(smooth.size(), i + smooth.reach() + 1) && !clipped; ++k) clipped = servo.clipped[log][k] != 0;
+      for (std::size_t k = i - std::min(i, smooth.reach());
+           k < std::min(smooth.size(), i + smooth.reach() + 1) && !clipped; ++k)
+        clipped = servo.clipped[log][k] != 0;
       if (clipped) continue;
       std::vector<double> x = {target[i] - angle[i], -(speed[i] + ripple[i]), 1};
       if (servo.has_feedforward) x.push_back(forward[i]);
@@ -94,9 +107,12 @@ Result<Servo> LoadServo(const IdentifyInput& input, const IdentifyOptions& optio
   const mjModel& m = input.model.compiled();
   Servo servo;
   for (const Recording& recording : input.recordings) {
-    const Recording::Measured *angle = FindSignal(input.model, recording, SignalKind::kPosition, joint), *torque = FindSignal(input.model, recording, SignalKind::kTorque, joint);
+    const Recording::Measured *angle = FindSignal(input.model, recording, SignalKind::kPosition, joint),
+                              *torque = FindSignal(input.model, recording, SignalKind::kTorque, joint);
     if (!angle || !torque) {
-      return Error{.what = "the law of a servo needs its angle and its torque (or duty)", .where = recording.log_path, .actual = angle ? "no torque column that the experiment binds" : "no angle",
+      return Error{.what = "the law of a servo needs its angle and its torque (or duty)",
+                   .where = recording.log_path,
+                   .actual = angle ? "no torque column that the experiment binds" : "no angle",
                    .cure = "a measured signal of 'kind: torque' in " + experiment.path};
     }
     servo.torque_unit = torque->spec.unit;
@@ -104,13 +120,17 @@ Result<Servo> LoadServo(const IdentifyInput& input, const IdentifyOptions& optio
     const std::vector<double>* forward = nullptr;
     for (std::size_t c = 0; c < experiment.commands.size(); ++c) {
       const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, experiment.commands[c].actuator.c_str());
-      if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint) continue;
+      if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint)
+        continue;
       const auto& command = recording.commands[c];
       if (experiment.commands[c].unit == "rad" && !target) target = &command.values;
       const auto [low, high] = std::minmax_element(command.values.begin(), command.values.end());
       if (experiment.commands[c].unit == "N m" && *low < *high) forward = &command.values;
     }
-    if (!target) return Error{.what = "no command of a target angle drives the joint", .where = experiment.path, .allowed = "a command with 'unit: rad'"};
+    if (!target)
+      return Error{.what = "no command of a target angle drives the joint",
+                   .where = experiment.path,
+                   .allowed = "a command with 'unit: rad'"};
     servo.smooth.emplace_back(recording, options);
     const SmoothLog& smooth = servo.smooth.back();
     servo.target.push_back(*target);
@@ -131,7 +151,10 @@ double RmseAt(const Servo& servo, double delay_s, Reading reading) {
 
 // Gains of the thirds of rows with small, middle and large error.
 PointTable ByErrorSize(const Servo& servo, double delay_s, Reading reading, double dt) {
-  PointTable table{.name = "by_error", .columns = {"error_from_rad", "error_to_rad", "kp", "kp_low", "kp_high", "kd", "kd_low", "kd_high", "r2"}, .rows = {}};
+  PointTable table{
+      .name = "by_error",
+      .columns = {"error_from_rad", "error_to_rad", "kp", "kp_low", "kp_high", "kd", "kd_low", "kd_high", "r2"},
+      .rows = {}};
   const Rows all = MakeRows(servo, delay_s, reading, false, {});
   const Eigen::MatrixXd x = all.X();
   const Eigen::VectorXd y = all.Y();
@@ -139,12 +162,14 @@ PointTable ByErrorSize(const Servo& servo, double delay_s, Reading reading, doub
   // The largest error within a tenth of a second: an instant of zero error inside a large swing is not a small error.
   const std::size_t half = static_cast<std::size_t>(0.1 / dt);
   for (std::size_t i = 0; i < all.size(); ++i) {
-    for (std::size_t k = i - std::min(i, half); k <= std::min(all.size() - 1, i + half); ++k) envelope[i] = std::max(envelope[i], std::abs(x(static_cast<Eigen::Index>(k), 0)));
+    for (std::size_t k = i - std::min(i, half); k <= std::min(all.size() - 1, i + half); ++k)
+      envelope[i] = std::max(envelope[i], std::abs(x(static_cast<Eigen::Index>(k), 0)));
   }
   std::vector<double> sorted = envelope;
   std::sort(sorted.begin(), sorted.end());
   for (int third = 0; third < 3; ++third) {
-    const double low = sorted[sorted.size() * third / 3], high = sorted[std::min(sorted.size() - 1, sorted.size() * (third + 1) / 3)];
+    const double low = sorted[sorted.size() * third / 3],
+                 high = sorted[std::min(sorted.size() - 1, sorted.size() * (third + 1) / 3)];
     Rows part(all.columns());
     for (std::size_t i = 0; i < all.size(); ++i) {
       if (envelope[i] < low || envelope[i] > high) continue;
@@ -165,14 +190,17 @@ double DrivenInertiaOf(const Servo& servo, double dt) {
   Rows rows({"acceleration", "speed", "constant"});
   for (std::size_t log = 0; log < servo.smooth.size(); ++log) {
     const SmoothLog& smooth = servo.smooth[log];
-    const std::vector<double> torque = smooth.OnGrid(servo.torque[log], 0), speed = smooth.OnGrid(servo.angle[log], 1), acceleration = smooth.OnGrid(servo.angle[log], 2);
-    for (std::size_t i = 0; i < smooth.size(); ++i) rows.Add(static_cast<int>(log), smooth.time_s(i), torque[i], {acceleration[i], speed[i], 1});
+    const std::vector<double> torque = smooth.OnGrid(servo.torque[log], 0), speed = smooth.OnGrid(servo.angle[log], 1),
+                              acceleration = smooth.OnGrid(servo.angle[log], 2);
+    for (std::size_t i = 0; i < smooth.size(); ++i)
+      rows.Add(static_cast<int>(log), smooth.time_s(i), torque[i], {acceleration[i], speed[i], 1});
   }
   const auto fit = Regress(rows, dt);
   return fit.ok() ? fit.value().value[0] : 0;
 }
 
-Status FindDelay(const Servo& servo, const IdentifyInput& input, const IdentifyOptions& options, PointTable* scan, double* delay, Reading* reading) {
+Status FindDelay(const Servo& servo, const IdentifyInput& input, const IdentifyOptions& options, PointTable* scan,
+                 double* delay, Reading* reading) {
   const double dt = servo.smooth.front().dt_s();
   *scan = {.name = "delay_scan", .columns = {"delay_s", "rmse", "rmse_averaged"}, .rows = {}};
   double best = 0, best_rmse = INFINITY;
@@ -184,14 +212,16 @@ Status FindDelay(const Servo& servo, const IdentifyInput& input, const IdentifyO
     }
     scan->rows.push_back(std::move(row));
   }
-  if (!std::isfinite(best_rmse)) return Error{.what = "no delay of the scan leaves rows to fit", .where = input.recordings.front().log_path};
+  if (!std::isfinite(best_rmse))
+    return Error{.what = "no delay of the scan leaves rows to fit", .where = input.recordings.front().log_path};
   double a = best - 0.25 * dt, b = best + 0.25 * dt;
   if (*reading == Reading::kStamped) {
     const double row = std::floor(best / dt) * dt;
     a = std::max(a, row + 2e-6 * dt), b = std::min(b, row + dt - 2e-6 * dt);
   }
   constexpr double kGolden = 0.6180339887;
-  double c = b - kGolden * (b - a), d = a + kGolden * (b - a), at_c = RmseAt(servo, c, *reading), at_d = RmseAt(servo, d, *reading);
+  double c = b - kGolden * (b - a), d = a + kGolden * (b - a), at_c = RmseAt(servo, c, *reading),
+         at_d = RmseAt(servo, d, *reading);
   for (int i = 0; i < 24; ++i) {
     if (at_c < at_d) {
       b = d, d = c, at_d = at_c, c = b - kGolden * (b - a), at_c = RmseAt(servo, c, *reading);
@@ -209,7 +239,8 @@ Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOpti
   GS_ASSIGN(Servo servo, LoadServo(input, options));
   const double dt = servo.smooth.front().dt_s();
   GS_ASSIGN(const Regression direct, Regress(MakeRows(servo, 0, Reading::kStamped, false, {}), dt));
-  // Scan both readings, then golden section inside the best row: a stamped target jumps at whole rows. Twice: the first pass gives the ripple's size.
+  // Scan both readings, then golden section inside the best row: a stamped target jumps at whole rows. Twice: the first
+  // pass gives the ripple's size.
   PointTable scan;
   double delay = 0;
   Reading reading = Reading::kStamped;
@@ -223,14 +254,22 @@ Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOpti
   GS_ASSIGN(const Regression at_delay, Regress(MakeRows(servo, delay, reading, false, {}), dt));
   // The delay as one more column: its interval, and what not knowing it costs the gains.
   GS_ASSIGN(const Regression fit, Regress(MakeRows(servo, delay, reading, true, at_delay.value), dt));
-  const std::string gain = servo.torque_unit == "1" ? "1/rad" : servo.torque_unit + "/rad", damping = servo.torque_unit == "1" ? "s/rad" : servo.torque_unit + " s/rad";
-  Identification result{.method = "pd", .relation = "torque(t) = kp (target - angle)(t - delay) - kd speed(t - delay) + offset", .r2 = at_delay.r2, .rmse = at_delay.rmse, .unit = servo.torque_unit, .rows = at_delay.rows};
-  // Noise of the angle is in error, speed and delay columns: what it does to the values is known from its variances, X'X/n holds too much of them. Taken out, and since noise is known to about half,
-  // half of what was taken out is added to the intervals.
+  const std::string gain = servo.torque_unit == "1" ? "1/rad" : servo.torque_unit + "/rad",
+                    damping = servo.torque_unit == "1" ? "s/rad" : servo.torque_unit + " s/rad";
+  Identification result{.method = "pd",
+                        .relation = "torque(t) = kp (target - angle)(t - delay) - kd speed(t - delay) + offset",
+                        .r2 = at_delay.r2,
+                        .rmse = at_delay.rmse,
+                        .unit = servo.torque_unit,
+                        .rows = at_delay.rows};
+  // Noise of the angle is in error, speed and delay columns: what it does to the values is known from its variances,
+  // X'X/n holds too much of them. Taken out, and since noise is known to about half, half of what was taken out is
+  // added to the intervals.
   GS_ASSIGN(const int joint, DrivenJoint(input.model, options.joint));
   const Eigen::MatrixXd x = MakeRows(servo, delay, reading, true, at_delay.value).X();
   const Eigen::MatrixXd moments = x.transpose() * x / static_cast<double>(x.rows());
-  const double q = NoiseVariance(input, joint, 0, options), v = NoiseVariance(input, joint, 1, options), acceleration = NoiseVariance(input, joint, 2, options), kp = fit.value[0], kd = fit.value[1];
+  const double q = NoiseVariance(input, joint, 0, options), v = NoiseVariance(input, joint, 1, options),
+               acceleration = NoiseVariance(input, joint, 2, options), kp = fit.value[0], kd = fit.value[1];
   const Eigen::Index delay_column = static_cast<Eigen::Index>(fit.value.size()) - 1;
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(fit.value.size(), fit.value.size());
   noise(0, 0) = q, noise(1, 1) = v;
@@ -259,28 +298,41 @@ Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOpti
   add("offset", servo.torque_unit, about(2, 0));
   if (servo.has_feedforward) add("feedforward_gain", "1", about(3, 0));
   if (result.values[2].value < 1.5 * dt) {
-    // One inertia and nothing else: kp (q(t - d)) and kd dq(t - d) are, to first order in d, the same law with smaller gains. Only the target's row tells.
+    // One inertia and nothing else: kp (q(t - d)) and kd dq(t - d) are, to first order in d, the same law with smaller
+    // gains. Only the target's row tells.
     for (int i = 0; i < 2; ++i) {
-      result.values[static_cast<std::size_t>(i)].low = std::min(result.values[static_cast<std::size_t>(i)].low, direct.low[i]);
-      result.values[static_cast<std::size_t>(i)].high = std::max(result.values[static_cast<std::size_t>(i)].high, direct.high[i]);
+      result.values[static_cast<std::size_t>(i)].low =
+          std::min(result.values[static_cast<std::size_t>(i)].low, direct.low[i]);
+      result.values[static_cast<std::size_t>(i)].high =
+          std::max(result.values[static_cast<std::size_t>(i)].high, direct.high[i]);
     }
     result.values[2].low = std::min(result.values[2].low, 0.0);
-    result.remarks.push_back("a delay below about one row cannot be told from smaller gains: the intervals reach to the values without delay");
+    result.remarks.push_back(
+        "a delay below about one row cannot be told from smaller gains: the intervals reach to the values without "
+        "delay");
   }
   result.values.push_back(ToEstimate(direct, 0, "kp_without_delay", gain));
   result.values.push_back(ToEstimate(direct, 1, "kd_without_delay", damping));
   result.values.push_back({.name = "r2_without_delay", .unit = "1", .value = direct.r2, .low = NAN, .high = NAN});
-  if (!trusted) result.remarks.push_back("noise of the angle moves the values by more than can be corrected: a larger motion, or a lower --cutoff");
+  if (!trusted)
+    result.remarks.push_back(
+        "noise of the angle moves the values by more than can be corrected: a larger motion, or a lower --cutoff");
   result.tables = {std::move(scan), ByErrorSize(servo, delay, reading, dt)};
-  if (result.r2 < 0.9) result.remarks.push_back("the law explains less than 90 % of the torque's variance: dry friction, a limit or another law");
-  if (delay > options.longest_delay_s - dt) result.remarks.push_back("the delay is at the end of the scan: raise --longest-delay");
+  if (result.r2 < 0.9)
+    result.remarks.push_back(
+        "the law explains less than 90 % of the torque's variance: dry friction, a limit or another law");
+  if (delay > options.longest_delay_s - dt)
+    result.remarks.push_back("the delay is at the end of the scan: raise --longest-delay");
   const PointTable& parts = result.tables.back();
   if (parts.rows.size() == 3 && std::abs(parts.rows[0][2] - at_delay.value[0]) > 0.1 * std::abs(at_delay.value[0])) {
-    result.remarks.push_back("with small errors the gain comes out by more than a tenth different: excite with larger errors");
+    result.remarks.push_back(
+        "with small errors the gain comes out by more than a tenth different: excite with larger errors");
   }
   std::size_t clipped = 0, total = 0;
-  for (const auto& rows : servo.clipped) clipped += static_cast<std::size_t>(std::count(rows.begin(), rows.end(), 1)), total += rows.size();
-  if (clipped > 0) result.remarks.push_back(std::to_string(100 * clipped / total) + " % of the rows are at a limit and left out");
+  for (const auto& rows : servo.clipped)
+    clipped += static_cast<std::size_t>(std::count(rows.begin(), rows.end(), 1)), total += rows.size();
+  if (clipped > 0)
+    result.remarks.push_back(std::to_string(100 * clipped / total) + " % of the rows are at a limit and left out");
   return result;
 }
 

@@ -30,7 +30,9 @@ double Mean(const std::vector<double>& y, std::size_t from, std::size_t to) {
 
 }  // namespace
 
-std::vector<Plateau> FindPlateaus(const IdentifyInput& input, int joint, const std::vector<std::vector<double>>& current, const IdentifyOptions& options, double least_s) {
+std::vector<Plateau> FindPlateaus(const IdentifyInput& input, int joint,
+                                  const std::vector<std::vector<double>>& current, const IdentifyOptions& options,
+                                  double least_s) {
   std::vector<Plateau> plateaus;
   for (std::size_t log = 0; log < input.recordings.size(); ++log) {
     const Recording& recording = input.recordings[log];
@@ -44,9 +46,15 @@ std::vector<Plateau> FindPlateaus(const IdentifyInput& input, int joint, const s
       const std::size_t last = k - 1, middle = begin + (last - begin) / 2, quarter = middle + (last - middle) / 2;
       const bool inside = t[begin] >= options.from_s && (options.to_s <= 0 || t[last] <= options.to_s);
       if (inside && t[last] - t[begin] >= least_s && last - middle >= 8) {
-        Plateau p{.log = static_cast<int>(log), .from_s = t[middle], .to_s = t[last], .command = command[begin], .rows = last - middle};
+        Plateau p{.log = static_cast<int>(log),
+                  .from_s = t[middle],
+                  .to_s = t[last],
+                  .command = command[begin],
+                  .rows = last - middle};
         p.speed = angle ? Slope(t, angle->values, middle, last) : kNan;
-        p.acceleration = angle ? (Slope(t, angle->values, quarter, last) - Slope(t, angle->values, middle, quarter)) / (t[quarter] - t[middle]) : kNan;
+        p.acceleration = angle ? (Slope(t, angle->values, quarter, last) - Slope(t, angle->values, middle, quarter)) /
+                                     (t[quarter] - t[middle])
+                               : kNan;
         p.current = current.empty() || current[log].empty() ? kNan : Mean(current[log], middle, last);
         p.torque = torque ? Mean(torque->values, middle, last) : kNan;
         plateaus.push_back(p);

@@ -20,9 +20,12 @@ void Rows::Add(int log, double time_s, double y, const std::vector<double>& x) {
 }
 
 Eigen::MatrixXd Rows::X() const {
-  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(x_.data(), static_cast<Eigen::Index>(y_.size()), static_cast<Eigen::Index>(columns_.size()));
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      x_.data(), static_cast<Eigen::Index>(y_.size()), static_cast<Eigen::Index>(columns_.size()));
 }
-Eigen::VectorXd Rows::Y() const { return Eigen::Map<const Eigen::VectorXd>(y_.data(), static_cast<Eigen::Index>(y_.size())); }
+Eigen::VectorXd Rows::Y() const {
+  return Eigen::Map<const Eigen::VectorXd>(y_.data(), static_cast<Eigen::Index>(y_.size()));
+}
 
 double StudentQuantile(double n) {
   if (n <= 1) return 12.706;
@@ -30,10 +33,12 @@ double StudentQuantile(double n) {
   if (n <= 3) return 3.182;
   // Cornish and Fisher's expansion about the normal quantile.
   const double z = 1.959964, z2 = z * z;
-  return z + z * (z2 + 1) / (4 * n) + z * (5 * z2 * z2 + 16 * z2 + 3) / (96 * n * n) + z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
+  return z + z * (z2 + 1) / (4 * n) + z * (5 * z2 * z2 + 16 * z2 + 3) / (96 * n * n) +
+         z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
 }
 
-BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual, const std::vector<int>& logs, const std::vector<double>& times, double dt_s) {
+BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual,
+                                   const std::vector<int>& logs, const std::vector<double>& times, double dt_s) {
   constexpr double kTimes = 6;
   constexpr std::size_t kFewestBlocks = 10;
   const Eigen::Index rows = jacobian.rows(), columns = jacobian.cols();
@@ -61,22 +66,29 @@ BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen:
   }
   middle += sum * sum.transpose();
   ++blocks;
-  const Eigen::MatrixXd inverse = (jacobian.transpose() * jacobian).ldlt().solve(Eigen::MatrixXd::Identity(columns, columns));
+  const Eigen::MatrixXd inverse =
+      (jacobian.transpose() * jacobian).ldlt().solve(Eigen::MatrixXd::Identity(columns, columns));
   const double b = static_cast<double>(blocks), correction = blocks > 1 ? b / (b - 1) : 1;
-  return {.covariance = correction * inverse * middle * inverse, .quantile = StudentQuantile(std::max(1.0, b - 1)), .blocks = blocks};
+  return {.covariance = correction * inverse * middle * inverse,
+          .quantile = StudentQuantile(std::max(1.0, b - 1)),
+          .blocks = blocks};
 }
 
 Result<Regression> Regress(const Rows& rows, double dt_s) {
   const std::size_t needed = std::max<std::size_t>(20, 2 * rows.columns().size());
   if (rows.size() < needed) {
-    return Error{.what = "too few rows are fit for this identification", .actual = std::to_string(rows.size()), .allowed = "at least " + std::to_string(needed)};
+    return Error{.what = "too few rows are fit for this identification",
+                 .actual = std::to_string(rows.size()),
+                 .allowed = "at least " + std::to_string(needed)};
   }
   const Eigen::MatrixXd x = rows.X();
   const Eigen::VectorXd y = rows.Y();
   // Columns scaled to length one: their smallest singular value says whether they can be told apart.
   Eigen::VectorXd scale = x.colwise().norm();
   for (Eigen::Index c = 0; c < x.cols(); ++c) {
-    if (!(scale[c] > 0)) return Error{.what = "the log does not exercise '" + rows.columns()[static_cast<std::size_t>(c)] + "'", .cure = "a log in which it changes"};
+    if (!(scale[c] > 0))
+      return Error{.what = "the log does not exercise '" + rows.columns()[static_cast<std::size_t>(c)] + "'",
+                   .cure = "a log in which it changes"};
   }
   const Eigen::MatrixXd scaled = x * scale.cwiseInverse().asDiagonal();
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(scaled.transpose() * scaled, Eigen::ComputeFullV);
@@ -84,7 +96,8 @@ Result<Regression> Regress(const Rows& rows, double dt_s) {
     const Eigen::VectorXd flat = svd.matrixV().col(x.cols() - 1);
     std::string names;
     for (Eigen::Index c = 0; c < x.cols(); ++c) {
-      if (std::abs(flat[c]) > 0.1) names += (names.empty() ? "'" : ", '") + rows.columns()[static_cast<std::size_t>(c)] + "'";
+      if (std::abs(flat[c]) > 0.1)
+        names += (names.empty() ? "'" : ", '") + rows.columns()[static_cast<std::size_t>(c)] + "'";
     }
     return Error{.what = "the log cannot tell " + names + " apart", .cure = "another kind of motion"};
   }
@@ -117,7 +130,8 @@ double ResidualRms(const Rows& rows) {
 }
 
 Estimate ToEstimate(const Regression& fit, Eigen::Index i, std::string name, std::string unit) {
-  return {.name = std::move(name), .unit = std::move(unit), .value = fit.value[i], .low = fit.low[i], .high = fit.high[i]};
+  return {
+      .name = std::move(name), .unit = std::move(unit), .value = fit.value[i], .low = fit.low[i], .high = fit.high[i]};
 }
 
 }  // namespace gapscope

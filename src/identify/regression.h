@@ -2,8 +2,9 @@
 //
 //   y = X b + e,  cov(b) = H^-1 (sum over blocks of g g') H^-1,  H = X'X,  g = sum over the block's rows of x e
 //
-// Blocks are six correlation times of the slowest of the products x e long, so that their sums are nearly independent (Liang and Zeger, "Longitudinal data
-// analysis using generalized linear models", Biometrika 73, 1986; a block bootstrap of the same blocks has this variance). Intervals: Student's t with blocks - 1 degrees of freedom.
+// Blocks are six correlation times of the slowest of the products x e long, so that their sums are nearly independent
+// (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986; a block
+// bootstrap of the same blocks has this variance). Intervals: Student's t with blocks - 1 degrees of freedom.
 #ifndef GAPSCOPE_IDENTIFY_REGRESSION_H_
 #define GAPSCOPE_IDENTIFY_REGRESSION_H_
 
@@ -42,7 +43,8 @@ struct Regression {
   std::size_t rows = 0, blocks = 0;
 };
 
-// `dt_s`: step between rows. Errors: fewer rows than 20 or twice the columns; columns that cannot be told apart in these rows (named).
+// `dt_s`: step between rows. Errors: fewer rows than 20 or twice the columns; columns that cannot be told apart in
+// these rows (named).
 Result<Regression> Regress(const Rows& rows, double dt_s);
 
 // Root mean square residual of the same fit, without anything else. Infinity where Regress would refuse.
@@ -54,7 +56,8 @@ struct BlockCovariance {
   double quantile = 0;
   std::size_t blocks = 0;
 };
-BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual, const std::vector<int>& logs, const std::vector<double>& times, double dt_s);
+BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual,
+                                   const std::vector<int>& logs, const std::vector<double>& times, double dt_s);
 
 // 97.5 % quantile of Student's t, to 1 % from 2 degrees of freedom on.
 double StudentQuantile(double degrees);

@@ -1,9 +1,11 @@
-// Resonance of a flexible joint: the peak of the deflection's spectrum, and the frequency with the base clamped from the balance of torques at the link.
+// Resonance of a flexible joint: the peak of the deflection's spectrum, and the frequency with the base clamped from
+// the balance of torques at the link.
 //
 //   a'' + th'' = -(K/J) a - (B/J) a'          (th base, a deflection)
 //
-// The peak gives K = J w_peak^2, as "Study and Control of the Mechanichal System: Rotary Flexible Joint", 2.2.1 does; it is the clamped frequency only where the base stands
-// still. The regression needs no clamped base: what the base does is in it.
+// The peak gives K = J w_peak^2, as "Study and Control of the Mechanichal System: Rotary Flexible Joint", 2.2.1 does;
+// it is the clamped frequency only where the base stands still. The regression needs no clamped base: what the base
+// does is in it.
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -19,8 +21,9 @@ struct Peak {
   double hz = 0, width_hz = 0;
 };
 
-// The peak of the Hann-windowed spectrum above `least_hz`, refined by evaluating the transform between the bins. It is sought in the spectrum of the speed, where
-// a drift or the step that began the log do not count, and read off that of the angle.
+// The peak of the Hann-windowed spectrum above `least_hz`, refined by evaluating the transform between the bins. It is
+// sought in the spectrum of the speed, where a drift or the step that began the log do not count, and read off that of
+// the angle.
 Peak SpectrumPeak(const std::vector<double>& values, double dt, double least_hz, double most_hz, PointTable* spectrum) {
   const std::size_t n = values.size();
   double mean = 0;
@@ -28,7 +31,9 @@ Peak SpectrumPeak(const std::vector<double>& values, double dt, double least_hz,
   const auto power = [&](double hz) {
     std::complex<double> sum = 0, turn = std::polar(1.0, -2 * std::numbers::pi * hz * dt), phase = 1;
     for (std::size_t k = 0; k < n; ++k) {
-      sum += (values[k] - mean) * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(n))) * phase;
+      sum += (values[k] - mean) *
+             (0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(n))) *
+             phase;
       phase *= turn;
     }
     return std::norm(sum);
@@ -64,7 +69,10 @@ Result<Identification> IdentifyResonance(const IdentifyInput& input, const Ident
   if (!options.joint.empty()) {
     GS_ASSIGN(joint, DrivenJoint(input.model, options.joint));
   }
-  if (joint < 0) return Error{.what = "the model has no joint with a spring", .where = input.model.experiment().model_path, .cure = "name the flexible joint by --joint"};
+  if (joint < 0)
+    return Error{.what = "the model has no joint with a spring",
+                 .where = input.model.experiment().model_path,
+                 .cure = "name the flexible joint by --joint"};
   GS_ASSIGN(const int base, DrivenJoint(input.model, ""));
   IdentifyOptions quiet = options;
   quiet.cutoff_hz = QuietCutoff(input, joint, 1, 0.003, options);
@@ -74,23 +82,38 @@ Result<Identification> IdentifyResonance(const IdentifyInput& input, const Ident
   double width = 0, dt = 0;
   for (std::size_t log = 0; log < input.recordings.size(); ++log) {
     const Recording& recording = input.recordings[log];
-    const auto *deflection = FindSignal(input.model, recording, SignalKind::kPosition, joint), *carrier = FindSignal(input.model, recording, SignalKind::kPosition, base);
-    if (!deflection || !carrier) return Error{.what = "a resonance needs the angles of the base and of the flexible joint", .where = recording.log_path};
+    const auto *deflection = FindSignal(input.model, recording, SignalKind::kPosition, joint),
+               *carrier = FindSignal(input.model, recording, SignalKind::kPosition, base);
+    if (!deflection || !carrier)
+      return Error{.what = "a resonance needs the angles of the base and of the flexible joint",
+                   .where = recording.log_path};
     const SmoothLog smooth(recording, quiet);
     dt = smooth.dt_s();
     std::vector<double> grid = smooth.GridOf(deflection->values, false);
-    if (grid.size() < 100) return Error{.what = "the log is too short for a spectrum", .where = recording.log_path, .actual = std::to_string(grid.size()) + " rows", .allowed = "at least 100"};
+    if (grid.size() < 100)
+      return Error{.what = "the log is too short for a spectrum",
+                   .where = recording.log_path,
+                   .actual = std::to_string(grid.size()) + " rows",
+                   .allowed = "at least 100"};
     const double duration = static_cast<double>(grid.size()) * dt;
     // Below one and a half turns in the log a peak is a drift.
     const Peak peak = SpectrumPeak(grid, dt, 1.5 / duration, std::min(0.25 / dt, 15.0), log == 0 ? &spectrum : nullptr);
     peaks.push_back(peak.hz);
     width = std::max(width, peak.width_hz);
-    const std::vector<double> a = smooth.Sampled(deflection->values, 0), da = smooth.Sampled(deflection->values, 1), dda = smooth.Sampled(deflection->values, 2), ddth = smooth.Sampled(carrier->values, 2);
-    for (std::size_t i = 0; i < smooth.size(); ++i) rows.Add(static_cast<int>(log), smooth.time_s(i), dda[i] + ddth[i], {-a[i], -da[i], 1});
+    const std::vector<double> a = smooth.Sampled(deflection->values, 0), da = smooth.Sampled(deflection->values, 1),
+                              dda = smooth.Sampled(deflection->values, 2), ddth = smooth.Sampled(carrier->values, 2);
+    for (std::size_t i = 0; i < smooth.size(); ++i)
+      rows.Add(static_cast<int>(log), smooth.time_s(i), dda[i] + ddth[i], {-a[i], -da[i], 1});
   }
   GS_ASSIGN(const Regression fit, Regress(rows, dt));
   const double inertia = DrivenInertia(m, joint);
-  Identification result{.method = "resonance", .relation = "deflection'' + base'' = -(2 pi clamped_frequency)^2 deflection - damping_rate deflection'", .r2 = fit.r2, .rmse = fit.rmse, .unit = "rad/s^2", .rows = fit.rows};
+  Identification result{
+      .method = "resonance",
+      .relation = "deflection'' + base'' = -(2 pi clamped_frequency)^2 deflection - damping_rate deflection'",
+      .r2 = fit.r2,
+      .rmse = fit.rmse,
+      .unit = "rad/s^2",
+      .rows = fit.rows};
   double mean = 0, square = 0;
   const double n = static_cast<double>(peaks.size());
   for (const double hz : peaks) mean += hz / n;
@@ -98,25 +121,48 @@ Result<Identification> IdentifyResonance(const IdentifyInput& input, const Ident
   // One log: a quarter of the spectrum's own resolution. Several: their scatter as well.
   const double half = std::max(n > 1 ? StudentQuantile(n - 1) * std::sqrt(square / (n - 1) / n) : 0, 0.25 * width);
   const double two_pi = 2 * std::numbers::pi;
-  result.values.push_back({.name = "peak_frequency", .unit = "Hz", .value = mean, .low = mean - half, .high = mean + half});
+  result.values.push_back(
+      {.name = "peak_frequency", .unit = "Hz", .value = mean, .low = mean - half, .high = mean + half});
   const auto stiffness = [&](double hz) { return inertia * two_pi * two_pi * hz * hz; };
-  result.values.push_back({.name = "stiffness_from_peak", .unit = "N m/rad", .value = stiffness(mean), .low = stiffness(mean - half), .high = stiffness(mean + half)});
+  result.values.push_back({.name = "stiffness_from_peak",
+                           .unit = "N m/rad",
+                           .value = stiffness(mean),
+                           .low = stiffness(mean - half),
+                           .high = stiffness(mean + half)});
   if (fit.value[0] > 0) {
     const double w2 = fit.value[0], hz = std::sqrt(w2) / two_pi;
     const auto to_hz = [&](double x) { return x > 0 ? std::sqrt(x) / two_pi : 0; };
-    result.values.push_back({.name = "clamped_frequency", .unit = "Hz", .value = hz, .low = to_hz(fit.low[0]), .high = to_hz(fit.high[0])});
-    result.values.push_back({.name = "stiffness", .unit = "N m/rad", .value = inertia * w2, .low = inertia * fit.low[0], .high = inertia * fit.high[0]});
+    result.values.push_back(
+        {.name = "clamped_frequency", .unit = "Hz", .value = hz, .low = to_hz(fit.low[0]), .high = to_hz(fit.high[0])});
+    result.values.push_back({.name = "stiffness",
+                             .unit = "N m/rad",
+                             .value = inertia * w2,
+                             .low = inertia * fit.low[0],
+                             .high = inertia * fit.high[0]});
     result.values.push_back(ToEstimate(fit, 1, "damping_rate", "1/s"));
-    result.values.push_back({.name = "damping", .unit = "N m s/rad", .value = inertia * fit.value[1], .low = inertia * fit.low[1], .high = inertia * fit.high[1]});
-    result.values.push_back({.name = "damping_ratio", .unit = "1", .value = 0.5 * fit.value[1] / std::sqrt(w2), .low = 0.5 * fit.low[1] / std::sqrt(w2), .high = 0.5 * fit.high[1] / std::sqrt(w2)});
+    result.values.push_back({.name = "damping",
+                             .unit = "N m s/rad",
+                             .value = inertia * fit.value[1],
+                             .low = inertia * fit.low[1],
+                             .high = inertia * fit.high[1]});
+    result.values.push_back({.name = "damping_ratio",
+                             .unit = "1",
+                             .value = 0.5 * fit.value[1] / std::sqrt(w2),
+                             .low = 0.5 * fit.low[1] / std::sqrt(w2),
+                             .high = 0.5 * fit.high[1] / std::sqrt(w2)});
     if (std::abs(hz - mean) > 0.1 * hz) {
-      result.remarks.push_back("the peak is not the clamped frequency: the base moves with the link, or the input has its own peak; stiffness_from_peak is then wrong");
+      result.remarks.push_back(
+          "the peak is not the clamped frequency: the base moves with the link, or the input has its own peak; "
+          "stiffness_from_peak is then wrong");
     }
   } else {
     result.remarks.push_back("the deflection does not answer like a spring in these logs");
   }
   result.values.push_back({.name = "inertia_nominal", .unit = "kg m2", .value = inertia, .low = NAN, .high = NAN});
-  if (fit.r2 < 0.8) result.remarks.push_back("the spring's equation explains less than 80 % of the acceleration: noise of the second derivative (lower --cutoff), or higher modes");
+  if (fit.r2 < 0.8)
+    result.remarks.push_back(
+        "the spring's equation explains less than 80 % of the acceleration: noise of the second derivative (lower "
+        "--cutoff), or higher modes");
   result.tables.push_back(std::move(spectrum));
   return result;
 }

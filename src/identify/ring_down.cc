@@ -1,9 +1,13 @@
-// A free swing that dies out: frequency, viscous and dry friction told apart, from the whole motion rather than from its peaks alone.
+// A free swing that dies out: frequency, viscous and dry friction told apart, from the whole motion rather than from
+// its peaks alone.
 //
-//   dd = -w^2 f(q - rest) - damping dq - dry sign(dq) - coupling cos(q - rest) dd_parent,  f = sin under gravity, the angle itself on a spring
+//   dd = -w^2 f(q - rest) - damping dq - dry sign(dq) - coupling cos(q - rest) dd_parent,  f = sin under gravity, the
+//   angle itself on a spring
 //
-// With viscous friction alone the peaks fall exponentially, with dry friction alone by equal steps. The equation is integrated and fitted by Levenberg and Marquardt, so large swings need no
-// small-angle formula, and the joint that carries the swinging one may move: its measured acceleration is an input. Source: "Quanser Qube 2 - Report", 2.4, which fits the envelope.
+// With viscous friction alone the peaks fall exponentially, with dry friction alone by equal steps. The equation is
+// integrated and fitted by Levenberg and Marquardt, so large swings need no small-angle formula, and the joint that
+// carries the swinging one may move: its measured acceleration is an input. Source: "Quanser Qube 2 - Report", 2.4,
+// which fits the envelope.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,26 +23,29 @@ enum Index { kLogW2, kDamping, kDry, kRest, kAngle, kSpeed, kCoupling, kCount };
 using Parameters = std::array<double, kCount>;
 
 struct Swing {
-  std::vector<double> time_s, angle;  // of the rows used
+  std::vector<double> time_s, angle;                  // of the rows used
   std::vector<double> parent_s, parent_acceleration;  // regular grid; empty: the parent rests
   bool spring = false;
 };
 
 double ParentAt(const Swing& swing, double t) {
   if (swing.parent_s.empty()) return 0;
-  const double dt = swing.parent_s[1] - swing.parent_s[0], x = std::clamp((t - swing.parent_s[0]) / dt, 0.0, static_cast<double>(swing.parent_s.size() - 1));
+  const double dt = swing.parent_s[1] - swing.parent_s[0],
+               x = std::clamp((t - swing.parent_s[0]) / dt, 0.0, static_cast<double>(swing.parent_s.size() - 1));
   const std::size_t k = std::min(static_cast<std::size_t>(x), swing.parent_s.size() - 2);
-  return swing.parent_acceleration[k] + (x - static_cast<double>(k)) * (swing.parent_acceleration[k + 1] - swing.parent_acceleration[k]);
+  return swing.parent_acceleration[k] +
+         (x - static_cast<double>(k)) * (swing.parent_acceleration[k + 1] - swing.parent_acceleration[k]);
 }
 
-// The angle at each row. Fourth-order Runge-Kutta with the direction of dry friction held over a step; a step in which the speed turns ends in rest, from which
-// the joint leaves only when the pull beats dry friction.
+// The angle at each row. Fourth-order Runge-Kutta with the direction of dry friction held over a step; a step in which
+// the speed turns ends in rest, from which the joint leaves only when the pull beats dry friction.
 void Integrate(const Swing& swing, const Parameters& p, Eigen::VectorXd* angle) {
   constexpr double kStep_s = 0.002;
   const double w2 = std::exp(p[kLogW2]);
   const auto pull = [&](double q, double t) {
     const double x = q - p[kRest];
-    return -w2 * (swing.spring ? x : std::sin(x)) - p[kCoupling] * (swing.spring ? 1 : std::cos(x)) * ParentAt(swing, t);
+    return -w2 * (swing.spring ? x : std::sin(x)) -
+           p[kCoupling] * (swing.spring ? 1 : std::cos(x)) * ParentAt(swing, t);
   };
   double q = p[kAngle], v = p[kSpeed];
   for (std::size_t r = 0; r < swing.time_s.size(); ++r) {
@@ -54,13 +61,17 @@ void Integrate(const Swing& swing, const Parameters& p, Eigen::VectorXd* angle) 
         if (std::abs(at_rest) <= p[kDry]) continue;
         direction = at_rest > 0 ? 1 : -1;
       }
-      const auto rate = [&](double qq, double vv, double tt) { return pull(qq, tt) - p[kDamping] * vv - p[kDry] * direction; };
-      const double a1 = rate(q, v, t), v2 = v + 0.5 * h * a1, a2 = rate(q + 0.5 * h * v, v2, t + 0.5 * h), v3 = v + 0.5 * h * a2;
+      const auto rate = [&](double qq, double vv, double tt) {
+        return pull(qq, tt) - p[kDamping] * vv - p[kDry] * direction;
+      };
+      const double a1 = rate(q, v, t), v2 = v + 0.5 * h * a1, a2 = rate(q + 0.5 * h * v, v2, t + 0.5 * h),
+                   v3 = v + 0.5 * h * a2;
       const double a3 = rate(q + 0.5 * h * v2, v3, t + 0.5 * h), v4 = v + h * a3, a4 = rate(q + h * v3, v4, t + h);
       const double next_v = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), next_q = q + h / 6 * (v + 2 * v2 + 2 * v3 + v4);
       if (next_v * direction < 0 && p[kDry] > 0) {
         // Turns inside the step: up to there, then on from rest with the rest of the step.
-        const double share = v == 0 ? 0 : v / (v - next_v), turn = q + 0.5 * v * share * h, left = (1 - share) * h, now = pull(turn, t + share * h);
+        const double share = v == 0 ? 0 : v / (v - next_v), turn = q + 0.5 * v * share * h, left = (1 - share) * h,
+                     now = pull(turn, t + share * h);
         if (std::abs(now) <= p[kDry]) {
           q = turn, v = 0;
         } else {
@@ -83,7 +94,8 @@ struct SwingFit {
 };
 
 SwingFit Fit(const Swing& swing, Parameters start, std::vector<int> free) {
-  const Eigen::Index rows = static_cast<Eigen::Index>(swing.time_s.size()), columns = static_cast<Eigen::Index>(free.size());
+  const Eigen::Index rows = static_cast<Eigen::Index>(swing.time_s.size()),
+                     columns = static_cast<Eigen::Index>(free.size());
   const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(swing.angle.data(), rows);
   const double w = std::exp(0.5 * start[kLogW2]);
   const std::array<double, kCount> step = {1e-3, 1e-3 * w, 1e-4 * w * w, 1e-3, 1e-3, 1e-3 * w, 1e-3};
@@ -107,7 +119,8 @@ SwingFit Fit(const Swing& swing, Parameters start, std::vector<int> free) {
     double gain = 0;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
       Eigen::MatrixXd damped = normal;
-      damped.diagonal() += damping * normal.diagonal() + Eigen::VectorXd::Constant(columns, 1e-15 * normal.diagonal().maxCoeff());
+      damped.diagonal() +=
+          damping * normal.diagonal() + Eigen::VectorXd::Constant(columns, 1e-15 * normal.diagonal().maxCoeff());
       const Eigen::VectorXd move = damped.ldlt().solve(right);
       Parameters next = fit.parameters;
       for (Eigen::Index c = 0; c < columns; ++c) next[fit.free[static_cast<std::size_t>(c)]] += move[c];
@@ -131,7 +144,8 @@ SwingFit Fit(const Swing& swing, Parameters start, std::vector<int> free) {
 
 // The longest stretch in which nothing drives: a drive that is switched off, or a command of zero.
 Result<std::pair<double, double>> FreeStretch(const Recording& recording, const IdentifyOptions& options) {
-  if (options.from_s > 0 || options.to_s > 0) return std::pair{options.from_s, options.to_s > 0 ? options.to_s : recording.time_s.back()};
+  if (options.from_s > 0 || options.to_s > 0)
+    return std::pair{options.from_s, options.to_s > 0 ? options.to_s : recording.time_s.back()};
   const Recording::Command* gate = &recording.commands.front();
   for (const auto& command : recording.commands) {
     if (command.actuator.ends_with(".enable")) gate = &command;
@@ -140,11 +154,15 @@ Result<std::pair<double, double>> FreeStretch(const Recording& recording, const 
   std::size_t begin = 0;
   for (std::size_t k = 0; k <= recording.rows(); ++k) {
     if (k < recording.rows() && std::abs(gate->values[k]) < 1e-9) continue;
-    if (k > begin && recording.time_s[k - 1] - recording.time_s[begin] > best_to - best_from) best_from = recording.time_s[begin], best_to = recording.time_s[k - 1];
+    if (k > begin && recording.time_s[k - 1] - recording.time_s[begin] > best_to - best_from)
+      best_from = recording.time_s[begin], best_to = recording.time_s[k - 1];
     begin = k + 1;
   }
   if (best_to - best_from < 0.5) {
-    return Error{.what = "the log has no stretch without a command", .where = recording.log_path, .actual = std::to_string(best_to - best_from) + " s", .allowed = "at least 0.5 s",
+    return Error{.what = "the log has no stretch without a command",
+                 .where = recording.log_path,
+                 .actual = std::to_string(best_to - best_from) + " s",
+                 .allowed = "at least 0.5 s",
                  .cure = "name the stretch by --from and --to"};
   }
   return std::pair{best_from, best_to};
@@ -175,23 +193,33 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
   for (std::size_t log = 0; log < input.recordings.size(); ++log) {
     const Recording& recording = input.recordings[log];
     const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
-    if (!angle) return Error{.what = "the log has no angle of '" + JointName(input.model, joint) + "'", .where = recording.log_path};
+    if (!angle)
+      return Error{.what = "the log has no angle of '" + JointName(input.model, joint) + "'",
+                   .where = recording.log_path};
     GS_ASSIGN(const auto stretch, FreeStretch(recording, options));
     Swing swing{.spring = m.jnt_stiffness[joint] > 0};
     spring = swing.spring;
     for (std::size_t k = 0; k < recording.rows(); ++k) {
-      if (recording.time_s[k] < stretch.first || recording.time_s[k] > stretch.second || !std::isfinite(angle->values[k])) continue;
+      if (recording.time_s[k] < stretch.first || recording.time_s[k] > stretch.second ||
+          !std::isfinite(angle->values[k]))
+        continue;
       swing.time_s.push_back(recording.time_s[k]);
       swing.angle.push_back(angle->values[k]);
     }
-    if (swing.time_s.size() < 50) return Error{.what = "the free stretch is too short", .where = recording.log_path, .actual = std::to_string(swing.time_s.size()) + " rows", .allowed = "at least 50"};
+    if (swing.time_s.size() < 50)
+      return Error{.what = "the free stretch is too short",
+                   .where = recording.log_path,
+                   .actual = std::to_string(swing.time_s.size()) + " rows",
+                   .allowed = "at least 50"};
     // Where the parent moves, its acceleration drives the swing.
     const int body = m.jnt_bodyid[joint], parent_body = m.body_parentid[body];
     const int parent = parent_body > 0 && m.body_jntnum[parent_body] == 1 ? m.body_jntadr[parent_body] : -1;
-    if (const auto* carrier = parent >= 0 ? FindSignal(input.model, recording, SignalKind::kPosition, parent) : nullptr) {
+    if (const auto* carrier =
+            parent >= 0 ? FindSignal(input.model, recording, SignalKind::kPosition, parent) : nullptr) {
       double low = INFINITY, high = -INFINITY;
       for (std::size_t k = 0; k < recording.rows(); ++k) {
-        if (recording.time_s[k] >= stretch.first && recording.time_s[k] <= stretch.second) low = std::min(low, carrier->values[k]), high = std::max(high, carrier->values[k]);
+        if (recording.time_s[k] >= stretch.first && recording.time_s[k] <= stretch.second)
+          low = std::min(low, carrier->values[k]), high = std::max(high, carrier->values[k]);
       }
       if (high - low > std::max(0.01, 3 * carrier->spec.resolution)) {
         IdentifyOptions whole = options;
@@ -208,7 +236,8 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
     // A first guess from the mean and its crossings.
     double mean = 0;
     for (const double q : swing.angle) mean += q / static_cast<double>(swing.angle.size());
-    std::vector<double> tail(swing.angle.begin() + static_cast<std::ptrdiff_t>(swing.angle.size() * 3 / 4), swing.angle.end());
+    std::vector<double> tail(swing.angle.begin() + static_cast<std::ptrdiff_t>(swing.angle.size() * 3 / 4),
+                             swing.angle.end());
     double rest = 0, amplitude = 0;
     for (const double q : tail) rest += q / static_cast<double>(tail.size());
     for (const double q : swing.angle) amplitude = std::max(amplitude, std::abs(q - rest));
@@ -223,15 +252,20 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
       side = now;
     }
     if (crossings.size() < 2) {
-      return Error{.what = "the joint does not swing in the free stretch", .where = recording.log_path, .actual = std::to_string(crossings.size()) + " passages through rest between " + std::to_string(stretch.first) + " and " + std::to_string(stretch.second) + " s",
-                   .allowed = "at least two", .cure = "let it go from a larger angle, or name the stretch by --from and --to"};
+      return Error{.what = "the joint does not swing in the free stretch",
+                   .where = recording.log_path,
+                   .actual = std::to_string(crossings.size()) + " passages through rest between " +
+                             std::to_string(stretch.first) + " and " + std::to_string(stretch.second) + " s",
+                   .allowed = "at least two",
+                   .cure = "let it go from a larger angle, or name the stretch by --from and --to"};
     }
     // Later swings are small ones: their period is the linear one.
     const std::size_t n = crossings.size(), first = n > 6 ? n / 2 : 0;
     const double half_period = n > 1 ? (crossings.back() - crossings[first]) / static_cast<double>(n - 1 - first) : 0.5;
     Parameters start{};
     const double w = std::numbers::pi / half_period;
-    start[kLogW2] = 2 * std::log(w), start[kDamping] = 0.05 * w, start[kDry] = 0.002 * w * w * amplitude, start[kRest] = rest, start[kAngle] = swing.angle.front();
+    start[kLogW2] = 2 * std::log(w), start[kDamping] = 0.05 * w, start[kDry] = 0.002 * w * w * amplitude,
+    start[kRest] = rest, start[kAngle] = swing.angle.front();
     start[kSpeed] = (swing.angle[3] - swing.angle[0]) / (swing.time_s[3] - swing.time_s[0]);
     start[kCoupling] = swing.spring ? 1 : 0.5;
     std::vector<int> free = {kLogW2, kDamping, kDry, kRest, kAngle, kSpeed};
@@ -260,31 +294,36 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
     total_rows += rows;
     for (const double q : swing.angle) variance += (q - mean) * (q - mean);
     std::vector<int> ids(swing.angle.size(), 0);
-    const BlockCovariance covariance = CovarianceByBlocks(best.jacobian, best.residual, ids, swing.time_s, recording.timeline.median_step_s);
+    const BlockCovariance covariance =
+        CovarianceByBlocks(best.jacobian, best.residual, ids, swing.time_s, recording.timeline.median_step_s);
     // Peaks of the measured motion between passages.
     for (std::size_t c = 0; c + 1 < crossings.size(); ++c) {
       double peak = 0, at = 0;
       for (std::size_t k = 0; k < swing.angle.size(); ++k) {
         if (swing.time_s[k] < crossings[c] || swing.time_s[k] >= crossings[c + 1]) continue;
-        if (std::abs(swing.angle[k] - best.parameters[kRest]) > peak) peak = std::abs(swing.angle[k] - best.parameters[kRest]), at = swing.time_s[k];
+        if (std::abs(swing.angle[k] - best.parameters[kRest]) > peak)
+          peak = std::abs(swing.angle[k] - best.parameters[kRest]), at = swing.time_s[k];
       }
       peaks.rows.push_back({static_cast<double>(log), at, peak});
     }
     logs.push_back({std::move(best), covariance});
   }
   // Several logs: mean weighted by each one's variance, with their scatter where it is larger than the intervals say.
-  const auto combine = [&](int index, const std::function<double(double)>& value, const std::function<double(double)>& slope) {
+  const auto combine = [&](int index, const std::function<double(double)>& value,
+                           const std::function<double(double)>& slope) {
     double weight = 0, mean = 0, quantile = 0;
     for (const auto& one : logs) {
       const Eigen::Index c = std::find(one.fit.free.begin(), one.fit.free.end(), index) - one.fit.free.begin();
-      const double x = one.fit.parameters[index], s = slope(x) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
+      const double x = one.fit.parameters[index],
+                   s = slope(x) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
       weight += 1 / (s * s), mean += value(x) / (s * s), quantile = std::max(quantile, one.covariance.quantile);
     }
     mean /= weight;
     double chi = 0;
     for (const auto& one : logs) {
       const Eigen::Index c = std::find(one.fit.free.begin(), one.fit.free.end(), index) - one.fit.free.begin();
-      const double x = one.fit.parameters[index], s = slope(x) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
+      const double x = one.fit.parameters[index],
+                   s = slope(x) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
       chi += std::pow((value(x) - mean) / s, 2);
     }
     const double n = static_cast<double>(logs.size()), scatter = n > 1 ? std::max(1.0, std::sqrt(chi / (n - 1))) : 1;
@@ -299,38 +338,54 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
     return e;
   };
   const double two_pi = 2 * std::numbers::pi;
-  add("frequency", "Hz", combine(kLogW2, [&](double x) { return std::exp(0.5 * x) / two_pi; }, [&](double x) { return 0.5 * std::exp(0.5 * x) / two_pi; }));
-  const Estimate damping = add("damping_rate", "1/s", combine(kDamping, same, one)), dry = add("dry_rate", "rad/s^2", combine(kDry, same, one));
+  add("frequency", "Hz",
+      combine(
+          kLogW2, [&](double x) { return std::exp(0.5 * x) / two_pi; },
+          [&](double x) { return 0.5 * std::exp(0.5 * x) / two_pi; }));
+  const Estimate damping = add("damping_rate", "1/s", combine(kDamping, same, one)),
+                 dry = add("dry_rate", "rad/s^2", combine(kDry, same, one));
   add("rest", "rad", combine(kRest, same, one));
   if (coupled) add("coupling", "1", combine(kCoupling, same, one));
   // With the model's own inertia about the joint.
   const DataPtr data(mj_makeData(&m));
   const ModelPtr copy(mj_copyModel(nullptr, &m));
   ParameterWriter writer(input.model, copy.get(), data.get());
-  if (!writer.Write(input.values, input.recordings.front().values)) return Error{.what = "the parameters make no model", .where = input.model.experiment().path};
+  if (!writer.Write(input.values, input.recordings.front().values))
+    return Error{.what = "the parameters make no model", .where = input.model.experiment().path};
   mj_resetData(copy.get(), data.get());
   mj_fwdPosition(copy.get(), data.get());
   std::vector<mjtNum> unit(m.nv, 0), column(m.nv);
   unit[m.jnt_dofadr[joint]] = 1;
   mj_mulM(copy.get(), data.get(), column.data(), unit.data());
   const double inertia = column[m.jnt_dofadr[joint]];
-  const auto scaled = [&](Estimate e) { return Estimate{.name = "", .unit = "", .value = e.value * inertia, .low = e.low * inertia, .high = e.high * inertia}; };
+  const auto scaled = [&](Estimate e) {
+    return Estimate{
+        .name = "", .unit = "", .value = e.value * inertia, .low = e.low * inertia, .high = e.high * inertia};
+  };
   add("viscous", "N m s/rad", scaled(damping));
   add("coulomb", "N m", scaled(dry));
   add("inertia_nominal", "kg m2", {.name = "", .unit = "", .value = inertia, .low = NAN, .high = NAN});
-  add("rmse_viscous_only", "rad", {.name = "", .unit = "", .value = std::sqrt(viscous_only / total_rows), .low = NAN, .high = NAN});
-  add("rmse_dry_only", "rad", {.name = "", .unit = "", .value = std::sqrt(dry_only / total_rows), .low = NAN, .high = NAN});
-  result.relation = spring ? "acceleration = -(2 pi frequency)^2 (angle - rest) - damping_rate speed - dry_rate sign(speed)" : "acceleration = -(2 pi frequency)^2 sin(angle - rest) - damping_rate speed - dry_rate sign(speed)";
+  add("rmse_viscous_only", "rad",
+      {.name = "", .unit = "", .value = std::sqrt(viscous_only / total_rows), .low = NAN, .high = NAN});
+  add("rmse_dry_only", "rad",
+      {.name = "", .unit = "", .value = std::sqrt(dry_only / total_rows), .low = NAN, .high = NAN});
+  result.relation =
+      spring ? "acceleration = -(2 pi frequency)^2 (angle - rest) - damping_rate speed - dry_rate sign(speed)"
+             : "acceleration = -(2 pi frequency)^2 sin(angle - rest) - damping_rate speed - dry_rate sign(speed)";
   if (coupled) result.relation += " - coupling x acceleration of the joint that carries it";
   result.rmse = std::sqrt(total_square / total_rows);
   result.r2 = variance > 0 ? 1 - total_square / variance : NAN;
   result.rows = static_cast<std::size_t>(total_rows);
   const bool viscous_seen = damping.low > 0, dry_seen = dry.low > 0;
-  result.remarks.push_back(viscous_seen && dry_seen ? "the envelope is between exponential and linear: viscous and dry friction both stand clear of zero"
-                           : viscous_seen           ? "the envelope is exponential: viscous friction; dry friction does not stand clear of zero"
-                           : dry_seen               ? "the envelope is linear: dry friction; viscous friction does not stand clear of zero"
-                                                    : "neither viscous nor dry friction stands clear of zero: the swing is too short");
-  if (result.r2 < 0.98) result.remarks.push_back("the equation leaves more than 2 % of the motion's variance: another effect, or not a free swing");
+  result.remarks.push_back(
+      viscous_seen && dry_seen
+          ? "the envelope is between exponential and linear: viscous and dry friction both stand clear of zero"
+      : viscous_seen ? "the envelope is exponential: viscous friction; dry friction does not stand clear of zero"
+      : dry_seen     ? "the envelope is linear: dry friction; viscous friction does not stand clear of zero"
+                     : "neither viscous nor dry friction stands clear of zero: the swing is too short");
+  if (result.r2 < 0.98)
+    result.remarks.push_back(
+        "the equation leaves more than 2 % of the motion's variance: another effect, or not a free swing");
   result.tables.push_back(std::move(peaks));
   return result;
 }

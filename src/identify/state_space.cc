@@ -1,18 +1,20 @@
-// State space of a flexible joint, x = (th, th', a, a'), by convex least squares with the structure, signs and bounds of its coefficients as constraints, beside the
-// unconstrained fit, both scored on data they did not see.
+// State space of a flexible joint, x = (th, th', a, a'), by convex least squares with the structure, signs and bounds
+// of its coefficients as constraints, beside the unconstrained fit, both scored on data they did not see.
 //
 //   th'' =  A22 th' + A23 a + A24 a' + B2 u        A22 <= 0, A23, A24, B2 >= 0
 //   a''  = -A22 th' + A43 a + A44 a' - B2 u        A43 <= -A23, A44 <= -A24  (the link's inertia is finite)
 //
-// and every coefficient within a share of its nominal value. The quadratic program is solved by NLopt's SLSQP (Kraft, 1988), whose steps are themselves solutions of least-squares problems with linear
-// constraints. Source: "Rotary Flexible Joint", 2.1.3 and 2.2.2, which fits the same structure in the discrete form x_{k+1} = (1 + D A) x_k + D B u_k by CVX. Differences over a step D add D w^2 / 2 of
-// damping to what they fit (2.3 1/s at 2 ms and the joint's 48 rad/s, where the joint has 0.3), so the derivatives here are those of the low pass, and the discrete matrices are written out at the end.
+// and every coefficient within a share of its nominal value. The quadratic program is solved by NLopt's SLSQP (Kraft,
+// 1988), whose steps are themselves solutions of least-squares problems with linear constraints. Source: "Rotary
+// Flexible Joint", 2.1.3 and 2.2.2, which fits the same structure in the discrete form x_{k+1} = (1 + D A) x_k + D B
+// u_k by CVX. Differences over a step D add D w^2 / 2 of damping to what they fit (2.3 1/s at 2 ms and the joint's 48
+// rad/s, where the joint has 0.3), so the derivatives here are those of the low pass, and the discrete matrices are
+// written out at the end.
 #include <Eigen/Dense>
-#include <nlopt.hpp>
-#include <unsupported/Eigen/MatrixFunctions>
-
 #include <algorithm>
 #include <cmath>
+#include <nlopt.hpp>
+#include <unsupported/Eigen/MatrixFunctions>
 
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
@@ -52,7 +54,8 @@ System Nominal(const IdentifyInput& input, int base, int link) {
   const DataPtr d(mj_makeData(m.get()));
   ParameterWriter writer(input.model, m.get(), d.get());
   writer.Write(input.values, input.recordings.front().values);
-  const int qb = m->jnt_qposadr[base], vb = m->jnt_dofadr[base], ql = m->jnt_qposadr[link], vl = m->jnt_dofadr[link], u = input.model.command_actuators().front();
+  const int qb = m->jnt_qposadr[base], vb = m->jnt_dofadr[base], ql = m->jnt_qposadr[link], vl = m->jnt_dofadr[link],
+            u = input.model.command_actuators().front();
   const auto accelerations = [&](double th, double dth, double a, double da, double command) {
     mj_resetData(m.get(), d.get());
     d->qpos[qb] = th, d->qpos[ql] = a, d->qvel[vb] = dth, d->qvel[vl] = da, d->ctrl[u] = command;
@@ -62,10 +65,12 @@ System Nominal(const IdentifyInput& input, int base, int link) {
   System s;
   s.a(0, 1) = s.a(2, 3) = 1;
   constexpr double kStep = 1e-4;
-  const double unit[5][5] = {{kStep, 0, 0, 0, 0}, {0, kStep, 0, 0, 0}, {0, 0, kStep, 0, 0}, {0, 0, 0, kStep, 0}, {0, 0, 0, 0, kStep}};
+  const double unit[5][5] = {
+      {kStep, 0, 0, 0, 0}, {0, kStep, 0, 0, 0}, {0, 0, kStep, 0, 0}, {0, 0, 0, kStep, 0}, {0, 0, 0, 0, kStep}};
   for (int i = 0; i < 5; ++i) {
     const double* x = unit[i];
-    const Eigen::Vector2d slope = (accelerations(x[0], x[1], x[2], x[3], x[4]) - accelerations(-x[0], -x[1], -x[2], -x[3], -x[4])) / (2 * kStep);
+    const Eigen::Vector2d slope =
+        (accelerations(x[0], x[1], x[2], x[3], x[4]) - accelerations(-x[0], -x[1], -x[2], -x[3], -x[4])) / (2 * kStep);
     if (i < 4) {
       s.a(1, i) = slope[0], s.a(3, i) = slope[1];
     } else {
@@ -75,15 +80,20 @@ System Nominal(const IdentifyInput& input, int base, int link) {
   return s;
 }
 
-// Root mean square over both angles of (RMSE / standard deviation), simulated in windows of a second that start from the measured state.
-double Score(const System& system, const IdentifyInput& input, const std::vector<std::pair<std::size_t, IdentifyOptions>>& parts, int base, int link) {
+// Root mean square over both angles of (RMSE / standard deviation), simulated in windows of a second that start from
+// the measured state.
+double Score(const System& system, const IdentifyInput& input,
+             const std::vector<std::pair<std::size_t, IdentifyOptions>>& parts, int base, int link) {
   double sum = 0;
   int count = 0;
   for (const auto& [log, options] : parts) {
     const Recording& recording = input.recordings[log];
     const SmoothLog smooth(recording, options);
-    const auto *th = FindSignal(input.model, recording, SignalKind::kPosition, base), *al = FindSignal(input.model, recording, SignalKind::kPosition, link);
-    const std::vector<double> q = smooth.Sampled(th->values, 0), dq = smooth.Sampled(th->values, 1), a = smooth.Sampled(al->values, 0), da = smooth.Sampled(al->values, 1), u = smooth.GridOf(recording.commands.front().values, true);
+    const auto *th = FindSignal(input.model, recording, SignalKind::kPosition, base),
+               *al = FindSignal(input.model, recording, SignalKind::kPosition, link);
+    const std::vector<double> q = smooth.Sampled(th->values, 0), dq = smooth.Sampled(th->values, 1),
+                              a = smooth.Sampled(al->values, 0), da = smooth.Sampled(al->values, 1),
+                              u = smooth.GridOf(recording.commands.front().values, true);
     // Exact over a held command: exp of the augmented matrix.
     Eigen::Matrix<double, 5, 5> augmented = Eigen::Matrix<double, 5, 5>::Zero();
     augmented.topLeftCorner<4, 4>() = system.a * smooth.dt_s();
@@ -125,16 +135,22 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
   for (int j = 0; j < m.njnt; ++j) {
     if (j != base && m.jnt_stiffness[j] > 0) link = j;
   }
-  if (link < 0 || m.nv != 2) return Error{.what = "this state space is that of a flexible joint", .where = input.model.experiment().model_path, .allowed = "a driven joint and a joint with a spring, nothing else"};
-  // Of a speed's variance, as noise: what noise in the regressors can take off a coefficient, and so part of its interval.
+  if (link < 0 || m.nv != 2)
+    return Error{.what = "this state space is that of a flexible joint",
+                 .where = input.model.experiment().model_path,
+                 .allowed = "a driven joint and a joint with a spring, nothing else"};
+  // Of a speed's variance, as noise: what noise in the regressors can take off a coefficient, and so part of its
+  // interval.
   constexpr double kNoiseShare = 0.003;
-  options.cutoff_hz = std::min(QuietCutoff(input, base, 1, kNoiseShare, asked), QuietCutoff(input, link, 1, kNoiseShare, asked));
+  options.cutoff_hz =
+      std::min(QuietCutoff(input, base, 1, kNoiseShare, asked), QuietCutoff(input, link, 1, kNoiseShare, asked));
   // What is held out: the logs asked for, or the last of several, or the last 30 % of one.
   std::vector<std::pair<std::size_t, IdentifyOptions>> train, held_out;
   std::string how;
   std::vector<std::size_t> held = options.held_out;
   if (held.empty() && input.recordings.size() > 1) held = {input.recordings.size() - 1}, how = "held out: the last log";
-  for (std::size_t log = 0; log < input.recordings.size(); ++log) (std::find(held.begin(), held.end(), log) != held.end() ? held_out : train).emplace_back(log, options);
+  for (std::size_t log = 0; log < input.recordings.size(); ++log)
+    (std::find(held.begin(), held.end(), log) != held.end() ? held_out : train).emplace_back(log, options);
   if (input.recordings.size() == 1) {
     const double cut = 0.7 * input.recordings.front().duration_s();
     train.front().second.to_s = cut;
@@ -142,7 +158,8 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
     held_out.front().second.from_s = cut;
     how = "held out: the last 30 % of the log's time";
   }
-  if (train.empty()) return Error{.what = "every log is held out", .where = "--hold-out", .allowed = "at least one log to fit"};
+  if (train.empty())
+    return Error{.what = "every log is held out", .where = "--hold-out", .allowed = "at least one log to fit"};
   const System nominal = Nominal(input, base, link);
 
   Samples s;
@@ -150,18 +167,26 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
   for (const auto& [log, part] : train) {
     const Recording& recording = input.recordings[log];
     const SmoothLog smooth(recording, part);
-    const auto *th = FindSignal(input.model, recording, SignalKind::kPosition, base), *al = FindSignal(input.model, recording, SignalKind::kPosition, link);
+    const auto *th = FindSignal(input.model, recording, SignalKind::kPosition, base),
+               *al = FindSignal(input.model, recording, SignalKind::kPosition, link);
     if (!th || !al) return Error{.what = "the state needs both angles", .where = recording.log_path};
     dt = smooth.dt_s();
-    const std::vector<double> q = smooth.Sampled(th->values, 0), dq = smooth.Sampled(th->values, 1), ddq = smooth.Sampled(th->values, 2), a = smooth.Sampled(al->values, 0), da = smooth.Sampled(al->values, 1), dda = smooth.Sampled(al->values, 2),
+    const std::vector<double> q = smooth.Sampled(th->values, 0), dq = smooth.Sampled(th->values, 1),
+                              ddq = smooth.Sampled(th->values, 2), a = smooth.Sampled(al->values, 0),
+                              da = smooth.Sampled(al->values, 1), dda = smooth.Sampled(al->values, 2),
                               u = smooth.Held(recording.commands.front().values);
     for (std::size_t i = 0; i < q.size(); ++i) {
       if (!std::isfinite(ddq[i]) || !std::isfinite(dda[i]) || !std::isfinite(u[i])) continue;
-      s.th.push_back(q[i]), s.dth.push_back(dq[i]), s.ddth.push_back(ddq[i]), s.a.push_back(a[i]), s.da.push_back(da[i]), s.dda.push_back(dda[i]), s.u.push_back(u[i]);
+      s.th.push_back(q[i]), s.dth.push_back(dq[i]), s.ddth.push_back(ddq[i]), s.a.push_back(a[i]),
+          s.da.push_back(da[i]), s.dda.push_back(dda[i]), s.u.push_back(u[i]);
       s.time_s.push_back(smooth.time_s(i)), s.log.push_back(static_cast<int>(log));
     }
   }
-  if (s.u.size() < 100) return Error{.what = "too few rows to fit a state space", .where = input.recordings.front().log_path, .actual = std::to_string(s.u.size()), .allowed = "at least 100"};
+  if (s.u.size() < 100)
+    return Error{.what = "too few rows to fit a state space",
+                 .where = input.recordings.front().log_path,
+                 .actual = std::to_string(s.u.size()),
+                 .allowed = "at least 100"};
 
   // Unconstrained: each acceleration on everything.
   Rows first({"base angle", "base speed", "deflection", "deflection's speed", "command"}), second(first.columns());
@@ -193,8 +218,11 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
     logs[2 * k] = logs[2 * k + 1] = s.log[k];
     times[2 * k] = times[2 * k + 1] = s.time_s[k];
   }
-  const Coefficients center = (Coefficients() << nominal.a(1, 1), nominal.a(1, 2), nominal.a(1, 3), nominal.a(3, 2), nominal.a(3, 3), nominal.b[1]).finished();
-  // In units of the nominal values: all coefficients are one there. A nominal of zero (a link without damping) is only held to its sign, in units of the base's.
+  const Coefficients center = (Coefficients() << nominal.a(1, 1), nominal.a(1, 2), nominal.a(1, 3), nominal.a(3, 2),
+                               nominal.a(3, 3), nominal.b[1])
+                                  .finished();
+  // In units of the nominal values: all coefficients are one there. A nominal of zero (a link without damping) is only
+  // held to its sign, in units of the base's.
   Coefficients scale = center;
   for (int i = 0; i < kCoefficients; ++i) {
     if (std::abs(scale[i]) < 1e-9) scale[i] = (i == kA44 ? -1 : 1) * std::abs(center[kA22]);
@@ -253,29 +281,55 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
     solver.optimize(start, value);
   } catch (const nlopt::roundoff_limited&) {  // as near as doubles go
   } catch (const std::exception& e) {
-    return Error{.what = std::string("the quadratic program failed: ") + e.what(), .where = input.recordings.front().log_path};
+    return Error{.what = std::string("the quadratic program failed: ") + e.what(),
+                 .where = input.recordings.front().log_path};
   }
   Coefficients solution;
   for (int i = 0; i < kCoefficients; ++i) solution[i] = start[static_cast<std::size_t>(i)] * scale[i];
   const System constrained = FromCoefficients(solution);
 
-  Identification result{.method = "state-space", .relation = "th'' = A22 th' + A23 a + A24 a' + B2 u; a'' = -A22 th' + A43 a + A44 a' - B2 u", .unit = "rad/s^2", .rows = s.u.size()};
+  Identification result{.method = "state-space",
+                        .relation = "th'' = A22 th' + A23 a + A24 a' + B2 u; a'' = -A22 th' + A43 a + A44 a' - B2 u",
+                        .unit = "rad/s^2",
+                        .rows = s.u.size()};
   const Eigen::VectorXd residual = y - x * solution;
   const BlockCovariance blocks = CovarianceByBlocks(x, residual, logs, times, dt);
   static constexpr const char* kNames[] = {"A22", "A23", "A24", "A43", "A44", "B2"};
   static constexpr const char* kUnits[] = {"1/s", "1/s^2", "1/s", "1/s^2", "1/s", "rad/s^2 per command"};
   std::string bound;
   for (int i = 0; i < kCoefficients; ++i) {
-    const double half = blocks.quantile * std::sqrt(std::max(0.0, blocks.covariance(i, i))) + kNoiseShare * std::abs(solution[i]);
-    result.values.push_back({.name = kNames[i], .unit = kUnits[i], .value = solution[i], .low = solution[i] - half, .high = solution[i] + half});
+    const double half =
+        blocks.quantile * std::sqrt(std::max(0.0, blocks.covariance(i, i))) + kNoiseShare * std::abs(solution[i]);
+    result.values.push_back({.name = kNames[i],
+                             .unit = kUnits[i],
+                             .value = solution[i],
+                             .low = solution[i] - half,
+                             .high = solution[i] + half});
     const double z = solution[i] / scale[i];
-    if (z < lower[static_cast<std::size_t>(i)] + 1e-6 || z > upper[static_cast<std::size_t>(i)] - 1e-6) bound += (bound.empty() ? "" : ", ") + std::string(kNames[i]);
+    if (z < lower[static_cast<std::size_t>(i)] + 1e-6 || z > upper[static_cast<std::size_t>(i)] - 1e-6)
+      bound += (bound.empty() ? "" : ", ") + std::string(kNames[i]);
   }
   // A43 / A23 = -(1 + J_base / J_link): what is known of the inertias without a force.
-  result.values.push_back({.name = "base_over_link_inertia", .unit = "1", .value = -solution[kA43] / solution[kA23] - 1, .low = NAN, .high = NAN});
-  result.values.push_back({.name = "error_nominal", .unit = "1", .value = Score(nominal, input, held_out, base, link), .low = NAN, .high = NAN});
-  result.values.push_back({.name = "error_constrained", .unit = "1", .value = Score(constrained, input, held_out, base, link), .low = NAN, .high = NAN});
-  result.values.push_back({.name = "error_unconstrained", .unit = "1", .value = Score(unconstrained, input, held_out, base, link), .low = NAN, .high = NAN});
+  result.values.push_back({.name = "base_over_link_inertia",
+                           .unit = "1",
+                           .value = -solution[kA43] / solution[kA23] - 1,
+                           .low = NAN,
+                           .high = NAN});
+  result.values.push_back({.name = "error_nominal",
+                           .unit = "1",
+                           .value = Score(nominal, input, held_out, base, link),
+                           .low = NAN,
+                           .high = NAN});
+  result.values.push_back({.name = "error_constrained",
+                           .unit = "1",
+                           .value = Score(constrained, input, held_out, base, link),
+                           .low = NAN,
+                           .high = NAN});
+  result.values.push_back({.name = "error_unconstrained",
+                           .unit = "1",
+                           .value = Score(unconstrained, input, held_out, base, link),
+                           .low = NAN,
+                           .high = NAN});
   double misfit = 0, total = 0;
   for (Eigen::Index i = 0; i < 2 * n; ++i) misfit += residual[i] * residual[i], total += y[i] * y[i];
   result.r2 = 1 - misfit / total;

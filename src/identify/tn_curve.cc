@@ -1,4 +1,5 @@
-// The envelope of torque against speed: peak torque, the power that bounds it at speed, the speed without load. Source: "Motor System Identification", "TN curve".
+// The envelope of torque against speed: peak torque, the power that bounds it at speed, the speed without load. Source:
+// "Motor System Identification", "TN curve".
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -28,7 +29,8 @@ struct Curve {
 constexpr int kGrid = 60, kDraws = 200;
 constexpr double kGridStep = 0.6 / kGrid;
 
-// Peak and constant power by least absolute deviation of the envelope's logarithm over a grid from 0.4 of the largest torque and power to those: the corner is where they meet.
+// Peak and constant power by least absolute deviation of the envelope's logarithm over a grid from 0.4 of the largest
+// torque and power to those: the corner is where they meet.
 Curve FitCurve(const Envelope& envelope, double strongest, double power) {
   double best = INFINITY;
   Curve curve{.peak = strongest, .power = power};
@@ -42,14 +44,16 @@ Curve FitCurve(const Envelope& envelope, double strongest, double power) {
     for (int j = 0; j <= kGrid; ++j) {
       const double watts = std::log(power * (0.4 + kGridStep * j));
       double misfit = 0;
-      for (std::size_t k = 0; k < logs.size() && misfit < best; ++k) misfit += std::abs(std::min(peak, watts - speeds[k]) - logs[k]);
+      for (std::size_t k = 0; k < logs.size() && misfit < best; ++k)
+        misfit += std::abs(std::min(peak, watts - speeds[k]) - logs[k]);
       if (misfit < best) best = misfit, curve = {.peak = std::exp(peak), .power = std::exp(watts)};
     }
   }
   return curve;
 }
 
-// The same, and the speed at which the torque is gone: where the fastest bins fall short of the constant power they are the drive running out of voltage, a line to zero, and no part of the power.
+// The same, and the speed at which the torque is gone: where the fastest bins fall short of the constant power they are
+// the drive running out of voltage, a line to zero, and no part of the power.
 Curve FitWithNoLoad(Envelope envelope, double strongest, double power) {
   constexpr double kShort = 0.88;
   constexpr std::size_t kLeast = 2;
@@ -58,7 +62,9 @@ Curve FitWithNoLoad(Envelope envelope, double strongest, double power) {
   std::size_t kept = envelope.size();
   for (int round = 0; round < 4; ++round) {
     std::size_t first = envelope.size();
-    while (first > 0 && envelope[first - 1].second < kShort * std::min(curve.peak, curve.power / envelope[first - 1].first)) --first;
+    while (first > 0 &&
+           envelope[first - 1].second < kShort * std::min(curve.peak, curve.power / envelope[first - 1].first))
+      --first;
     if (first == kept || envelope.size() - first < kLeast || first < kLeast) break;
     kept = first;
     curve = FitCurve({envelope.begin(), envelope.begin() + static_cast<std::ptrdiff_t>(kept)}, strongest, power);
@@ -67,7 +73,8 @@ Curve FitWithNoLoad(Envelope envelope, double strongest, double power) {
   double w = 0, t = 0, ww = 0, wt = 0;
   const double n = static_cast<double>(envelope.size() - kept);
   for (std::size_t k = kept; k < envelope.size(); ++k) w += envelope[k].first / n, t += envelope[k].second / n;
-  for (std::size_t k = kept; k < envelope.size(); ++k) ww += std::pow(envelope[k].first - w, 2), wt += (envelope[k].first - w) * (envelope[k].second - t);
+  for (std::size_t k = kept; k < envelope.size(); ++k)
+    ww += std::pow(envelope[k].first - w, 2), wt += (envelope[k].first - w) * (envelope[k].second - t);
   if (ww > 0 && wt < 0) curve.no_load = w - t * ww / wt;
   return curve;
 }
@@ -82,26 +89,37 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   for (const Recording& recording : input.recordings) {
     const auto* torque = FindSignal(input.model, recording, SignalKind::kTorque, joint);
     const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
-    if (!torque || !angle) return Error{.what = "a torque-speed curve needs torque and angle", .where = recording.log_path, .cure = "a measured signal of 'kind: torque' in " + input.model.experiment().path};
+    if (!torque || !angle)
+      return Error{.what = "a torque-speed curve needs torque and angle",
+                   .where = recording.log_path,
+                   .cure = "a measured signal of 'kind: torque' in " + input.model.experiment().path};
     const SmoothLog smooth(recording, options);
     // Only the speed needs the low pass: it would round off the corners of what is to be seen.
-    const std::vector<double> t = smooth.GridOf(torque->values, false), q = smooth.GridOf(angle->values, false), w = smooth.Sampled(angle->values, 1);
+    const std::vector<double> t = smooth.GridOf(torque->values, false), q = smooth.GridOf(angle->values, false),
+                              w = smooth.Sampled(angle->values, 1);
     // What the drive was asked for, by the nominal model's own law, linear in command, angle and speed.
     std::vector<double> demand(smooth.size(), 0.0);
     for (std::size_t c = 0; c < recording.commands.size(); ++c) {
       const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, recording.commands[c].actuator.c_str());
-      if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint) continue;
+      if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint)
+        continue;
       const std::vector<double> u = smooth.GridOf(recording.commands[c].values, true);
       const mjtNum *gain = m.actuator_gainprm + mjNGAIN * actuator, *bias = m.actuator_biasprm + mjNBIAS * actuator;
-      for (std::size_t i = 0; i < smooth.size(); ++i) demand[i] += gain[0] * u[i] + bias[0] + bias[1] * q[i] + bias[2] * w[i];
+      for (std::size_t i = 0; i < smooth.size(); ++i)
+        demand[i] += gain[0] * u[i] + bias[0] + bias[1] * q[i] + bias[2] * w[i];
     }
     for (std::size_t i = 0; i < smooth.size(); ++i) {
       if (!std::isfinite(t[i]) || !std::isfinite(w[i]) || t[i] * w[i] < 0) continue;
-      samples.push_back({std::abs(w[i]), std::abs(t[i]), std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0});
+      samples.push_back(
+          {std::abs(w[i]), std::abs(t[i]), std::abs(demand[i]) > 1.15 * std::abs(t[i]) && demand[i] * t[i] > 0});
       limited += samples.back().limited ? 1 : 0;
     }
   }
-  if (samples.size() < 200) return Error{.what = "too few rows in which the drive pushes", .where = input.recordings.front().log_path, .actual = std::to_string(samples.size()), .allowed = "at least 200"};
+  if (samples.size() < 200)
+    return Error{.what = "too few rows in which the drive pushes",
+                 .where = input.recordings.front().log_path,
+                 .actual = std::to_string(samples.size()),
+                 .allowed = "at least 200"};
   double fastest = 0, strongest = 0, power = 0;
   for (const auto& s : samples) {
     fastest = std::max(fastest, s.speed);
@@ -109,9 +127,11 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     power = std::max(power, s.speed * s.torque);
   }
   const bool reaches = limited > samples.size() / 100;
-  // The envelope: the middle, in each bin of speed, of the rows where the drive was asked for more; where there are too few of those, near the top of all rows.
+  // The envelope: the middle, in each bin of speed, of the rows where the drive was asked for more; where there are too
+  // few of those, near the top of all rows.
   constexpr int kBins = 16;
-  PointTable table{.name = "envelope", .columns = {"speed_rad_per_s", "torque_n_m", "power_w", "rows", "limited_rows"}, .rows = {}};
+  PointTable table{
+      .name = "envelope", .columns = {"speed_rad_per_s", "torque_n_m", "power_w", "rows", "limited_rows"}, .rows = {}};
   Envelope envelope;
   for (int b = 0; b < kBins; ++b) {
     std::vector<double> torques, all;
@@ -124,14 +144,22 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     if (torques.size() < 10) continue;
     const double w = speed / static_cast<double>(torques.size()), top = Quantile(torques, reaches ? 0.5 : 0.99);
     envelope.emplace_back(w, top);
-    table.rows.push_back({w, top, w * top, static_cast<double>(all.size()), reaches ? static_cast<double>(torques.size()) : 0.0});
+    table.rows.push_back(
+        {w, top, w * top, static_cast<double>(all.size()), reaches ? static_cast<double>(torques.size()) : 0.0});
   }
-  Identification result{.method = "tn-curve", .relation = "|torque| <= min(peak, power / speed), envelope of the rows in which the drive pushes", .r2 = NAN, .rmse = NAN, .unit = "N m", .rows = samples.size()};
+  Identification result{
+      .method = "tn-curve",
+      .relation = "|torque| <= min(peak, power / speed), envelope of the rows in which the drive pushes",
+      .r2 = NAN,
+      .rmse = NAN,
+      .unit = "N m",
+      .rows = samples.size()};
   Curve curve{.peak = strongest, .power = power};
   std::vector<double> peaks, powers, no_loads;
   if (envelope.size() >= 3) {
     curve = FitWithNoLoad(envelope, strongest, power);
-    // Intervals: the same over bins drawn again (bootstrap percentiles; Efron and Tibshirani, "An Introduction to the Bootstrap", 1993), and a step of the grid.
+    // Intervals: the same over bins drawn again (bootstrap percentiles; Efron and Tibshirani, "An Introduction to the
+    // Bootstrap", 1993), and a step of the grid.
     std::mt19937 random(1);
     std::uniform_int_distribution<std::size_t> pick(0, envelope.size() - 1);
     for (int draw = 0; draw < kDraws; ++draw) {
@@ -144,9 +172,13 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
     }
   }
   const double peak = curve.peak, bound = curve.power;
-  const bool before = std::any_of(envelope.begin(), envelope.end(), [&](const auto& bin) { return bin.first * peak < 0.8 * bound; });
-  const bool beyond = std::any_of(envelope.begin(), envelope.end(), [&](const auto& bin) { return bin.first * peak > 1.2 * bound; });
-  const auto interval = [](const std::vector<double>& values, double step) { return std::pair{Quantile(values, 0.025) - step, Quantile(values, 0.975) + step}; };
+  const bool before =
+      std::any_of(envelope.begin(), envelope.end(), [&](const auto& bin) { return bin.first * peak < 0.8 * bound; });
+  const bool beyond =
+      std::any_of(envelope.begin(), envelope.end(), [&](const auto& bin) { return bin.first * peak > 1.2 * bound; });
+  const auto interval = [](const std::vector<double>& values, double step) {
+    return std::pair{Quantile(values, 0.025) - step, Quantile(values, 0.975) + step};
+  };
   const auto nothing = std::pair<double, double>{NAN, NAN};
   const auto [pl, ph] = before && !peaks.empty() ? interval(peaks, kGridStep * strongest) : nothing;
   const auto [wl, wh] = beyond && !powers.empty() ? interval(powers, kGridStep * power) : nothing;
@@ -154,15 +186,22 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   result.values.push_back({.name = "power", .unit = "W", .value = bound, .low = wl, .high = wh});
   result.values.push_back({.name = "corner_speed", .unit = "rad/s", .value = bound / peak, .low = NAN, .high = NAN});
   const auto [nl, nh] = std::isfinite(curve.no_load) && no_loads.size() > kDraws / 2 ? interval(no_loads, 0) : nothing;
-  if (std::isfinite(curve.no_load)) result.values.push_back({.name = "no_load_speed", .unit = "rad/s", .value = curve.no_load, .low = nl, .high = nh});
+  if (std::isfinite(curve.no_load))
+    result.values.push_back({.name = "no_load_speed", .unit = "rad/s", .value = curve.no_load, .low = nl, .high = nh});
   result.values.push_back({.name = "fastest", .unit = "rad/s", .value = fastest, .low = NAN, .high = NAN});
   if (options.rated_torque_n_m > 0 && options.rated_speed_rad_per_s > 0) {
     const double rated = options.rated_torque_n_m * options.rated_speed_rad_per_s;
     result.values.push_back({.name = "rated_power", .unit = "W", .value = rated, .low = NAN, .high = NAN});
     if (bound < rated) result.remarks.push_back("these logs never reach the rated power");
   }
-  if (!reaches) result.remarks.push_back("the drive was hardly ever asked for more than it gave: the envelope is how far the log went, not what the motor can do");
-  if (std::isnan(curve.no_load)) result.remarks.push_back("the torque never falls short of the constant power at high speed: the no-load speed lies beyond the fastest row");
+  if (!reaches)
+    result.remarks.push_back(
+        "the drive was hardly ever asked for more than it gave: the envelope is how far the log went, not what the "
+        "motor can do");
+  if (std::isnan(curve.no_load))
+    result.remarks.push_back(
+        "the torque never falls short of the constant power at high speed: the no-load speed lies beyond the fastest "
+        "row");
   if (std::isnan(wl)) result.remarks.push_back("no rows beyond the corner: the power is a lower bound");
   result.tables.push_back(std::move(table));
   return result;

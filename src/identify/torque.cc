@@ -18,9 +18,12 @@ Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, 
   const SmoothLog smooth(recording, options);
   const std::size_t rows = smooth.size();
   const auto measured = [&](int j) { return FindSignal(model, recording, SignalKind::kPosition, j); };
-  if (!measured(joint)) return Error{.what = "the log has no angle of '" + JointName(model, joint) + "'", .where = recording.log_path};
+  if (!measured(joint))
+    return Error{.what = "the log has no angle of '" + JointName(model, joint) + "'", .where = recording.log_path};
   if (rows < 4 * smooth.reach()) {
-    return Error{.what = "the log is too short for its low pass", .where = recording.log_path, .actual = std::to_string(static_cast<double>(rows) * smooth.dt_s()) + " s",
+    return Error{.what = "the log is too short for its low pass",
+                 .where = recording.log_path,
+                 .actual = std::to_string(static_cast<double>(rows) * smooth.dt_s()) + " s",
                  .cure = "raise --cutoff (now " + std::to_string(smooth.cutoff_hz()) + " Hz)"};
   }
   // Angle, speed, acceleration of every joint; one that is not logged is taken to rest at the initial pose.
@@ -49,7 +52,8 @@ Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, 
   const int dof = base.jnt_dofadr[joint], body = base.jnt_bodyid[joint];
   for (mjModel* m : {copy.get(), light.get()}) {
     ParameterWriter writer(model, m, data.get());
-    if (!writer.Write(input.values, recording.values)) return Error{.what = "the parameters make no model", .where = model.experiment().path};
+    if (!writer.Write(input.values, recording.values))
+      return Error{.what = "the parameters make no model", .where = model.experiment().path};
     m->dof_damping[dof] = 0;
     m->opt.disableflags |= mjDSBL_CONSTRAINT;  // no dry friction: that is what is sought
   }
@@ -63,11 +67,16 @@ Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, 
   Motion motion;
   motion.torque_logged = torque != nullptr;
   std::vector<double> logged = torque ? smooth.Sampled(torque->values, 0) : std::vector<double>();
-  // A servo's torque jumps with each new target and is logged just before: what moves the joint is the mean over the row, half a row's change of the target further.
+  // A servo's torque jumps with each new target and is logged just before: what moves the joint is the mean over the
+  // row, half a row's change of the target further.
   for (std::size_t c = 0; torque && c < recording.commands.size(); ++c) {
     const int actuator = mj_name2id(&base, mjOBJ_ACTUATOR, recording.commands[c].actuator.c_str());
-    if (actuator < 0 || base.actuator_plugin[actuator] >= 0 || base.actuator_trntype[actuator] != mjTRN_JOINT || base.actuator_trnid[2 * actuator] != joint) continue;
-    const std::vector<double> mean = smooth.Held(recording.commands[c].values, options.torque_delay_s), seen = smooth.OnGrid(smooth.HeldBefore(recording.commands[c].values, options.torque_delay_s), 0);
+    if (actuator < 0 || base.actuator_plugin[actuator] >= 0 || base.actuator_trntype[actuator] != mjTRN_JOINT ||
+        base.actuator_trnid[2 * actuator] != joint)
+      continue;
+    const std::vector<double> mean = smooth.Held(recording.commands[c].values, options.torque_delay_s),
+                              seen = smooth.OnGrid(
+                                  smooth.HeldBefore(recording.commands[c].values, options.torque_delay_s), 0);
     for (std::size_t i = 0; i < rows; ++i) logged[i] += base.actuator_gainprm[mjNGAIN * actuator] * (mean[i] - seen[i]);
   }
   motion.angle_rad = q[joint], motion.speed_rad_per_s = v[joint], motion.acceleration_rad_per_s2 = a[joint];
@@ -95,7 +104,8 @@ Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, 
       mj_fwdPosition(m, d);
       mj_fwdVelocity(m, d);
       mj_mulM(m, d, inertial.data(), acceleration.data());
-      (m == copy.get() ? motion.demand_n_m : motion.others_n_m)[i] = inertial[dof] + d->qfrc_bias[dof] - d->qfrc_passive[dof];
+      (m == copy.get() ? motion.demand_n_m : motion.others_n_m)[i] =
+          inertial[dof] + d->qfrc_bias[dof] - d->qfrc_passive[dof];
     }
     if (torque) {
       motion.drive_n_m[i] = logged[i];
@@ -109,7 +119,8 @@ Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, 
   return motion;
 }
 
-std::vector<char> Sliding(const std::vector<double>& speed, const std::vector<double>& quick, double least, std::size_t reach) {
+std::vector<char> Sliding(const std::vector<double>& speed, const std::vector<double>& quick, double least,
+                          std::size_t reach) {
   const std::size_t rows = speed.size();
   std::vector<char> sliding(rows, 0);
   for (std::size_t i = reach; i + reach < rows; ++i) {

@@ -43,7 +43,9 @@ std::vector<std::string> Words(const std::string& name) {
 }
 
 bool HasAny(const std::vector<std::string>& words, std::initializer_list<const char*> candidates) {
-  return std::any_of(words.begin(), words.end(), [&](const std::string& w) { return std::find(candidates.begin(), candidates.end(), w) != candidates.end(); });
+  return std::any_of(words.begin(), words.end(), [&](const std::string& w) {
+    return std::find(candidates.begin(), candidates.end(), w) != candidates.end();
+  });
 }
 
 // How much a name speaks of an element: the share of the element's words that the name holds.
@@ -52,8 +54,10 @@ double NameMatch(const std::string& name, const std::string& element) {
   if (wanted.empty()) return 0;
   double hits = 0;
   for (const auto& w : wanted) {
-    if (std::find(words.begin(), words.end(), w) != words.end()) hits += 1;
-    else if (Lower(name).find(w) != std::string::npos && w.size() > 2) hits += 0.8;
+    if (std::find(words.begin(), words.end(), w) != words.end())
+      hits += 1;
+    else if (Lower(name).find(w) != std::string::npos && w.size() > 2)
+      hits += 0.8;
   }
   return hits / static_cast<double>(wanted.size());
 }
@@ -65,21 +69,40 @@ Guess Classify(const Column& column, const std::string& time_column) {
     guess.role = Role::kTime;
     return guess;
   }
-  const bool velocity = HasAny(words, {"vel", "velocity", "speed", "dot", "dq", "qd", "qdot", "w", "omega", "rate", "dtheta"});
+  const bool velocity =
+      HasAny(words, {"vel", "velocity", "speed", "dot", "dq", "qd", "qdot", "w", "omega", "rate", "dtheta"});
   const bool torque = HasAny(words, {"torque", "tau", "effort", "trq"});
-  const bool command = HasAny(words, {"cmd", "command", "target", "des", "desired", "ref", "reference", "goal", "setpoint", "ctrl", "control", "action", "input", "u", "voltage", "sp", "feedforward"});
-  const bool position = HasAny(words, {"pos", "position", "angle", "q", "theta", "alpha", "rad", "deg", "encoder", "meas", "measured", "actual", "joint"});
-  if (command) guess.role = Role::kCommand;
-  else if (torque) guess.role = Role::kTorque;
-  else if (velocity) guess.role = Role::kVelocity;
-  else if (position) guess.role = Role::kPosition;
+  const bool command =
+      HasAny(words, {"cmd", "command", "target", "des", "desired", "ref", "reference", "goal", "setpoint", "ctrl",
+                     "control", "action", "input", "u", "voltage", "sp", "feedforward"});
+  const bool position = HasAny(words, {"pos", "position", "angle", "q", "theta", "alpha", "rad", "deg", "encoder",
+                                       "meas", "measured", "actual", "joint"});
+  if (command)
+    guess.role = Role::kCommand;
+  else if (torque)
+    guess.role = Role::kTorque;
+  else if (velocity)
+    guess.role = Role::kVelocity;
+  else if (position)
+    guess.role = Role::kPosition;
   // Units: as stated, by the name's last words, or by what is usual.
   if (const auto stated = ParseUnit(column.unit); !column.unit.empty() && stated.ok()) {
     guess.unit = column.unit;
     guess.unit_stated = true;
   } else {
-    for (const auto& [word, unit] : {std::pair{"deg", "deg"}, {"rpm", "rpm"}, {"rad", "rad"}, {"v", "V"}, {"mv", "mV"}, {"a", "A"}, {"ma", "mA"}, {"nm", "N m"}, {"volt", "V"}, {"volts", "V"}, {"voltage", "V"},
-                                     {"current", "A"}, {"amps", "A"}}) {
+    for (const auto& [word, unit] : {std::pair{"deg", "deg"},
+                                     {"rpm", "rpm"},
+                                     {"rad", "rad"},
+                                     {"v", "V"},
+                                     {"mv", "mV"},
+                                     {"a", "A"},
+                                     {"ma", "mA"},
+                                     {"nm", "N m"},
+                                     {"volt", "V"},
+                                     {"volts", "V"},
+                                     {"voltage", "V"},
+                                     {"current", "A"},
+                                     {"amps", "A"}}) {
       if (!HasAny(words, {word})) continue;
       guess.unit = unit;
       guess.unit_stated = true;
@@ -99,7 +122,8 @@ double Correlation(const std::vector<double>& a, const std::vector<double>& b) {
   ma /= n, mb /= n;
   double aa = 0, bb = 0, ab = 0;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-    if (std::isfinite(a[i]) && std::isfinite(b[i])) aa += (a[i] - ma) * (a[i] - ma), bb += (b[i] - mb) * (b[i] - mb), ab += (a[i] - ma) * (b[i] - mb);
+    if (std::isfinite(a[i]) && std::isfinite(b[i]))
+      aa += (a[i] - ma) * (a[i] - ma), bb += (b[i] - mb) * (b[i] - mb), ab += (a[i] - ma) * (b[i] - mb);
   }
   return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0;
 }
@@ -126,7 +150,9 @@ std::string Num(double value) {
 
 // Quoted where YAML needs it.
 std::string Quote(const std::string& text) {
-  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '/' || c == '-'; }) &&
+  const bool plain = !text.empty() &&
+                     std::all_of(text.begin(), text.end(),
+                                 [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '/' || c == '-'; }) &&
                      !std::isdigit(static_cast<unsigned char>(text[0])) && text[0] != '-';
   if (plain) return text;
   std::string out = "\"";
@@ -139,7 +165,8 @@ std::string Quote(const std::string& text) {
 
 class Drafter {
  public:
-  Drafter(const mjModel& model, const std::string& model_text, const Log& log, const Timeline& timeline) : m_(model), model_text_(model_text), timeline_(timeline) {
+  Drafter(const mjModel& model, const std::string& model_text, const Log& log, const Timeline& timeline)
+      : m_(model), model_text_(model_text), timeline_(timeline) {
     for (const Column& column : log.columns) {
       guesses_.push_back(Classify(column, timeline.time_column));
       if (Spread(column.values) == 0) guesses_.back().used = true;  // a constant column says nothing
@@ -148,12 +175,15 @@ class Drafter {
 
   Result<Draft> Write() {
     yaml_ = "# Drafted by `gapscope init`. Check every line marked \"unsure\", then: gapscope replay THIS_FILE LOG\n";
-    yaml_ += "schema: gapscope.experiment/1\nmodel: " + Quote(model_text_) + "\nlog:\n  time: {column: " + Quote(timeline_.time_column) + ", unit: " + timeline_.time_unit + "}  # median step " +
-             Num(timeline_.median_step_s) + " s\n";
+    yaml_ += "schema: gapscope.experiment/1\nmodel: " + Quote(model_text_) +
+             "\nlog:\n  time: {column: " + Quote(timeline_.time_column) + ", unit: " + timeline_.time_unit +
+             "}  # median step " + Num(timeline_.median_step_s) + " s\n";
     std::string measured = WriteMeasured();
     if (measured.empty()) {
-      return Error{.what = "no column of the log pairs with a joint of the model", .where = model_text_,
-                   .cure = "name a column after its joint (\"" + JointName(0) + "_rad\"), or write the experiment file by hand (docs/experiment.md)"};
+      return Error{.what = "no column of the log pairs with a joint of the model",
+                   .where = model_text_,
+                   .cure = "name a column after its joint (\"" + JointName(0) +
+                           "_rad\"), or write the experiment file by hand (docs/experiment.md)"};
     }
     yaml_ += "commands:\n" + WriteCommands() + "measured:\n" + measured;
     WriteParameters();
@@ -166,7 +196,9 @@ class Drafter {
     const char* name = mj_id2name(&m_, mjOBJ_JOINT, joint);
     return name ? name : "";
   }
-  bool IsScalar(int joint) const { return (m_.jnt_type[joint] == mjJNT_HINGE || m_.jnt_type[joint] == mjJNT_SLIDE) && !JointName(joint).empty(); }
+  bool IsScalar(int joint) const {
+    return (m_.jnt_type[joint] == mjJNT_HINGE || m_.jnt_type[joint] == mjJNT_SLIDE) && !JointName(joint).empty();
+  }
 
   std::string Unsure(const std::string& text) {
     unsure_.push_back(text);
@@ -206,11 +238,14 @@ class Drafter {
     const bool any = std::string(usual) == "1";
     if (known && (any || stated.value().si == ParseUnit(usual).value().si)) return guess.unit;
     const bool degrees = std::string(usual) == "rad" && Spread(guess.column->values) > 13;
-    *doubt += std::string(doubt->empty() ? "" : "; ") + (known ? "unit '" + guess.unit + "' of '" + guess.column->name + "' does not fit" : "unit of '" + guess.column->name + "' is not stated");
+    *doubt += std::string(doubt->empty() ? "" : "; ") +
+              (known ? "unit '" + guess.unit + "' of '" + guess.column->name + "' does not fit"
+                     : "unit of '" + guess.column->name + "' is not stated");
     return degrees ? "deg" : usual;
   }
 
-  // The velocity column of each joint: the best pair of a column and a joint's derivative first, whatever the joints' order; a name that fits decides.
+  // The velocity column of each joint: the best pair of a column and a joint's derivative first, whatever the joints'
+  // order; a name that fits decides.
   std::vector<Guess*> PairVelocities(std::vector<bool>* by_correlation) {
     constexpr double kFollows = 0.3;
     std::vector<Guess*> speeds(m_.njnt, nullptr);
@@ -225,7 +260,8 @@ class Drafter {
         for (Guess& guess : guesses_) {
           if (guess.used || guess.role != Role::kVelocity) continue;
           const double follows = std::abs(Correlation(guess.column->values, slope));
-          const double match = follows + (follows > kFollows && NameMatch(guess.column->name, JointName(j)) >= 0.99 ? 1 : 0);
+          const double match =
+              follows + (follows > kFollows && NameMatch(guess.column->name, JointName(j)) >= 0.99 ? 1 : 0);
           if (match > score) best = &guess, joint = j, score = match;
         }
       }
@@ -257,16 +293,20 @@ class Drafter {
         if (pass == 0 && !certain) continue;
         if (!found && pass == 1) {
           for (Guess& guess : guesses_) {
-            if (!guess.used && (guess.role == Role::kPosition || guess.role == Role::kUnknown) && !found) found = &guess;
+            if (!guess.used && (guess.role == Role::kPosition || guess.role == Role::kUnknown) && !found)
+              found = &guess;
           }
         }
         if (!found) continue;
         found->used = true;
         positions_[j] = found->column;
-        std::string doubt = certain ? "" : "'" + found->column->name + "' is taken for the position of joint '" + JointName(j) + "'";
+        std::string doubt =
+            certain ? "" : "'" + found->column->name + "' is taken for the position of joint '" + JointName(j) + "'";
         const bool slide = m_.jnt_type[j] == mjJNT_SLIDE;
         const std::string unit = UnitOf(*found, slide ? "m" : "rad", &doubt);
-        text += "  - {signal: " + Quote(JointName(j)) + ", column: " + Quote(found->column->name) + ", joint: " + Quote(JointName(j)) + ", unit: " + unit + "}" + (doubt.empty() ? "" : Unsure(doubt)) + "\n";
+        text += "  - {signal: " + Quote(JointName(j)) + ", column: " + Quote(found->column->name) +
+                ", joint: " + Quote(JointName(j)) + ", unit: " + unit + "}" + (doubt.empty() ? "" : Unsure(doubt)) +
+                "\n";
       }
     }
     std::vector<bool> by_correlation;
@@ -274,10 +314,13 @@ class Drafter {
     for (int j = 0; j < m_.njnt; ++j) {
       if (!speeds[j]) continue;
       Guess* speed = speeds[j];
-      std::string doubt = by_correlation[j] ? "" : "'" + speed->column->name + "' does not follow the derivative of '" + positions_[j]->name + "'";
+      std::string doubt = by_correlation[j] ? ""
+                                            : "'" + speed->column->name + "' does not follow the derivative of '" +
+                                                  positions_[j]->name + "'";
       const std::string unit = UnitOf(*speed, m_.jnt_type[j] == mjJNT_SLIDE ? "m/s" : "rad/s", &doubt);
-      text += "  - {signal: " + Quote(JointName(j) + "_speed") + ", kind: velocity, column: " + Quote(speed->column->name) + ", joint: " + Quote(JointName(j)) + ", unit: " + unit + ", optional: true, score: false}" +
-              (doubt.empty() ? "" : Unsure(doubt)) + "\n";
+      text += "  - {signal: " + Quote(JointName(j) + "_speed") +
+              ", kind: velocity, column: " + Quote(speed->column->name) + ", joint: " + Quote(JointName(j)) +
+              ", unit: " + unit + ", optional: true, score: false}" + (doubt.empty() ? "" : Unsure(doubt)) + "\n";
     }
     for (int a = 0; a < m_.nactuator; ++a) {
       const char* name = mj_id2name(&m_, mjOBJ_ACTUATOR, a);
@@ -285,9 +328,12 @@ class Drafter {
       Guess* torque = name ? BestByName(Role::kTorque, name, &certain) : nullptr;
       if (!torque) continue;
       torque->used = true;
-      std::string doubt = certain ? "" : "'" + torque->column->name + "' is taken for the torque of actuator '" + name + "'";
-      text += "  - {signal: " + Quote(std::string(name) + "_torque") + ", kind: torque, column: " + Quote(torque->column->name) + ", actuator: " + Quote(name) + ", unit: " + UnitOf(*torque, "N m", &doubt) +
-              ", optional: true, score: false}" + (doubt.empty() ? "" : Unsure(doubt)) + "\n";
+      std::string doubt =
+          certain ? "" : "'" + torque->column->name + "' is taken for the torque of actuator '" + name + "'";
+      text += "  - {signal: " + Quote(std::string(name) + "_torque") +
+              ", kind: torque, column: " + Quote(torque->column->name) + ", actuator: " + Quote(name) +
+              ", unit: " + UnitOf(*torque, "N m", &doubt) + ", optional: true, score: false}" +
+              (doubt.empty() ? "" : Unsure(doubt)) + "\n";
     }
     return text;
   }
@@ -305,16 +351,20 @@ class Drafter {
         if (Guess* by_joint = BestByName(Role::kCommand, JointName(joint), &certain)) found = by_joint;
       }
       if (!certain && servo && joint >= 0 && positions_[joint]) {
-        if (Guess* follows = BestByCorrelation(Role::kCommand, positions_[joint]->values)) found = follows, certain = true;
+        if (Guess* follows = BestByCorrelation(Role::kCommand, positions_[joint]->values))
+          found = follows, certain = true;
       }
       if (!found) {
-        text += "  - {actuator: " + Quote(name) + ", default: \"0\"}" + Unsure("no column looks like the command of actuator '" + std::string(name) + "': it gets 0") + "\n";
+        text += "  - {actuator: " + Quote(name) + ", default: \"0\"}" +
+                Unsure("no column looks like the command of actuator '" + std::string(name) + "': it gets 0") + "\n";
         continue;
       }
       found->used = true;
-      std::string doubt = certain ? "" : "'" + found->column->name + "' is taken for the command of actuator '" + name + "'";
+      std::string doubt =
+          certain ? "" : "'" + found->column->name + "' is taken for the command of actuator '" + name + "'";
       const std::string unit = servo ? UnitOf(*found, "rad", &doubt) : UnitOf(*found, "1", &doubt);
-      text += "  - {actuator: " + Quote(name) + ", column: " + Quote(found->column->name) + ", unit: " + Quote(unit) + "}" + (doubt.empty() ? "" : Unsure(doubt)) + "\n";
+      text += "  - {actuator: " + Quote(name) + ", column: " + Quote(found->column->name) + ", unit: " + Quote(unit) +
+              "}" + (doubt.empty() ? "" : Unsure(doubt)) + "\n";
     }
     return text;
   }
@@ -322,7 +372,8 @@ class Drafter {
   // A name that expressions can use, and no other parameter has.
   std::string ParameterName(std::string name) {
     for (char& c : name) {
-      const bool good = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
+      const bool good =
+          (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
       if (!good) c = '_';
     }
     if (name.empty() || name[0] == '.' || (name[0] >= '0' && name[0] <= '9')) name.insert(0, "_");
@@ -330,9 +381,11 @@ class Drafter {
     return name;
   }
 
-  void Propose(const std::string& element, const std::string& unit, double nominal, double low, double high, const std::string& field, const std::string& comment) {
+  void Propose(const std::string& element, const std::string& unit, double nominal, double low, double high,
+               const std::string& field, const std::string& comment) {
     const std::string name = ParameterName(element);
-    parameters_ += "  " + Quote(name) + ": {unit: " + Quote(unit) + ", nominal: " + Num(nominal) + ", bounds: [" + Num(low) + ", " + Num(high) + "]}" + (comment.empty() ? "" : "  # " + comment) + "\n";
+    parameters_ += "  " + Quote(name) + ": {unit: " + Quote(unit) + ", nominal: " + Num(nominal) + ", bounds: [" +
+                   Num(low) + ", " + Num(high) + "]}" + (comment.empty() ? "" : "  # " + comment) + "\n";
     set_ += "  " + Quote(field) + ": " + Quote(name) + "\n";
   }
 
@@ -344,18 +397,27 @@ class Drafter {
       const double inertia = m_.dof_M0[dof], damping = m_.dof_damping[dof];
       // Without a value to start from: a damping that stops the joint within about ten seconds.
       const double scale = damping > 0 ? damping : 0.1 * inertia;
-      Propose(name + ".damping", unit + " s/rad", damping, 0, 20 * scale, "joint/" + name + "/damping", damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia");
-      Propose(name + ".armature", "kg m^2", m_.dof_armature[dof], 0, std::max(5 * m_.dof_armature[dof], inertia), "joint/" + name + "/armature", "");
-      if (m_.jnt_stiffness[j] > 0) Propose(name + ".stiffness", unit + "/rad", m_.jnt_stiffness[j], 0.2 * m_.jnt_stiffness[j], 5 * m_.jnt_stiffness[j], "joint/" + name + "/stiffness", "");
-      if (m_.dof_frictionloss[dof] > 0) Propose(name + ".frictionloss", unit, m_.dof_frictionloss[dof], 0, 10 * m_.dof_frictionloss[dof], "joint/" + name + "/frictionloss", "");
+      Propose(name + ".damping", unit + " s/rad", damping, 0, 20 * scale, "joint/" + name + "/damping",
+              damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia");
+      Propose(name + ".armature", "kg m^2", m_.dof_armature[dof], 0, std::max(5 * m_.dof_armature[dof], inertia),
+              "joint/" + name + "/armature", "");
+      if (m_.jnt_stiffness[j] > 0)
+        Propose(name + ".stiffness", unit + "/rad", m_.jnt_stiffness[j], 0.2 * m_.jnt_stiffness[j],
+                5 * m_.jnt_stiffness[j], "joint/" + name + "/stiffness", "");
+      if (m_.dof_frictionloss[dof] > 0)
+        Propose(name + ".frictionloss", unit, m_.dof_frictionloss[dof], 0, 10 * m_.dof_frictionloss[dof],
+                "joint/" + name + "/frictionloss", "");
     }
     for (int a = 0; a < m_.nactuator; ++a) {
       const char* name = mj_id2name(&m_, mjOBJ_ACTUATOR, a);
       if (!name || m_.actuator_plugin[a] >= 0 || m_.actuator_gaintype[a] != mjGAIN_FIXED) continue;
-      const double gain = m_.actuator_gainprm[a * mjNGAIN], b1 = m_.actuator_biasprm[a * mjNBIAS + 1], b2 = m_.actuator_biasprm[a * mjNBIAS + 2];
+      const double gain = m_.actuator_gainprm[a * mjNGAIN], b1 = m_.actuator_biasprm[a * mjNBIAS + 1],
+                   b2 = m_.actuator_biasprm[a * mjNBIAS + 2];
       const std::string base = name, field = "actuator/" + base;
-      if (gain > 0 && b1 == -gain) Propose(base + ".kp", "N m/rad", gain, 0.5 * gain, 2 * gain, field + "/kp", "");
-      else if (gain > 0) Propose(base + ".gain", "N m per unit of command", gain, 0.5 * gain, 2 * gain, field + "/gain", "");
+      if (gain > 0 && b1 == -gain)
+        Propose(base + ".kp", "N m/rad", gain, 0.5 * gain, 2 * gain, field + "/kp", "");
+      else if (gain > 0)
+        Propose(base + ".gain", "N m per unit of command", gain, 0.5 * gain, 2 * gain, field + "/gain", "");
       if (b2 < 0) Propose(base + ".kv", "N m s/rad", -b2, -0.3 * b2, -3 * b2, field + "/kv", "");
     }
     if (!parameters_.empty()) yaml_ += "parameters:\n" + parameters_ + "set:\n" + set_;
@@ -373,7 +435,8 @@ class Drafter {
 
 }  // namespace
 
-Result<Draft> DraftExperiment(const std::string& model_path, const std::string& model_text, const Log& log, const Timeline& timeline) {
+Result<Draft> DraftExperiment(const std::string& model_path, const std::string& model_text, const Log& log,
+                              const Timeline& timeline) {
   char message[1024] = "";
   const ModelPtr model(mj_loadXML(model_path.c_str(), nullptr, message, sizeof message));
   if (!model) {

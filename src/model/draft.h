@@ -15,9 +15,11 @@ struct Draft {
   std::vector<std::string> unsure;  // one sentence per guess that the user should check; they stand in the file too
 };
 
-// `model_text` is what the file says for the model's path. Pairs columns with joints and actuators by name first, then by correlation; proposes
-// parameters with bounds. Errors: the MJCF does not load, it has no hinge or slide joint, no column pairs with any joint.
-Result<Draft> DraftExperiment(const std::string& model_path, const std::string& model_text, const Log& log, const Timeline& timeline);
+// `model_text` is what the file says for the model's path. Pairs columns with joints and actuators by name first, then
+// by correlation; proposes parameters with bounds. Errors: the MJCF does not load, it has no hinge or slide joint, no
+// column pairs with any joint.
+Result<Draft> DraftExperiment(const std::string& model_path, const std::string& model_text, const Log& log,
+                              const Timeline& timeline);
 
 }  // namespace gapscope
 

@@ -21,15 +21,24 @@ const std::vector<Effect>& Catalogue() {
 
 double ScaleOf(ScaleKind kind, const Scales& s) {
   switch (kind) {
-    case ScaleKind::kOne: return 1;
-    case ScaleKind::kTorque: return s.torque_n_m;
-    case ScaleKind::kAngle: return s.angle_rad;
-    case ScaleKind::kSpeed: return s.speed_rad_per_s;
-    case ScaleKind::kStiffness: return s.torque_n_m / s.angle_rad;
-    case ScaleKind::kDrag: return s.torque_n_m / (s.speed_rad_per_s * s.speed_rad_per_s);
-    case ScaleKind::kPower: return s.torque_n_m * s.speed_rad_per_s;
-    case ScaleKind::kCommand: return s.command;
-    case ScaleKind::kCubic: return s.torque_n_m / (s.angle_rad * s.angle_rad * s.angle_rad);
+    case ScaleKind::kOne:
+      return 1;
+    case ScaleKind::kTorque:
+      return s.torque_n_m;
+    case ScaleKind::kAngle:
+      return s.angle_rad;
+    case ScaleKind::kSpeed:
+      return s.speed_rad_per_s;
+    case ScaleKind::kStiffness:
+      return s.torque_n_m / s.angle_rad;
+    case ScaleKind::kDrag:
+      return s.torque_n_m / (s.speed_rad_per_s * s.speed_rad_per_s);
+    case ScaleKind::kPower:
+      return s.torque_n_m * s.speed_rad_per_s;
+    case ScaleKind::kCommand:
+      return s.command;
+    case ScaleKind::kCubic:
+      return s.torque_n_m / (s.angle_rad * s.angle_rad * s.angle_rad);
   }
   return 1;
 }
@@ -93,7 +102,10 @@ Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& struc
   }
   if (std::find(names.begin(), names.end(), name) == names.end()) {
     const std::string nearest = Nearest(name, names);
-    return Error{.what = "unknown effect", .where = "--with " + text, .actual = "'" + name + "'", .allowed = Join(names),
+    return Error{.what = "unknown effect",
+                 .where = "--with " + text,
+                 .actual = "'" + name + "'",
+                 .allowed = Join(names),
                  .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
   }
   if (places.empty()) {
@@ -101,7 +113,10 @@ Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& struc
   }
   if (at == std::string::npos) return EffectUse{name, places.front()};
   if (std::find(places.begin(), places.end(), on) == places.end()) {
-    return Error{.what = "the effect '" + name + "' cannot act there", .where = "--with " + text, .actual = "'" + on + "'", .allowed = Join(places)};
+    return Error{.what = "the effect '" + name + "' cannot act there",
+                 .where = "--with " + text,
+                 .actual = "'" + on + "'",
+                 .allowed = Join(places)};
   }
   return EffectUse{name, on};
 }
@@ -124,7 +139,8 @@ const Effect& EffectOf(const EffectUse& use, const Structure& structure) {
   return Catalogue().front();
 }
 
-std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure, const ScaleTable& table) {
+std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure,
+                                              const ScaleTable& table) {
   const Effect& effect = EffectOf(use, structure);
   const Scales scales = ScalesAt(use.on, structure, table);
   std::vector<PlacedParameter> placed;
@@ -138,8 +154,14 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Struct
       unit = electric ? command : "N m";
       if (!electric) scale = scales.torque_n_m;
     }
-    PlacedParameter out{.name = use.Text() + "." + key, .key = key, .unit = unit, .neutral = p.neutral * scale, .low = p.low * scale, .high = p.high * scale,
-                        .start = p.start * scale, .shape = p.shape};
+    PlacedParameter out{.name = use.Text() + "." + key,
+                        .key = key,
+                        .unit = unit,
+                        .neutral = p.neutral * scale,
+                        .low = p.low * scale,
+                        .high = p.high * scale,
+                        .start = p.start * scale,
+                        .shape = p.shape};
     if (p.voltage_only && structure.CommandUnit(use.on) != "V") out.low = out.high = out.start = out.neutral;
     for (const double trial : p.trials) out.trials.push_back(trial * scale);
     placed.push_back(std::move(out));
@@ -154,13 +176,29 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
   for (const auto& p : PlacedParameters(use, structure, table)) {
     names.push_back(p.name);
     const Parameter::With with = effect.parameters[names.size() - 1].with;
-    structure.AddParameter({.name = p.name, .unit = p.unit, .doc = effect.meaning, .nominal = p.neutral, .low = p.low, .high = p.high, .frozen = false, .with = with,
+    structure.AddParameter({.name = p.name,
+                            .unit = p.unit,
+                            .doc = effect.meaning,
+                            .nominal = p.neutral,
+                            .low = p.low,
+                            .high = p.high,
+                            .frozen = false,
+                            .with = with,
                             .size = with == Parameter::With::kNone ? "" : names.front()});
   }
-  for (const auto& [suffix, value, unit] : {std::tuple{".torque_n_m", scales.torque_n_m, "N m"}, std::tuple{".inertia_kg_m2", scales.inertia_kg_m2, "kg m^2"}}) {
+  for (const auto& [suffix, value, unit] : {std::tuple{".torque_n_m", scales.torque_n_m, "N m"},
+                                            std::tuple{".inertia_kg_m2", scales.inertia_kg_m2, "kg m^2"}}) {
     const std::string name = "scale@" + use.on + suffix;
-    const auto known = std::find_if(structure.parameters.begin(), structure.parameters.end(), [&](const Parameter& q) { return q.name == name; });
-    if (known == structure.parameters.end()) structure.AddParameter({.name = name, .unit = unit, .doc = "the rig's own size", .nominal = value, .low = value, .high = value, .frozen = true});
+    const auto known = std::find_if(structure.parameters.begin(), structure.parameters.end(),
+                                    [&](const Parameter& q) { return q.name == name; });
+    if (known == structure.parameters.end())
+      structure.AddParameter({.name = name,
+                              .unit = unit,
+                              .doc = "the rig's own size",
+                              .nominal = value,
+                              .low = value,
+                              .high = value,
+                              .frozen = true});
   }
   return effect.apply(structure, use.on, names);
 }

@@ -1,5 +1,5 @@
-// The catalogue of effects that a model may lack. One file per effect under src/model/effects/ states its parameters and how it enters a model;
-// adding a file there adds the effect everywhere. Meaning and names: docs/effects.md.
+// The catalogue of effects that a model may lack. One file per effect under src/model/effects/ states its parameters
+// and how it enters a model; adding a file there adds the effect everywhere. Meaning and names: docs/effects.md.
 #ifndef GAPSCOPE_MODEL_EFFECT_H_
 #define GAPSCOPE_MODEL_EFFECT_H_
 
@@ -17,22 +17,23 @@ class Structure;
 
 // What an effect acts on: `on` in results and in `--with EFFECT@ON`.
 enum class EffectPlace {
-  kMotor,         // an actuator
-  kServo,         // an actuator with position feedback
-  kJoint,         // any hinge or slide joint
-  kDrivenJoint,   // a joint with an actuator
-  kSpringJoint,   // a joint that has a spring in the base model
-  kSignal,        // a measured signal
+  kMotor,        // an actuator
+  kServo,        // an actuator with position feedback
+  kJoint,        // any hinge or slide joint
+  kDrivenJoint,  // a joint with an actuator
+  kSpringJoint,  // a joint that has a spring in the base model
+  kSignal,       // a measured signal
 };
 
-// A rig's own size, so that one catalogue serves all rigs: bounds and trial values of effect parameters are multiples of these.
+// A rig's own size, so that one catalogue serves all rigs: bounds and trial values of effect parameters are multiples
+// of these.
 struct Scales {
-  double torque_n_m = 1;         // largest torque on the joint in the logs
-  double angle_rad = 1;          // largest excursion
-  double speed_rad_per_s = 1;    // largest speed
-  double sample_s = 0.002;       // median sample time
-  double command = 1;            // largest command, in its unit
-  double inertia_kg_m2 = 1;      // of the joint's driven inertia, at the initial pose
+  double torque_n_m = 1;       // largest torque on the joint in the logs
+  double angle_rad = 1;        // largest excursion
+  double speed_rad_per_s = 1;  // largest speed
+  double sample_s = 0.002;     // median sample time
+  double command = 1;          // largest command, in its unit
+  double inertia_kg_m2 = 1;    // of the joint's driven inertia, at the initial pose
 };
 
 // How a parameter scales with the rig.
@@ -40,14 +41,14 @@ enum class ScaleKind { kOne, kTorque, kAngle, kSpeed, kStiffness, kDrag, kPower,
 double ScaleOf(ScaleKind kind, const Scales& scales);
 
 struct EffectParameter {
-  std::string key, unit;      // "stiffness_n_m_per_rad", "N m/rad"
+  std::string key, unit;  // "stiffness_n_m_per_rad", "N m/rad"
   ScaleKind scale = ScaleKind::kOne;
-  double neutral = 0;         // the effect does nothing here; in multiples of the scale, like all below
+  double neutral = 0;  // the effect does nothing here; in multiples of the scale, like all below
   double low = 0, high = 0;
-  std::vector<double> trials; // values to screen with; empty: a shape parameter that stays at `start`
-  double start = 0;           // where a fit starts when nothing better is known
-  bool shape = false;         // simpler models have a fixed value for it: does not count as a parameter
-  bool voltage_only = false;  // acts on a voltage drive; else fixed at neutral
+  std::vector<double> trials;  // values to screen with; empty: a shape parameter that stays at `start`
+  double start = 0;            // where a fit starts when nothing better is known
+  bool shape = false;          // simpler models have a fixed value for it: does not count as a parameter
+  bool voltage_only = false;   // acts on a voltage drive; else fixed at neutral
   Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
 };
 
@@ -55,9 +56,9 @@ struct Effect {
   std::string name;
   EffectPlace place;
   std::vector<EffectParameter> parameters;
-  std::string meaning;    // one line for the user
-  std::string signature;  // how it shows in a log
-  std::string told_apart; // what separates it from its partners
+  std::string meaning;     // one line for the user
+  std::string signature;   // how it shows in a log
+  std::string told_apart;  // what separates it from its partners
   std::vector<std::string> partners;
   // Enters the effect in the structure; parameter i has the name `names[i]`.
   Status (*apply)(Structure& structure, const std::string& on, const std::vector<std::string>& names);
@@ -76,7 +77,8 @@ struct EffectUse {
 // Scales by joint and by actuator.
 using ScaleTable = std::map<std::string, Scales>;
 
-// "cable_spring@arm" or "cable_spring" (then on the first place where it makes sense). Errors: unknown effect, unknown place, with what is allowed.
+// "cable_spring@arm" or "cable_spring" (then on the first place where it makes sense). Errors: unknown effect, unknown
+// place, with what is allowed.
 Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& structure);
 // Every effect on every place where it makes sense.
 std::vector<EffectUse> AllUses(const Structure& structure);
@@ -90,7 +92,8 @@ struct PlacedParameter {
   bool shape = false;
   std::vector<double> trials;
 };
-std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure, const ScaleTable& scales);
+std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure,
+                                              const ScaleTable& scales);
 
 }  // namespace gapscope
 

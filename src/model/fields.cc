@@ -55,14 +55,16 @@ std::ptrdiff_t OffsetOf(const mjModel& model, const mjtNum* number) {
 
 Field ArrayAt(const mjModel& model, const ArrayField& array, int id) {
   Field field{.components = {}, .derived = array.derived};
-  for (int i = 0; i < array.count; ++i) field.components.push_back({{.offset = OffsetOf(model, array.array(model) + id * array.stride + i)}});
+  for (int i = 0; i < array.count; ++i)
+    field.components.push_back({{.offset = OffsetOf(model, array.array(model) + id * array.stride + i)}});
   return field;
 }
 
 Field Single(const mjModel& model, std::initializer_list<std::pair<const mjtNum*, double>> slots) {
   Field field;
   field.components.emplace_back();
-  for (const auto& [number, factor] : slots) field.components[0].push_back({.offset = OffsetOf(model, number), .factor = factor});
+  for (const auto& [number, factor] : slots)
+    field.components[0].push_back({.offset = OffsetOf(model, number), .factor = factor});
   return field;
 }
 
@@ -74,11 +76,16 @@ std::vector<std::string> NamesOf(const mjModel& model, mjtObj type, int count) {
   return names;
 }
 
-Error Unknown(const std::string& what, const std::string& name, const std::vector<std::string>& names, const std::string& where) {
+Error Unknown(const std::string& what, const std::string& name, const std::vector<std::string>& names,
+              const std::string& where) {
   std::string all;
   for (const auto& n : names) all += (all.empty() ? "" : ", ") + n;
   const std::string nearest = Nearest(name, names);
-  return Error{.what = what, .where = where, .actual = "'" + name + "'", .allowed = all, .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+  return Error{.what = what,
+               .where = where,
+               .actual = "'" + name + "'",
+               .allowed = all,
+               .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
 }
 
 template <class Map>
@@ -88,13 +95,15 @@ std::vector<std::string> Keys(const Map& map) {
   return keys;
 }
 
-// kp, kv, gain, bias0..2 of an actuator, wherever they stand: in a native actuator's prm, or in the numerics of a gapscope.motor instance.
+// kp, kv, gain, bias0..2 of an actuator, wherever they stand: in a native actuator's prm, or in the numerics of a
+// gapscope.motor instance.
 Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, const std::string& where) {
   const mjtNum* gain = m.actuator_gainprm + id * mjNGAIN;
   const mjtNum* bias = m.actuator_biasprm + id * mjNBIAS;
   // The element's own, plugin or not.
   if (field == "forcerange" || field == "ctrlrange") {
-    const mjtNum* range = field == "ctrlrange" ? m.actuator_ctrlrange + 2 * m.actuator_ctrladr[id] : m.actuator_forcerange + 2 * m.actuator_outadr[id];
+    const mjtNum* range = field == "ctrlrange" ? m.actuator_ctrlrange + 2 * m.actuator_ctrladr[id]
+                                               : m.actuator_forcerange + 2 * m.actuator_outadr[id];
     Field result;
     for (int i = 0; i < 2; ++i) result.components.push_back({{.offset = OffsetOf(m, range + i)}});
     return result;
@@ -106,7 +115,8 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
       return n < 0 ? nullptr : m.numeric_data + m.numeric_adr[n];
     };
     // A converted native actuator has the affine law.
-    if (const mjtNum *g = numeric("gain"), *b1 = numeric("bias1"), *b2 = numeric("bias2"), *b0 = numeric("bias0"); g && b0 && b1 && b2) {
+    if (const mjtNum *g = numeric("gain"), *b1 = numeric("bias1"), *b2 = numeric("bias2"), *b0 = numeric("bias0");
+        g && b0 && b1 && b2) {
       if (field == "kp") return Single(m, {{g, 1}, {b1, -1}});
       if (field == "kv") return Single(m, {{b2, -1}});
       if (field == "gain") return Single(m, {{g, 1}});
@@ -115,7 +125,10 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
       if (field == "bias2") return Single(m, {{b2, 1}});
     }
     if (const mjtNum* value = numeric(field)) return Single(m, {{value, 1}});
-    return Error{.what = "the plugin actuator has no live parameter", .where = where, .actual = "'" + field + "'", .allowed = "a <numeric name=\"INSTANCE." + field + "\"> in the MJCF",
+    return Error{.what = "the plugin actuator has no live parameter",
+                 .where = where,
+                 .actual = "'" + field + "'",
+                 .allowed = "a <numeric name=\"INSTANCE." + field + "\"> in the MJCF",
                  .cure = "add it, or write numeric/NAME"};
   }
   if (field == "kp") return Single(m, {{gain, 1}, {bias + 1, -1}});
@@ -124,7 +137,8 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
   if (field == "bias0" || field == "bias1" || field == "bias2") return Single(m, {{bias + (field[4] - '0'), 1}});
   if (field == "gear") return Single(m, {{m.actuator_gear + m.actuator_outadr[id] * 6, 1}});
   if (field == "delay") return Single(m, {{m.actuator_delay + id, 1}});
-  return Unknown("unknown field of an actuator", field, {"kp", "kv", "gain", "bias0", "bias1", "bias2", "gear", "delay", "forcerange", "ctrlrange"}, where);
+  return Unknown("unknown field of an actuator", field,
+                 {"kp", "kv", "gain", "bias0", "bias1", "bias2", "gear", "delay", "forcerange", "ctrlrange"}, where);
 }
 
 }  // namespace
@@ -133,7 +147,10 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
   const std::size_t first = text.find('/'), last = text.rfind('/');
   const std::string kind = text.substr(0, first);
   if (first == std::string::npos || kind.empty() || first + 1 == text.size()) {
-    return Error{.what = "not a field", .where = where, .actual = "'" + text + "'", .allowed = "KIND/NAME/FIELD, numeric/NAME or option/gravity"};
+    return Error{.what = "not a field",
+                 .where = where,
+                 .actual = "'" + text + "'",
+                 .allowed = "KIND/NAME/FIELD, numeric/NAME or option/gravity"};
   }
   const std::string name = text.substr(first + 1, last > first ? last - first - 1 : std::string::npos);
   const std::string field = last > first ? text.substr(last + 1) : "";
@@ -147,39 +164,50 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
   }
   if (kind == "numeric") {
     const int id = mj_name2id(&m, mjOBJ_NUMERIC, name.c_str());
-    if (id < 0 || !field.empty()) return Unknown("no such numeric in the MJCF", text.substr(first + 1), NamesOf(m, mjOBJ_NUMERIC, static_cast<int>(m.nnumeric)), where);
+    if (id < 0 || !field.empty())
+      return Unknown("no such numeric in the MJCF", text.substr(first + 1),
+                     NamesOf(m, mjOBJ_NUMERIC, static_cast<int>(m.nnumeric)), where);
     Field result;
-    for (int i = 0; i < m.numeric_size[id]; ++i) result.components.push_back({{.offset = OffsetOf(m, m.numeric_data + m.numeric_adr[id] + i)}});
+    for (int i = 0; i < m.numeric_size[id]; ++i)
+      result.components.push_back({{.offset = OffsetOf(m, m.numeric_data + m.numeric_adr[id] + i)}});
     return result;
   }
   if (kind == "joint") {
     const int id = mj_name2id(&m, mjOBJ_JOINT, name.c_str());
-    if (id < 0) return Unknown("no such joint in the MJCF", name, NamesOf(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), where);
+    if (id < 0)
+      return Unknown("no such joint in the MJCF", name, NamesOf(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), where);
     if (m.jnt_type[id] != mjJNT_HINGE && m.jnt_type[id] != mjJNT_SLIDE) {
       return Error{.what = "the joint '" + name + "' is neither hinge nor slide", .where = where};
     }
     if (field == "springref") return Single(m, {{m.qpos_spring + m.jnt_qposadr[id], 1}});
-    if (const auto found = JointFields().find(field); found != JointFields().end()) return ArrayAt(m, found->second, id);
-    if (const auto found = DofFields().find(field); found != DofFields().end()) return ArrayAt(m, found->second, m.jnt_dofadr[id]);
+    if (const auto found = JointFields().find(field); found != JointFields().end())
+      return ArrayAt(m, found->second, id);
+    if (const auto found = DofFields().find(field); found != DofFields().end())
+      return ArrayAt(m, found->second, m.jnt_dofadr[id]);
     std::vector<std::string> names = Keys(DofFields());
     names.insert(names.end(), {"stiffness", "springref"});
     return Unknown("unknown field of a joint", field, names, where);
   }
   if (kind == "body") {
     const int id = mj_name2id(&m, mjOBJ_BODY, name.c_str());
-    if (id < 0) return Unknown("no such body in the MJCF", name, NamesOf(m, mjOBJ_BODY, static_cast<int>(m.nbody)), where);
+    if (id < 0)
+      return Unknown("no such body in the MJCF", name, NamesOf(m, mjOBJ_BODY, static_cast<int>(m.nbody)), where);
     if (const auto found = BodyFields().find(field); found != BodyFields().end()) return ArrayAt(m, found->second, id);
     return Unknown("unknown field of a body", field, Keys(BodyFields()), where);
   }
   if (kind == "tendon") {
     const int id = mj_name2id(&m, mjOBJ_TENDON, name.c_str());
-    if (id < 0) return Unknown("no such tendon in the MJCF", name, NamesOf(m, mjOBJ_TENDON, static_cast<int>(m.ntendon)), where);
-    if (const auto found = TendonFields().find(field); found != TendonFields().end()) return ArrayAt(m, found->second, id);
+    if (id < 0)
+      return Unknown("no such tendon in the MJCF", name, NamesOf(m, mjOBJ_TENDON, static_cast<int>(m.ntendon)), where);
+    if (const auto found = TendonFields().find(field); found != TendonFields().end())
+      return ArrayAt(m, found->second, id);
     return Unknown("unknown field of a tendon", field, Keys(TendonFields()), where);
   }
   if (kind == "actuator") {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, name.c_str());
-    if (id < 0) return Unknown("no such actuator in the MJCF", name, NamesOf(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), where);
+    if (id < 0)
+      return Unknown("no such actuator in the MJCF", name, NamesOf(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)),
+                     where);
     return ActuatorField(m, id, field, where);
   }
   return Unknown("unknown kind of field", kind, {"joint", "body", "actuator", "tendon", "numeric", "option"}, where);

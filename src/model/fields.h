@@ -1,4 +1,5 @@
-// Fields of a compiled model by name: "joint/arm/damping". A field is resolved once on the compiled model and written in any copy of it.
+// Fields of a compiled model by name: "joint/arm/damping". A field is resolved once on the compiled model and written
+// in any copy of it.
 #ifndef GAPSCOPE_MODEL_FIELDS_H_
 #define GAPSCOPE_MODEL_FIELDS_H_
 
@@ -24,8 +25,9 @@ struct Field {
   bool derived = false;                            // MuJoCo's derived constants depend on it (mj_setConst)
 };
 
-// Resolves KIND/NAME/FIELD; the fields are listed in docs/experiment.md. `where` is for errors: unknown kind, no such element (with the nearest
-// name), unknown field (with the nearest one), a native actuator's gain on a plugin actuator without such a stage.
+// Resolves KIND/NAME/FIELD; the fields are listed in docs/experiment.md. `where` is for errors: unknown kind, no such
+// element (with the nearest name), unknown field (with the nearest one), a native actuator's gain on a plugin actuator
+// without such a stage.
 Result<Field> ResolveField(const mjModel& model, const std::string& field, const std::string& where);
 
 // Writes one component.

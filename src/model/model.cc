@@ -17,7 +17,8 @@ std::string OneLine(std::string text) {
 
 // MuJoCo reports what it cannot refuse otherwise through mju_error, which by default ends the process.
 [[noreturn]] void ThrowMujocoError(const char* message) { throw std::runtime_error(message); }
-// What MuJoCo warns about (a state that blows up) is an outcome of a replay; by default it would write MUJOCO_LOG.TXT into the user's folder.
+// What MuJoCo warns about (a state that blows up) is an outcome of a replay; by default it would write MUJOCO_LOG.TXT
+// into the user's folder.
 void DropMujocoWarning(const char*) {}
 
 std::vector<std::string> NamesOf(const std::vector<Parameter>& parameters, const Experiment& experiment) {
@@ -43,11 +44,16 @@ std::vector<std::string> ElementNames(const mjModel& m, mjtObj type, int count) 
   return names;
 }
 
-Error NoElement(const std::string& what, const std::string& name, const std::vector<std::string>& names, const std::string& file) {
+Error NoElement(const std::string& what, const std::string& name, const std::vector<std::string>& names,
+                const std::string& file) {
   std::string all;
   for (const auto& n : names) all += (all.empty() ? "" : ", ") + n;
   const std::string nearest = Nearest(name, names);
-  return Error{.what = what, .where = file, .actual = "'" + name + "'", .allowed = all, .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+  return Error{.what = what,
+               .where = file,
+               .actual = "'" + name + "'",
+               .allowed = all,
+               .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
 }
 
 }  // namespace
@@ -69,7 +75,8 @@ double DrivenInertia(const mjModel& m, int joint) {
   return m.dof_armature[m.jnt_dofadr[joint]] + mju_dot3(axis, product) + m.body_mass[body] * mju_dot3(cross, cross);
 }
 
-Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, const std::vector<EffectUse>& effects, const ScaleTable& scales) {
+Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, const std::vector<EffectUse>& effects,
+                                                  const ScaleTable& scales) {
   mju_user_error = ThrowMujocoError;
   mju_user_warning = DropMujocoWarning;
   std::shared_ptr<Model> model(new Model);
@@ -83,10 +90,14 @@ Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, 
   try {
     model->compiled_.reset(mj_compile(structure.spec.get(), nullptr));
     if (!model->compiled_) {
-      return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(structure.spec.get())), .where = experiment.model_path};
+      return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(structure.spec.get())),
+                   .where = experiment.model_path};
     }
     if (!(model->compiled_->opt.timestep > 0)) {
-      return Error{.what = "the MJCF's time step is not positive", .where = experiment.model_path, .actual = std::to_string(model->compiled_->opt.timestep), .cure = "write <option timestep=\"0.002\"/>"};
+      return Error{.what = "the MJCF's time step is not positive",
+                   .where = experiment.model_path,
+                   .actual = std::to_string(model->compiled_->opt.timestep),
+                   .cure = "write <option timestep=\"0.002\"/>"};
     }
     const DataPtr probe(mj_makeData(model->compiled_.get()));  // runs the plugins' own checks
     if (!probe) return Error{.what = "the model cannot be simulated", .where = experiment.model_path};
@@ -99,8 +110,10 @@ Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, 
     const std::string where = setting.where == "effect" ? "effect field " + setting.field : setting.where;
     GS_ASSIGN(Field field, ResolveField(*model->compiled_, setting.field, where));
     if (field.components.size() != setting.expressions.size()) {
-      return Error{.what = "the field '" + setting.field + "' has " + std::to_string(field.components.size()) + " numbers", .where = where,
-                   .actual = std::to_string(setting.expressions.size()) + " expressions"};
+      return Error{
+          .what = "the field '" + setting.field + "' has " + std::to_string(field.components.size()) + " numbers",
+          .where = where,
+          .actual = std::to_string(setting.expressions.size()) + " expressions"};
     }
     for (const auto& text : setting.expressions) {
       if (const auto parsed = Expression::Parse(text, names, ones.data(), where); !parsed.ok()) return parsed.error();
@@ -109,14 +122,16 @@ Result<std::shared_ptr<const Model>> Model::Build(const Experiment& experiment, 
   }
   const mjModel& m = *model->compiled_;
   for (const auto& split : structure.splits) {
-    const int load = mj_name2id(&m, mjOBJ_JOINT, split.joint.c_str()), motor = mj_name2id(&m, mjOBJ_JOINT, structure.motor_joint.at(split.joint).c_str());
+    const int load = mj_name2id(&m, mjOBJ_JOINT, split.joint.c_str()),
+              motor = mj_name2id(&m, mjOBJ_JOINT, structure.motor_joint.at(split.joint).c_str());
     model->splits_.push_back({load, motor, split.share});
     model->mirrored_.emplace_back(motor, load);
   }
   if (!structure.command_delay.empty()) model->command_delay_ = model->IndexOf(structure.command_delay);
   GS_RETURN_IF_ERROR(model->ResolveNames());
   for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
-    if (const auto found = structure.signal_delay.find(experiment.measured[i].signal); found != structure.signal_delay.end()) {
+    if (const auto found = structure.signal_delay.find(experiment.measured[i].signal);
+        found != structure.signal_delay.end()) {
       model->sources_[i].delay = model->IndexOf(found->second);
     }
   }
@@ -129,23 +144,31 @@ Status Model::ResolveNames() {
   const std::string& file = experiment_.path;
   for (const auto& command : experiment_.commands) {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
-    if (id < 0) return NoElement("a command drives an actuator that the MJCF lacks", command.actuator, ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
+    if (id < 0)
+      return NoElement("a command drives an actuator that the MJCF lacks", command.actuator,
+                       ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
     command_ctrl_.push_back(m.actuator_ctrladr[id]);
   }
   for (const auto& measured : experiment_.measured) {
     SignalSource source{.kind = measured.kind};
     if (measured.kind == SignalKind::kTorque) {
       source.actuator = mj_name2id(&m, mjOBJ_ACTUATOR, measured.on.c_str());
-      if (source.actuator < 0) return NoElement("a measured torque is of an actuator that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
+      if (source.actuator < 0)
+        return NoElement("a measured torque is of an actuator that the MJCF lacks", measured.on,
+                         ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
       if (m.actuator_trntype[source.actuator] == mjTRN_JOINT) source.joint = m.actuator_trnid[2 * source.actuator];
       source.estimate = EstimateAddress(m, source.actuator);
     } else {
       source.joint = mj_name2id(&m, mjOBJ_JOINT, measured.on.c_str());
-      if (source.joint < 0) return NoElement("a measured signal is of a joint that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), file);
+      if (source.joint < 0)
+        return NoElement("a measured signal is of a joint that the MJCF lacks", measured.on,
+                         ElementNames(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), file);
     }
     if (source.joint >= 0) {
       if (m.jnt_type[source.joint] != mjJNT_HINGE && m.jnt_type[source.joint] != mjJNT_SLIDE) {
-        return Error{.what = "the joint of signal '" + measured.signal + "' is neither hinge nor slide", .where = file, .allowed = "hinge, slide"};
+        return Error{.what = "the joint of signal '" + measured.signal + "' is neither hinge nor slide",
+                     .where = file,
+                     .allowed = "hinge, slide"};
       }
       source.qpos = m.jnt_qposadr[source.joint];
       source.dof = m.jnt_dofadr[source.joint];
@@ -190,7 +213,8 @@ Result<std::vector<EffectUse>> Model::ParseEffects(const std::vector<std::string
   std::vector<EffectUse> uses;
   for (const auto& text : texts) {
     GS_ASSIGN(EffectUse use, ParseEffectUse(text, structure));
-    if (std::find(uses.begin(), uses.end(), use) != uses.end()) return Error{.what = "the effect stands twice", .where = "--with " + text};
+    if (std::find(uses.begin(), uses.end(), use) != uses.end())
+      return Error{.what = "the effect stands twice", .where = "--with " + text};
     uses.push_back(std::move(use));
   }
   return uses;
@@ -211,7 +235,8 @@ Result<std::vector<PlacedParameter>> Model::EffectParameters(const EffectUse& us
   return PlacedParameters(use, structure, scales);
 }
 
-Result<std::string> Model::ToXml(std::span<const double> values, const std::map<std::string, double>& log_values, const ScaleTable& scales) const {
+Result<std::string> Model::ToXml(std::span<const double> values, const std::map<std::string, double>& log_values,
+                                 const ScaleTable& scales) const {
   // Built anew: what the host does itself during a replay must stand in the exported model.
   GS_ASSIGN(Structure structure, Structure::Load(experiment_));
   structure.for_export = true;
@@ -221,18 +246,23 @@ Result<std::string> Model::ToXml(std::span<const double> values, const std::map<
   exported->experiment_ = experiment_;
   exported->parameters_ = structure.parameters;
   exported->compiled_.reset(mj_compile(structure.spec.get(), nullptr));
-  if (!exported->compiled_) return Error{.what = "the tuned model does not compile: " + OneLine(mjs_getError(structure.spec.get())), .where = experiment_.model_path};
+  if (!exported->compiled_)
+    return Error{.what = "the tuned model does not compile: " + OneLine(mjs_getError(structure.spec.get())),
+                 .where = experiment_.model_path};
   for (auto& setting : structure.settings) {
     GS_ASSIGN(Field field, ResolveField(*exported->compiled_, setting.field, setting.where));
     exported->settings_.push_back({setting.where, setting.expressions, std::move(field)});
   }
   const mjModel& m = *exported->compiled_;
   for (const auto& split : structure.splits) {
-    exported->splits_.push_back({mj_name2id(&m, mjOBJ_JOINT, split.joint.c_str()), mj_name2id(&m, mjOBJ_JOINT, structure.motor_joint.at(split.joint).c_str()), split.share});
+    exported->splits_.push_back({mj_name2id(&m, mjOBJ_JOINT, split.joint.c_str()),
+                                 mj_name2id(&m, mjOBJ_JOINT, structure.motor_joint.at(split.joint).c_str()),
+                                 split.share});
   }
   const DataPtr data(mj_makeData(&m));
   ParameterWriter writer(*exported, exported->compiled_.get(), data.get());
-  if (!writer.Write(values, log_values)) return Error{.what = "the tuned model has a parameter that is not finite", .where = experiment_.model_path};
+  if (!writer.Write(values, log_values))
+    return Error{.what = "the tuned model has a parameter that is not finite", .where = experiment_.model_path};
   mj_copyBack(structure.spec.get(), exported->compiled_.get());
   std::string xml(1 << 20, '\0');
   char message[512] = "";
@@ -243,7 +273,8 @@ Result<std::string> Model::ToXml(std::span<const double> values, const std::map<
   return xml;
 }
 
-Result<ModelPtr> Model::CompileForDrawing(std::span<const double> values, const std::map<std::string, double>& log_values) const {
+Result<ModelPtr> Model::CompileForDrawing(std::span<const double> values,
+                                          const std::map<std::string, double>& log_values) const {
   const ModelPtr written(mj_copyModel(nullptr, compiled_.get()));
   const DataPtr data(mj_makeData(written.get()));
   ParameterWriter(*this, written.get(), data.get()).Write(values, log_values);
@@ -257,7 +288,9 @@ Result<ModelPtr> Model::CompileForDrawing(std::span<const double> values, const 
   } catch (const std::exception& e) {
     return Error{.what = "MuJoCo refuses to draw the model: " + OneLine(e.what()), .where = experiment_.model_path};
   }
-  if (!drawn) return Error{.what = "the MJCF does not compile with what it draws: " + OneLine(mjs_getError(structure.spec.get())), .where = experiment_.model_path};
+  if (!drawn)
+    return Error{.what = "the MJCF does not compile with what it draws: " + OneLine(mjs_getError(structure.spec.get())),
+                 .where = experiment_.model_path};
   GS_CHECK(drawn->nbody == written->nbody && drawn->njnt == written->njnt && drawn->nq == written->nq);
   std::copy_n(written->body_pos, 3 * written->nbody, drawn->body_pos);
   std::copy_n(written->body_quat, 4 * written->nbody, drawn->body_quat);
@@ -266,17 +299,20 @@ Result<ModelPtr> Model::CompileForDrawing(std::span<const double> values, const 
   return drawn;
 }
 
-ParameterWriter::ParameterWriter(const Model& model, mjModel* target, mjData* data) : model_(model), target_(target), data_(data) {
+ParameterWriter::ParameterWriter(const Model& model, mjModel* target, mjData* data)
+    : model_(model), target_(target), data_(data) {
   const std::vector<std::string> names = NamesOf(model.parameters_, model.experiment_);
   for (const auto& value : model.experiment_.values) log_names_.push_back(value.name);
   variables_.assign(names.size(), 1.0);
   for (const auto& setting : model.settings_) {
     Bound bound{.expressions = {}, .field = &setting.field};
-    for (const auto& text : setting.expressions) bound.expressions.push_back(Expression::Parse(text, names, variables_.data(), setting.where).value());
+    for (const auto& text : setting.expressions)
+      bound.expressions.push_back(Expression::Parse(text, names, variables_.data(), setting.where).value());
     bound_.push_back(std::move(bound));
   }
   for (const auto& split : model.splits_) {
-    splits_.push_back({split.load_joint, split.motor_joint, Expression::Parse(split.share, names, variables_.data(), "split").value()});
+    splits_.push_back({split.load_joint, split.motor_joint,
+                       Expression::Parse(split.share, names, variables_.data(), "split").value()});
   }
 }
 
@@ -314,7 +350,8 @@ void ParameterWriter::WriteSplits() {
     const int load = target_->jnt_dofadr[split.load_joint], motor = target_->jnt_dofadr[split.motor_joint];
     // The settings wrote the load's own armature anew, or never touch it: start from the compiled value in that case.
     const bool written = std::any_of(bound_.begin(), bound_.end(), [&](const Bound& b) {
-      const auto offset = reinterpret_cast<const char*>(target_->dof_armature + load) - static_cast<const char*>(target_->buffer);
+      const auto offset =
+          reinterpret_cast<const char*>(target_->dof_armature + load) - static_cast<const char*>(target_->buffer);
       return b.field->components[0][0].offset == offset && !b.field->components[0][0].in_options;
     });
     if (!written) target_->dof_armature[load] = model_.compiled_->dof_armature[load];

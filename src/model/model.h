@@ -1,5 +1,5 @@
-// A compiled model whose parameters have names. Compiled once per structure (the base MJCF and a set of effects), shared and const; each worker
-// copies it and writes parameters into its copy through a ParameterWriter.
+// A compiled model whose parameters have names. Compiled once per structure (the base MJCF and a set of effects),
+// shared and const; each worker copies it and writes parameters into its copy through a ParameterWriter.
 #ifndef GAPSCOPE_MODEL_MODEL_H_
 #define GAPSCOPE_MODEL_MODEL_H_
 
@@ -21,10 +21,10 @@ namespace gapscope {
 struct SignalSource {
   SignalKind kind = SignalKind::kPosition;
   int joint = -1, qpos = -1, dof = -1;
-  int actuator = -1;   // torque: of this actuator's joint
-  int estimate = -1;   // torque: address in plugin_state of a gapscope.motor's own estimate; -1: qfrc_actuator of `dof`
-  int offset = -1;     // parameter that is added to the prediction
-  int delay = -1;      // parameter: how late the signal is logged
+  int actuator = -1;  // torque: of this actuator's joint
+  int estimate = -1;  // torque: address in plugin_state of a gapscope.motor's own estimate; -1: qfrc_actuator of `dof`
+  int offset = -1;    // parameter that is added to the prediction
+  int delay = -1;     // parameter: how late the signal is logged
   int cutoff = -1, damping_ratio = -1;  // parameters of the low-pass between mechanism and log
 };
 
@@ -36,9 +36,10 @@ struct SplitJoint {
 
 class Model {
  public:
-  // Errors: the MJCF does not load or compile (with its own message), a name in the experiment that the MJCF lacks (file:line and the nearest), an
-  // effect that makes no sense here, an expression that does not parse.
-  static Result<std::shared_ptr<const Model>> Build(const Experiment& experiment, const std::vector<EffectUse>& effects = {},
+  // Errors: the MJCF does not load or compile (with its own message), a name in the experiment that the MJCF lacks
+  // (file:line and the nearest), an effect that makes no sense here, an expression that does not parse.
+  static Result<std::shared_ptr<const Model>> Build(const Experiment& experiment,
+                                                    const std::vector<EffectUse>& effects = {},
                                                     const ScaleTable& scales = {});
 
   const mjModel& compiled() const { return *compiled_; }
@@ -52,7 +53,9 @@ class Model {
   std::vector<double> Nominal() const;
 
   const std::vector<int>& command_actuators() const { return command_ctrl_; }  // ctrl address per experiment command
-  const SignalSource& source(std::size_t measured) const { return sources_[measured]; }  // by index in experiment.measured
+  const SignalSource& source(std::size_t measured) const {
+    return sources_[measured];
+  }  // by index in experiment.measured
   const std::vector<SignalSource>& sources() const { return sources_; }
   int command_delay() const { return command_delay_; }  // parameter, or -1
   // {joint, joint that it starts with}: unmeasured joints that an effect added.
@@ -66,12 +69,15 @@ class Model {
   // The parameters that an effect would add.
   Result<std::vector<PlacedParameter>> EffectParameters(const EffectUse& use, const ScaleTable& scales) const;
 
-  // The tuned MJCF with its plugin elements: loads in any MuJoCo with the plugin library. `values` as Nominal(), `log_values` of one log.
-  Result<std::string> ToXml(std::span<const double> values, const std::map<std::string, double>& log_values, const ScaleTable& scales) const;
+  // The tuned MJCF with its plugin elements: loads in any MuJoCo with the plugin library. `values` as Nominal(),
+  // `log_values` of one log.
+  Result<std::string> ToXml(std::span<const double> values, const std::map<std::string, double>& log_values,
+                            const ScaleTable& scales) const;
 
-  // The same structure with everything that is only drawn, which compiled() leaves out; bodies stand where `values` put them. qpos means the same in
-  // both. Error: the MJCF does not compile with its pictures (a missing texture, say).
-  Result<ModelPtr> CompileForDrawing(std::span<const double> values, const std::map<std::string, double>& log_values) const;
+  // The same structure with everything that is only drawn, which compiled() leaves out; bodies stand where `values` put
+  // them. qpos means the same in both. Error: the MJCF does not compile with its pictures (a missing texture, say).
+  Result<ModelPtr> CompileForDrawing(std::span<const double> values,
+                                     const std::map<std::string, double>& log_values) const;
 
  private:
   friend class ParameterWriter;
@@ -104,12 +110,14 @@ class Model {
 // Writes parameter values into one copy of a model. Not thread-safe: one per worker.
 class ParameterWriter {
  public:
-  // `target` must be a copy of model.compiled() and outlive the writer, as must `model`; `data` is scratch for MuJoCo's derived constants.
+  // `target` must be a copy of model.compiled() and outlive the writer, as must `model`; `data` is scratch for MuJoCo's
+  // derived constants.
   ParameterWriter(const Model& model, mjModel* target, mjData* data);
   ParameterWriter(const ParameterWriter&) = delete;
   ParameterWriter& operator=(const ParameterWriter&) = delete;
 
-  // Writes all settings. Returns false, having written what it could, when an expression is not finite or a mass or inertia is negative.
+  // Writes all settings. Returns false, having written what it could, when an expression is not finite or a mass or
+  // inertia is negative.
   bool Write(std::span<const double> values, const std::map<std::string, double>& log_values);
 
  private:
@@ -128,7 +136,8 @@ class ParameterWriter {
   std::vector<SplitJoint> splits_;
 };
 
-// Inertia of the joint's own body (without its children) about the joint's axis, with the armature of the joint; kg m^2.
+// Inertia of the joint's own body (without its children) about the joint's axis, with the armature of the joint; kg
+// m^2.
 double DrivenInertia(const mjModel& model, int joint);
 
 }  // namespace gapscope

@@ -11,8 +11,8 @@
 namespace gapscope {
 namespace {
 
-constexpr double kTinyFriction = 1e-9;   // keeps the solver's friction row alive at zero friction
-constexpr double kTinyInertia = 1e-9;    // of the motor side's body before its armature is written
+constexpr double kTinyFriction = 1e-9;  // keeps the solver's friction row alive at zero friction
+constexpr double kTinyInertia = 1e-9;   // of the motor side's body before its armature is written
 constexpr const char* kMaxDelay_s = "0.13";
 constexpr double kGapTimeConstant_s = 0.004;  // how stiff the flanks of a gap are
 
@@ -34,7 +34,8 @@ std::string TextOf(double value) {
 void Combine(Structure::Terms& terms, const std::string& key, const std::string& expression) {
   auto [entry, added] = terms.emplace(key, expression);
   if (added) return;
-  entry->second = key == "torque_limit_n_m" || key == "power_w" ? "min(" + entry->second + "," + expression + ")" : entry->second + "+(" + expression + ")";
+  entry->second = key == "torque_limit_n_m" || key == "power_w" ? "min(" + entry->second + "," + expression + ")"
+                                                                : entry->second + "+(" + expression + ")";
 }
 
 void AddText(mjSpec* spec, const std::string& name, const std::string& value) {
@@ -43,8 +44,10 @@ void AddText(mjSpec* spec, const std::string& name, const std::string& value) {
   mjs_setString(text->data, value.c_str());
 }
 
-// A plugin instance of that name. Its attributes stand in custom texts: mjSpec's attribute map is a C++ object that crosses no library boundary.
-void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& instance, const std::map<std::string, std::string>& attributes) {
+// A plugin instance of that name. Its attributes stand in custom texts: mjSpec's attribute map is a C++ object that
+// crosses no library boundary.
+void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& instance,
+                 const std::map<std::string, std::string>& attributes) {
   mjs_activatePlugin(spec, plugin.c_str());
   mjsPlugin* element = mjs_addPlugin(spec);
   mjs_setName(element->element, instance.c_str());
@@ -188,9 +191,12 @@ Status Structure::AddFrictionTerm(const std::string& joint, const std::string& k
 
 Status Structure::AddSpringTerm(const std::string& joint, const std::string& key, const std::string& expression) {
   if (!FindJoint(joint)) return NoSuch("joint", joint, Joints());
-  // Two springs on one joint keep their own rest angle: a sum of terms about zero does not exist, so the second gets its own instance.
+  // Two springs on one joint keep their own rest angle: a sum of terms about zero does not exist, so the second gets
+  // its own instance.
   if (spring_[joint].contains(key)) {
-    return Error{.what = "the joint '" + joint + "' has two effects that set '" + key + "'", .allowed = "one", .cure = "drop one of them"};
+    return Error{.what = "the joint '" + joint + "' has two effects that set '" + key + "'",
+                 .allowed = "one",
+                 .cure = "drop one of them"};
   }
   spring_[joint][key] = expression;
   return Ok();
@@ -200,7 +206,8 @@ Status Structure::AddSplit(Split split) {
   if (!FindJoint(split.joint)) return NoSuch("joint", split.joint, Joints());
   for (const auto& other : splits) {
     if (other.joint == split.joint) {
-      return Error{.what = "the joint '" + split.joint + "' is split twice", .allowed = "backlash or joint_compliance, not both"};
+      return Error{.what = "the joint '" + split.joint + "' is split twice",
+                   .allowed = "backlash or joint_compliance, not both"};
     }
   }
   splits.push_back(std::move(split));
@@ -235,8 +242,9 @@ Status Structure::Finish() {
   return FinishSprings();
 }
 
-// The load keeps the joint, its body and everything measured; the motor side is a body of its own beside it that turns about the same axis and
-// carries the actuator, the damping and the dry friction. A fixed tendon (motor angle less load angle) is the spring or the gap between them.
+// The load keeps the joint, its body and everything measured; the motor side is a body of its own beside it that turns
+// about the same axis and carries the actuator, the damping and the dry friction. A fixed tendon (motor angle less load
+// angle) is the spring or the gap between them.
 Status Structure::FinishSplits() {
   for (const auto& split : splits) {
     mjsJoint* joint = FindJoint(split.joint);
@@ -266,7 +274,8 @@ Status Structure::FinishSplits() {
     joint->frictionloss = 0;
     for (mjsElement* e = mjs_firstElement(spec.get(), mjOBJ_ACTUATOR); e; e = mjs_nextElement(spec.get(), e)) {
       mjsActuator* actuator = mjs_asActuator(e);
-      if (actuator->trntype == mjTRN_JOINT && mjs_getString(actuator->target) == split.joint) mjs_setString(actuator->target, motor.c_str());
+      if (actuator->trntype == mjTRN_JOINT && mjs_getString(actuator->target) == split.joint)
+        mjs_setString(actuator->target, motor.c_str());
     }
     mjsTendon* link = mjs_addTendon(spec.get(), nullptr);
     mjs_setName(link->element, tendon.c_str());
@@ -317,19 +326,26 @@ Status Structure::FinishMotors() {
     std::string instance;
     if (drive->plugin.active) {
       if (std::string(mjs_getString(drive->plugin.plugin_name)) != "gapscope.motor") {
-        return Error{.what = "the actuator '" + NameOf(drive->element) + "' is a plugin of another kind", .where = experiment_->model_path,
-                     .actual = mjs_getString(drive->plugin.plugin_name), .allowed = "a native actuator or gapscope.motor"};
+        return Error{.what = "the actuator '" + NameOf(drive->element) + "' is a plugin of another kind",
+                     .where = experiment_->model_path,
+                     .actual = mjs_getString(drive->plugin.plugin_name),
+                     .allowed = "a native actuator or gapscope.motor"};
       }
       instance = mjs_getString(drive->plugin.name);
     } else {
       instance = NameOf(drive->element);
       std::string roles;
       for (const mjsActuator* input : inputs) {
-        const bool plain = input->gaintype == mjGAIN_FIXED && input->dyntype == mjDYN_NONE && (input->biastype == mjBIAS_NONE || input->biastype == mjBIAS_AFFINE);
+        const bool plain = input->gaintype == mjGAIN_FIXED && input->dyntype == mjDYN_NONE &&
+                           (input->biastype == mjBIAS_NONE || input->biastype == mjBIAS_AFFINE);
         const bool feedforward = input != drive && input->biastype == mjBIAS_NONE && input->gainprm[0] == 1;
         if (!plain || (input != drive && !feedforward)) {
-          return Error{.what = "the actuator '" + NameOf(input->element) + "' cannot take motor effects", .where = experiment_->model_path,
-                       .allowed = "a stateless fixed-gain, affine-bias actuator, and plain motors of gain 1 beside it as feed-forward", .cure = "replace it by gapscope.motor"};
+          return Error{
+              .what = "the actuator '" + NameOf(input->element) + "' cannot take motor effects",
+              .where = experiment_->model_path,
+              .allowed =
+                  "a stateless fixed-gain, affine-bias actuator, and plain motors of gain 1 beside it as feed-forward",
+              .cure = "replace it by gapscope.motor"};
         }
         roles += input == drive ? "target" : " feedforward";
       }
@@ -347,10 +363,12 @@ Status Structure::FinishMotors() {
       }
     }
     // Room for the longest delays that the catalogue allows, both together; a <config> of the model's own goes first.
-    if (terms.contains("command_delay_s") || terms.contains("torque_delay_s")) AddText(spec.get(), instance + ".max_delay_s", kMaxDelay_s);
+    if (terms.contains("command_delay_s") || terms.contains("torque_delay_s"))
+      AddText(spec.get(), instance + ".max_delay_s", kMaxDelay_s);
     // Lags and the sag keep their state in activations of the first actuator.
     drive->actdim = std::max(0, drive->actdim);  // MuJoCo's default, -1, counts as none
-    for (const char* stage : {"time_constant_s", "second_time_constant_s", "sag_fraction"}) drive->actdim += terms.contains(stage) ? 1 : 0;
+    for (const char* stage : {"time_constant_s", "second_time_constant_s", "sag_fraction"})
+      drive->actdim += terms.contains(stage) ? 1 : 0;
     for (const auto& [key, expression] : terms) {
       AddNumeric(instance + "." + key, NominalOf(expression));
       Set("numeric/" + instance + "." + key, {expression});
@@ -369,7 +387,8 @@ Status Structure::FinishFriction() {
     element->solref_friction[0] = -1;
     element->solref_friction[1] = -0.9999 / spec->option.timestep;  // at -1/h stops give energy back
     const std::string base = "joint/" + joint + "/frictionloss";
-    const auto set = std::find_if(settings.begin(), settings.end(), [&](const FieldSetting& s) { return s.field == base; });
+    const auto set =
+        std::find_if(settings.begin(), settings.end(), [&](const FieldSetting& s) { return s.field == base; });
     const std::string base_level = set != settings.end() ? set->expressions.front() : TextOf(element->frictionloss);
     if (element->frictionloss <= 0) element->frictionloss = kTinyFriction;
     if (set != settings.end()) settings.erase(set);
@@ -382,8 +401,11 @@ Status Structure::FinishFriction() {
     const std::string instance = joint + ".friction";
     mjsBody* body = mjs_getParent(element->element);
     if (body->plugin.active) {
-      return Error{.what = "the body of joint '" + joint + "' already has a plugin", .where = experiment_->model_path, .actual = mjs_getString(body->plugin.plugin_name),
-                   .allowed = "one plugin per body", .cure = "move it to a body of its own"};
+      return Error{.what = "the body of joint '" + joint + "' already has a plugin",
+                   .where = experiment_->model_path,
+                   .actual = mjs_getString(body->plugin.plugin_name),
+                   .allowed = "one plugin per body",
+                   .cure = "move it to a body of its own"};
     }
     AddInstance(spec.get(), "gapscope.friction", instance, {{"joint", joint}, {"row_softness", "0.01"}});
     Attach(&body->plugin, "gapscope.friction", instance);
@@ -406,11 +428,14 @@ Status Structure::FinishFriction() {
 Status Structure::FinishSprings() {
   for (const auto& [joint, terms] : spring_) {
     mjsJoint* element = FindJoint(joint);
-    const bool linear = std::all_of(terms.begin(), terms.end(), [](const auto& t) { return t.first == "stiffness_n_m_per_rad" || t.first == "rest_rad"; });
+    const bool linear = std::all_of(terms.begin(), terms.end(), [](const auto& t) {
+      return t.first == "stiffness_n_m_per_rad" || t.first == "rest_rad";
+    });
     if (linear && element->stiffness[0] == 0) {
       // MuJoCo's own spring does it.
       element->stiffness[0] = kTinyFriction;
-      for (const auto& [key, expression] : terms) Set("joint/" + joint + (key == "rest_rad" ? "/springref" : "/stiffness"), {expression});
+      for (const auto& [key, expression] : terms)
+        Set("joint/" + joint + (key == "rest_rad" ? "/springref" : "/stiffness"), {expression});
       continue;
     }
     const std::string instance = joint + ".spring";

@@ -1,4 +1,5 @@
-// What a replay with the loop closed adds to a replay's report: how the rig moves and what is sent, measured against predicted, in statistics.
+// What a replay with the loop closed adds to a replay's report: how the rig moves and what is sent, measured against
+// predicted, in statistics.
 #ifndef GAPSCOPE_REPORT_CLOSED_LOOP_REPORT_H_
 #define GAPSCOPE_REPORT_CLOSED_LOOP_REPORT_H_
 
@@ -8,11 +9,14 @@
 
 namespace gapscope {
 
-std::string StatisticsTable(const ClosedLoopResult& closed, const std::vector<Recording>& recordings, const ControllerSpec& spec);
+std::string StatisticsTable(const ClosedLoopResult& closed, const std::vector<Recording>& recordings,
+                            const ControllerSpec& spec);
 // `replay_json` (gapscope.replay/1) with "statistics" in each log.
-std::string WithStatistics(const std::string& replay_json, const ClosedLoopResult& closed, const std::vector<Recording>& recordings, const ControllerSpec& spec);
+std::string WithStatistics(const std::string& replay_json, const ClosedLoopResult& closed,
+                           const std::vector<Recording>& recordings, const ControllerSpec& spec);
 // FOLDER/LOG.csv: __time, logged and closed-loop command.
-Status WriteSent(const std::string& folder, const ClosedLoopResult& closed, const std::vector<Recording>& recordings, const ControllerSpec& spec);
+Status WriteSent(const std::string& folder, const ClosedLoopResult& closed, const std::vector<Recording>& recordings,
+                 const ControllerSpec& spec);
 
 }  // namespace gapscope
 

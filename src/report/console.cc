@@ -33,18 +33,24 @@ std::string Sparkline(std::span<const double> values) {
   return line;
 }
 
-std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<const double> measured, std::span<const double> predicted, std::size_t parts) {
+std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<const double> measured,
+                                  std::span<const double> predicted, std::size_t parts) {
   std::vector<double> sums(parts, 0);
   std::vector<std::size_t> rows(parts, 0);
   const double length = time_s.empty() ? 0 : time_s.back() - time_s.front();
   for (std::size_t r = 0; r < time_s.size(); ++r) {
     const double error = measured[r] - predicted[r];
     if (!std::isfinite(error)) continue;
-    const std::size_t part = length > 0 ? std::min(parts - 1, static_cast<std::size_t>(static_cast<double>(parts) * (time_s[r] - time_s.front()) / length)) : 0;
+    const std::size_t part = length > 0
+                                 ? std::min(parts - 1, static_cast<std::size_t>(static_cast<double>(parts) *
+                                                                                (time_s[r] - time_s.front()) / length))
+                                 : 0;
     sums[part] += error * error;
     ++rows[part];
   }
-  for (std::size_t p = 0; p < parts; ++p) sums[p] = rows[p] > 0 ? std::sqrt(sums[p] / static_cast<double>(rows[p])) : std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t p = 0; p < parts; ++p)
+    sums[p] =
+        rows[p] > 0 ? std::sqrt(sums[p] / static_cast<double>(rows[p])) : std::numeric_limits<double>::quiet_NaN();
   return sums;
 }
 

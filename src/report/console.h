@@ -18,17 +18,21 @@ struct Console {
   std::string Bad(const std::string& text) const { return Dressed("31", text); }
 
  private:
-  std::string Dressed(const char* code, const std::string& text) const { return colour ? std::string("\033[").append(code).append("m").append(text).append("\033[0m") : text; }
+  std::string Dressed(const char* code, const std::string& text) const {
+    return colour ? std::string("\033[").append(code).append("m").append(text).append("\033[0m") : text;
+  }
 };
 
 // Of a stream that goes to a terminal that takes colour, unless the user has set NO_COLOR (no-color.org).
 Console ConsoleOf(int descriptor);
 
-// One block character per value, of an eighth to full height; the largest value is full, a blank stands for what is not finite. Zero is the lowest block.
+// One block character per value, of an eighth to full height; the largest value is full, a blank stands for what is not
+// finite. Zero is the lowest block.
 std::string Sparkline(std::span<const double> values);
 
 // Root mean square of measured less predicted in `parts` equal stretches of time; NaN where a stretch has no rows.
-std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<const double> measured, std::span<const double> predicted, std::size_t parts);
+std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<const double> measured,
+                                  std::span<const double> predicted, std::size_t parts);
 
 }  // namespace gapscope
 

@@ -29,7 +29,9 @@ std::string Wrap(const std::string& text, std::size_t width) {
 std::string ConditionTable(const char* title, const std::vector<ConditionShare>& shares) {
   if (shares.empty()) return "";
   std::string text = fmt::format("\n{:<18} {:<44} {:>9} {:>9}\n", title, "", "of error", "of time");
-  for (const auto& w : shares) text += fmt::format("{:<18} {:<44} {:>8.0f}% {:>8.0f}%\n", w.signal, w.condition, 100 * w.share_of_error, 100 * w.share_of_time);
+  for (const auto& w : shares)
+    text += fmt::format("{:<18} {:<44} {:>8.0f}% {:>8.0f}%\n", w.signal, w.condition, 100 * w.share_of_error,
+                        100 * w.share_of_time);
   return text;
 }
 
@@ -38,15 +40,19 @@ std::string ConditionTable(const char* title, const std::vector<ConditionShare>&
 std::string DiagnosisTable(const Diagnosis& d) {
   std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
   for (const auto& found : d.effects) {
-    text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap\n", found.use.effect, found.use.on, found.probability, 100 * found.share_of_gap);
-    for (const auto& p : found.parameters) text += fmt::format("    {:<28} {:>11.4g}   {:.4g} .. {:.4g} {}\n", p.key, p.value, p.low, p.high, p.unit);
+    text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap\n", found.use.effect, found.use.on,
+                        found.probability, 100 * found.share_of_gap);
+    for (const auto& p : found.parameters)
+      text += fmt::format("    {:<28} {:>11.4g}   {:.4g} .. {:.4g} {}\n", p.key, p.value, p.low, p.high, p.unit);
   }
   for (const auto& group : d.ambiguous) {
     std::string names;
     for (const auto& name : group) names += (names.empty() ? "" : ", ") + name;
     text += "  cannot be told apart on these logs: " + names + "\n";
   }
-  text += fmt::format("\nheld-out error: nominal {:.4g} -> refit {:.4g} -> final {:.4g} -> floor {:.4g}; {:.0f} % of the gap closed\n", d.nominal, d.refit, d.final, d.floor, 100 * d.closed);
+  text += fmt::format(
+      "\nheld-out error: nominal {:.4g} -> refit {:.4g} -> final {:.4g} -> floor {:.4g}; {:.0f} % of the gap closed\n",
+      d.nominal, d.refit, d.final, d.floor, 100 * d.closed);
   text += "\n" + Wrap(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);
@@ -54,19 +60,29 @@ std::string DiagnosisTable(const Diagnosis& d) {
   std::size_t shown = 0;
   for (const auto& c : d.candidates) {
     if (!c.refitted && ++shown > 4) continue;
-    text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", c.name, c.probability, c.refitted ? fmt::format("{:.4g}", c.held_out_error) : "-", c.reason);
+    text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", c.name, c.probability,
+                        c.refitted ? fmt::format("{:.4g}", c.held_out_error) : "-", c.reason);
   }
   text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.budget_spent ? ", the whole budget" : "");
   return text;
 }
 
 std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
-  ordered_json json = {{"schema", "gapscope.diagnosis/1"}, {"verdict", VerdictName(d.verdict)}, {"probability", d.probability}, {"effects", ordered_json::array()}};
+  ordered_json json = {{"schema", "gapscope.diagnosis/1"},
+                       {"verdict", VerdictName(d.verdict)},
+                       {"probability", d.probability},
+                       {"effects", ordered_json::array()}};
   for (const auto& found : d.effects) {
     ordered_json parameters = ordered_json::object();
-    for (const auto& p : found.parameters) parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
-    json["effects"].push_back({{"name", found.use.effect}, {"on", found.use.on}, {"probability", found.probability}, {"parameters", parameters}, {"error_before", JsonNumber(found.error_before)},
-                               {"error_after", JsonNumber(found.error_after)}, {"share_of_gap", JsonNumber(found.share_of_gap)}});
+    for (const auto& p : found.parameters)
+      parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
+    json["effects"].push_back({{"name", found.use.effect},
+                               {"on", found.use.on},
+                               {"probability", found.probability},
+                               {"parameters", parameters},
+                               {"error_before", JsonNumber(found.error_before)},
+                               {"error_after", JsonNumber(found.error_after)},
+                               {"share_of_gap", JsonNumber(found.share_of_gap)}});
   }
   json["ambiguous"] = ordered_json::array();
   for (const auto& group : d.ambiguous) {
@@ -74,11 +90,20 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
     for (const auto& name : group) names.push_back(name.substr(0, name.find('@')));
     json["ambiguous"].push_back(names);
   }
-  json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)}, {"final", JsonNumber(d.final)}, {"floor", JsonNumber(d.floor)}, {"closed", JsonNumber(d.closed)}, {"held_out", true}};
+  json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},   {"final", JsonNumber(d.final)},
+                 {"floor", JsonNumber(d.floor)},     {"closed", JsonNumber(d.closed)}, {"held_out", true}};
   const VerdictEvidence& e = d.evidence;
-  json["evidence"] = {{"floors_before", JsonNumber(e.floors_before)}, {"floors_left", JsonNumber(e.floors_left)}, {"removed", JsonNumber(e.removed)}, {"free_run_before", JsonNumber(e.free_run_before)}, {"free_run_left", JsonNumber(e.free_run_left)},
-                      {"free_run_removed", JsonNumber(e.free_run_removed)}, {"gain_train", JsonNumber(e.gain_train)},
-                      {"gain_held_out", JsonNumber(e.gain_held_out)}, {"standard_errors", JsonNumber(e.z)}, {"rival_lead", JsonNumber(e.rival_lead)}, {"rival_standard_errors", JsonNumber(e.rival_z)}};
+  json["evidence"] = {{"floors_before", JsonNumber(e.floors_before)},
+                      {"floors_left", JsonNumber(e.floors_left)},
+                      {"removed", JsonNumber(e.removed)},
+                      {"free_run_before", JsonNumber(e.free_run_before)},
+                      {"free_run_left", JsonNumber(e.free_run_left)},
+                      {"free_run_removed", JsonNumber(e.free_run_removed)},
+                      {"gain_train", JsonNumber(e.gain_train)},
+                      {"gain_held_out", JsonNumber(e.gain_held_out)},
+                      {"standard_errors", JsonNumber(e.z)},
+                      {"rival_lead", JsonNumber(e.rival_lead)},
+                      {"rival_standard_errors", JsonNumber(e.rival_z)}};
   json["where"] = JsonConditions(d.where);
   json["remains"] = JsonConditions(d.remains);
   json["candidates"] = ordered_json::array();
@@ -86,15 +111,27 @@ std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
     const std::size_t at = c.name.find('@');
     ordered_json entry = {{"name", c.name.substr(0, at)}};
     if (at != std::string::npos) entry["on"] = c.name.substr(at + 1);
-    entry.update({{"probability", c.probability}, {"held_out_error", JsonNumber(c.held_out_error)}, {"screen_drop", c.screen_drop}, {"absorbed", c.absorbed}, {"refitted", c.refitted},
-                  {"converged", c.converged}, {"bic", JsonNumber(c.bic)}, {"reason", c.reason}});
+    entry.update({{"probability", c.probability},
+                  {"held_out_error", JsonNumber(c.held_out_error)},
+                  {"screen_drop", c.screen_drop},
+                  {"absorbed", c.absorbed},
+                  {"refitted", c.refitted},
+                  {"converged", c.converged},
+                  {"bic", JsonNumber(c.bic)},
+                  {"reason", c.reason}});
     json["candidates"].push_back(std::move(entry));
   }
   json["second_effects"] = ordered_json::array();
   for (const auto& c : d.seconds) {
     const std::size_t at = c.name.find('@');
-    json["second_effects"].push_back({{"name", c.name.substr(0, at)}, {"on", c.name.substr(at + 1)}, {"held_out_error", JsonNumber(c.held_out_error)}, {"screen_drop", c.screen_drop},
-                                      {"absorbed", c.absorbed}, {"refitted", c.refitted}, {"converged", c.converged}, {"reason", c.reason}});
+    json["second_effects"].push_back({{"name", c.name.substr(0, at)},
+                                      {"on", c.name.substr(at + 1)},
+                                      {"held_out_error", JsonNumber(c.held_out_error)},
+                                      {"screen_drop", c.screen_drop},
+                                      {"absorbed", c.absorbed},
+                                      {"refitted", c.refitted},
+                                      {"converged", c.converged},
+                                      {"reason", c.reason}});
   }
   json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
   json["explanation"] = d.explanation;

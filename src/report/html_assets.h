@@ -7,7 +7,7 @@ namespace gapscope::assets {
 extern const char* const kPage;
 extern const char* const kStyle;
 extern const char* const kScript;
-extern const char* const kDygraphs;       // with its synchronizer; MIT licence
+extern const char* const kDygraphs;  // with its synchronizer; MIT licence
 extern const char* const kDygraphsStyle;
 
 }  // namespace gapscope::assets

@@ -49,8 +49,13 @@ ordered_json Quality(const Recording& recording) {
   const Timeline& t = recording.timeline;
   ordered_json findings = ordered_json::array();
   for (const auto& finding : recording.findings) findings.push_back(finding.text);
-  return {{"rows", recording.rows()}, {"rows_in_log", recording.rows_in_log}, {"duration_s", Rounded(recording.duration_s())}, {"step_s", Rounded(t.median_step_s)},
-          {"longest_step_s", Rounded(t.longest_step_s)}, {"jitter_s", Rounded(t.jitter_s)}, {"findings", std::move(findings)}};
+  return {{"rows", recording.rows()},
+          {"rows_in_log", recording.rows_in_log},
+          {"duration_s", Rounded(recording.duration_s())},
+          {"step_s", Rounded(t.median_step_s)},
+          {"longest_step_s", Rounded(t.longest_step_s)},
+          {"jitter_s", Rounded(t.jitter_s)},
+          {"findings", std::move(findings)}};
 }
 
 ordered_json Maps(const ReportSource& source, const Recording& recording) {
@@ -59,7 +64,11 @@ ordered_json Maps(const ReportSource& source, const Recording& recording) {
   for (const auto& residual : EstimateResidualTorque(*source.model, source.values, recording)) {
     const TorqueMap map = MapTorque(residual, kMapAngles, kMapSpeeds);
     if (map.mean_n_m.empty()) continue;
-    maps.push_back({{"joint", map.joint}, {"angle", Numbers(map.angle_edges_rad)}, {"speed", Numbers(map.speed_edges_rad_per_s)}, {"torque", Numbers(map.mean_n_m)}, {"rows", map.rows}});
+    maps.push_back({{"joint", map.joint},
+                    {"angle", Numbers(map.angle_edges_rad)},
+                    {"speed", Numbers(map.speed_edges_rad_per_s)},
+                    {"torque", Numbers(map.mean_n_m)},
+                    {"rows", map.rows}});
   }
   return maps;
 }
@@ -70,11 +79,15 @@ ordered_json Responses(const Recording& recording, const LogReplay& replay) {
     if (recording.commands[c].column == "constant") continue;
     for (const auto& signal : replay.signals) {
       if (!signal.scored || responses.size() >= 4) continue;
-      const auto points = EstimateResponse(recording.time_s, recording.commands[c].values, signal.measured, signal.predicted);
+      const auto points =
+          EstimateResponse(recording.time_s, recording.commands[c].values, signal.measured, signal.predicted);
       if (points.size() < 4) continue;
-      ordered_json entry = {{"command", recording.commands[c].actuator}, {"signal", signal.signal}, {"points", ordered_json::array()}};
+      ordered_json entry = {
+          {"command", recording.commands[c].actuator}, {"signal", signal.signal}, {"points", ordered_json::array()}};
       for (const auto& p : points) {
-        entry["points"].push_back({Rounded(p.hz), Rounded(p.measured_gain), Rounded(p.predicted_gain), Rounded(p.measured_phase_deg), Rounded(p.predicted_phase_deg), Rounded(p.coherence, 3)});
+        entry["points"].push_back({Rounded(p.hz), Rounded(p.measured_gain), Rounded(p.predicted_gain),
+                                   Rounded(p.measured_phase_deg), Rounded(p.predicted_phase_deg),
+                                   Rounded(p.coherence, 3)});
       }
       responses.push_back(std::move(entry));
     }
@@ -104,20 +117,31 @@ ordered_json Traces(const ReportSource& source, std::size_t index, std::size_t m
   for (const auto& residual : residuals) columns.emplace_back(residual);
   for (const auto& command : recording.commands) columns.emplace_back(command.values);
   const std::size_t buckets = std::max<std::size_t>(50, most_rows / (2 * columns.size()));
-  const std::vector<std::size_t> rows = recording.rows() <= most_rows ? ExtremeRows(columns, recording.rows()) : ExtremeRows(columns, buckets);
+  const std::vector<std::size_t> rows =
+      recording.rows() <= most_rows ? ExtremeRows(columns, recording.rows()) : ExtremeRows(columns, buckets);
 
-  ordered_json json = {{"time", Column(recording.time_s, rows, 8)}, {"signals", ordered_json::array()}, {"commands", ordered_json::array()}};
+  ordered_json json = {{"time", Column(recording.time_s, rows, 8)},
+                       {"signals", ordered_json::array()},
+                       {"commands", ordered_json::array()}};
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {
     const MeasuredSpec& spec = recording.measured[s].spec;
-    ordered_json signal = {{"name", spec.signal}, {"unit", spec.unit}, {"scored", spec.scored}, {"measured", Column(recording.measured[s].values, rows)}, {"predicted", ordered_json::array()}};
+    ordered_json signal = {{"name", spec.signal},
+                           {"unit", spec.unit},
+                           {"scored", spec.scored},
+                           {"measured", Column(recording.measured[s].values, rows)},
+                           {"predicted", ordered_json::array()}};
     for (const auto* prediction : predicted) {
-      signal["predicted"].push_back({{"label", prediction->label}, {"values", Column(prediction->logs[index].signals[s].predicted, rows)}});
+      signal["predicted"].push_back(
+          {{"label", prediction->label}, {"values", Column(prediction->logs[index].signals[s].predicted, rows)}});
     }
     json["signals"].push_back(std::move(signal));
   }
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];
-    if (command.column != "constant") json["commands"].push_back({{"name", command.actuator}, {"unit", source.experiment->commands[c].unit}, {"values", Column(command.values, rows)}});
+    if (command.column != "constant")
+      json["commands"].push_back({{"name", command.actuator},
+                                  {"unit", source.experiment->commands[c].unit},
+                                  {"values", Column(command.values, rows)}});
   }
   return json;
 }
@@ -129,17 +153,25 @@ ordered_json Data(const ReportSource& source, std::size_t most_rows) {
   data["parameters"] = ordered_json::array();
   for (const Parameter& p : source.parameters) {
     if (p.name.starts_with("scale@")) continue;
-    data["parameters"].push_back({{"name", p.name}, {"unit", p.unit}, {"doc", p.doc}, {"nominal", JsonNumber(p.nominal)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}, {"frozen", p.frozen}});
+    data["parameters"].push_back({{"name", p.name},
+                                  {"unit", p.unit},
+                                  {"doc", p.doc},
+                                  {"nominal", JsonNumber(p.nominal)},
+                                  {"low", JsonNumber(p.low)},
+                                  {"high", JsonNumber(p.high)},
+                                  {"frozen", p.frozen}});
   }
   // The model whose missing torque is mapped: the nominal one where the result says what it lacks.
-  data["map_of"] = source.predictions.size() > 1 && data["result"]["schema"] != "gapscope.replay/1" ? "nominal model" : "model";
+  data["map_of"] =
+      source.predictions.size() > 1 && data["result"]["schema"] != "gapscope.replay/1" ? "nominal model" : "model";
   data["logs"] = ordered_json::array();
   const std::size_t shown = std::min(kMostLogs, source.recordings.size());
   // Held-out logs first: they are what counts.
   std::vector<std::size_t> order(source.recordings.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto held_out = [&](std::size_t i) { return i < source.held_out.size() && source.held_out[i]; };
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return held_out(a) && !held_out(b); });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return held_out(a) && !held_out(b); });
   for (std::size_t k = 0; k < order.size(); ++k) {
     const std::size_t i = order[k];
     const Recording& recording = *source.recordings[i];
@@ -150,7 +182,8 @@ ordered_json Data(const ReportSource& source, std::size_t most_rows) {
       log["traces"] = Traces(source, i, most_rows / shown);
       log["maps"] = Maps(source, recording);
       log["responses"] = ordered_json::array();
-      if (!source.predictions.empty() && i < source.predictions.back().logs.size() && !source.predictions.back().logs[i].signals.empty()) {
+      if (!source.predictions.empty() && i < source.predictions.back().logs.size() &&
+          !source.predictions.back().logs[i].signals.empty()) {
         log["responses"] = Responses(recording, source.predictions.back().logs[i]);
         log["response_of"] = source.predictions.back().label;
       }
@@ -175,7 +208,9 @@ std::string Filled(std::string page, const std::string& slot, const std::string&
 }
 
 bool IsPlainName(const std::string& name) {
-  return !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; });
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return std::isalnum(c) || c == '.' || c == '_' || c == '-';
+  });
 }
 
 }  // namespace
@@ -193,7 +228,8 @@ Status WriteReportHtml(const std::string& folder, const ReportSource& source) {
   const std::filesystem::path path = std::filesystem::path(folder) / "report.html";
   std::string page = ReportHtml(source);
   std::error_code failure;
-  if (std::filesystem::exists(path.parent_path() / "video.mp4", failure)) page = Filled(page, kVideoSlot, "data-video=\"video.mp4\"");
+  if (std::filesystem::exists(path.parent_path() / "video.mp4", failure))
+    page = Filled(page, kVideoSlot, "data-video=\"video.mp4\"");
   return WriteFile(path.string(), page);
 }
 

@@ -1,4 +1,5 @@
-// A result as one HTML file that opens from disk with no network: src/report/html/ holds page, style and script, embedded at build time with dygraphs.
+// A result as one HTML file that opens from disk with no network: src/report/html/ holds page, style and script,
+// embedded at build time with dygraphs.
 #ifndef GAPSCOPE_REPORT_HTML_REPORT_H_
 #define GAPSCOPE_REPORT_HTML_REPORT_H_
 
@@ -36,7 +37,8 @@ std::string ReportHtml(const ReportSource& source, std::size_t most_rows = 60000
 // Writes `folder`/report.html. A video.mp4 that is already there is shown in it.
 Status WriteReportHtml(const std::string& folder, const ReportSource& source);
 
-// Shows `video`, a file beside the report, in a report that was written before. Does nothing, and says false, where there is no report.
+// Shows `video`, a file beside the report, in a report that was written before. Does nothing, and says false, where
+// there is no report.
 Result<bool> AttachVideo(const std::string& report_path, const std::string& video);
 
 }  // namespace gapscope

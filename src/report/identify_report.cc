@@ -13,9 +13,12 @@ namespace gapscope {
 using nlohmann::ordered_json;
 
 std::string IdentifyTable(const Identification& result) {
-  std::string text = fmt::format("{}\n\n{:<28} {:>12}   {:<26} {}\n", result.relation, "", "value", "95 % interval", "unit");
+  std::string text =
+      fmt::format("{}\n\n{:<28} {:>12}   {:<26} {}\n", result.relation, "", "value", "95 % interval", "unit");
   for (const auto& v : result.values) {
-    text += fmt::format("{:<28} {:>12.5g}   {:<26} {}\n", v.name, v.value, std::isfinite(v.low) || std::isfinite(v.high) ? fmt::format("{:.5g} .. {:.5g}", v.low, v.high) : "", v.unit);
+    text += fmt::format(
+        "{:<28} {:>12.5g}   {:<26} {}\n", v.name, v.value,
+        std::isfinite(v.low) || std::isfinite(v.high) ? fmt::format("{:.5g} .. {:.5g}", v.low, v.high) : "", v.unit);
   }
   text += fmt::format("\n{} rows", result.rows);
   if (std::isfinite(result.r2)) text += fmt::format(", R^2 {:.5f}", result.r2);
@@ -26,9 +29,14 @@ std::string IdentifyTable(const Identification& result) {
 }
 
 std::string IdentifyJson(const Identification& result, const std::vector<Recording>& recordings) {
-  ordered_json json = {{"schema", "gapscope.identify." + result.method + "/1"}, {"relation", result.relation}, {"values", ordered_json::object()}};
-  for (const auto& v : result.values) json["values"][v.name] = {{"value", JsonNumber(v.value)}, {"low", JsonNumber(v.low)}, {"high", JsonNumber(v.high)}, {"unit", v.unit}};
-  json["fit"] = {{"r2", JsonNumber(result.r2)}, {"rmse", JsonNumber(result.rmse)}, {"unit", result.unit}, {"rows", result.rows}};
+  ordered_json json = {{"schema", "gapscope.identify." + result.method + "/1"},
+                       {"relation", result.relation},
+                       {"values", ordered_json::object()}};
+  for (const auto& v : result.values)
+    json["values"][v.name] = {
+        {"value", JsonNumber(v.value)}, {"low", JsonNumber(v.low)}, {"high", JsonNumber(v.high)}, {"unit", v.unit}};
+  json["fit"] = {
+      {"r2", JsonNumber(result.r2)}, {"rmse", JsonNumber(result.rmse)}, {"unit", result.unit}, {"rows", result.rows}};
   json["remarks"] = result.remarks;
   json["tables"] = ordered_json::object();
   for (const auto& table : result.tables) {
@@ -52,7 +60,8 @@ Status WritePoints(const std::string& folder, const Identification& result) {
     for (std::size_t c = 0; c < table.columns.size(); ++c) csv += (c > 0 ? "," : "") + table.columns[c];
     for (const auto& row : table.rows) {
       csv += "\n";
-      for (std::size_t c = 0; c < row.size(); ++c) csv += fmt::format("{}{}", c > 0 ? "," : "", std::isfinite(row[c]) ? fmt::format("{:.10g}", row[c]) : "");
+      for (std::size_t c = 0; c < row.size(); ++c)
+        csv += fmt::format("{}{}", c > 0 ? "," : "", std::isfinite(row[c]) ? fmt::format("{:.10g}", row[c]) : "");
     }
     GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(folder) / (table.name + ".csv"), csv + "\n"));
   }

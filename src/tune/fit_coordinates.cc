@@ -6,14 +6,20 @@
 
 namespace gapscope {
 
-double Coordinate::ToSearch(double value) const { return logarithmic ? std::log(std::max(scale * value, 1e-300)) : value / scale; }
+double Coordinate::ToSearch(double value) const {
+  return logarithmic ? std::log(std::max(scale * value, 1e-300)) : value / scale;
+}
 double Coordinate::ToValue(double search) const { return logarithmic ? scale * std::exp(search) : search * scale; }
 
 void FitProblem::CoupleTerms() {
   for (std::size_t i = 0; i < coordinates_.size(); ++i) {
     const Parameter& p = model_.parameters()[coordinates_[i].parameter];
-    const auto size = std::find_if(coordinates_.begin(), coordinates_.end(), [&](const Coordinate& c) { return model_.parameters()[c.parameter].name == p.size; });
-    if (p.with == Parameter::With::kNone || size == coordinates_.end() || size->logarithmic || coordinates_[i].logarithmic) continue;
+    const auto size = std::find_if(coordinates_.begin(), coordinates_.end(), [&](const Coordinate& c) {
+      return model_.parameters()[c.parameter].name == p.size;
+    });
+    if (p.with == Parameter::With::kNone || size == coordinates_.end() || size->logarithmic ||
+        coordinates_[i].logarithmic)
+      continue;
     const Couple couple{.size = size - coordinates_.begin(), .other = static_cast<Eigen::Index>(i), .with = p.with};
     Coordinate& other = coordinates_[i];
     if (p.with == Parameter::With::kAngle) {
@@ -34,7 +40,8 @@ void FitProblem::CoupleTerms() {
 }
 
 void FitProblem::SetCouple(const Couple& couple, double size, double other, std::vector<double>* values) const {
-  const Coordinate &a = coordinates_[static_cast<std::size_t>(couple.size)], &b = coordinates_[static_cast<std::size_t>(couple.other)];
+  const Coordinate &a = coordinates_[static_cast<std::size_t>(couple.size)],
+                   &b = coordinates_[static_cast<std::size_t>(couple.other)];
   const Parameter& p = model_.parameters()[b.parameter];
   size *= a.scale, other *= b.scale;
   if (couple.with == Parameter::With::kAngle) {
@@ -46,11 +53,13 @@ void FitProblem::SetCouple(const Couple& couple, double size, double other, std:
   }
 }
 
-void FitProblem::SetCoordinate(const Eigen::VectorXd& y, Eigen::Index i, double moved, std::vector<double>* values) const {
+void FitProblem::SetCoordinate(const Eigen::VectorXd& y, Eigen::Index i, double moved,
+                               std::vector<double>* values) const {
   const Coordinate& c = coordinates_[static_cast<std::size_t>(i)];
   (*values)[c.parameter] = c.ToValue(moved);
   for (const Couple& couple : couples_) {
-    if (couple.size == i || couple.other == i) SetCouple(couple, couple.size == i ? moved : y[couple.size], couple.other == i ? moved : y[couple.other], values);
+    if (couple.size == i || couple.other == i)
+      SetCouple(couple, couple.size == i ? moved : y[couple.size], couple.other == i ? moved : y[couple.other], values);
   }
 }
 
@@ -62,7 +71,8 @@ Eigen::VectorXd FitProblem::ToSearch(const std::vector<double>& values) const {
     y[k] = c.ToSearch(values[c.parameter]);
   }
   for (const Couple& couple : couples_) {
-    const Coordinate &a = coordinates_[static_cast<std::size_t>(couple.size)], &b = coordinates_[static_cast<std::size_t>(couple.other)];
+    const Coordinate &a = coordinates_[static_cast<std::size_t>(couple.size)],
+                     &b = coordinates_[static_cast<std::size_t>(couple.other)];
     const double size = values[a.parameter], other = values[b.parameter];
     const bool angle = couple.with == Parameter::With::kAngle;
     y[couple.size] = (angle ? size * std::cos(other) : size) / a.scale;

@@ -1,4 +1,5 @@
-// Derivatives of a fit: finite differences of every window, normal equations with the states eliminated, secant updates, the score test.
+// Derivatives of a fit: finite differences of every window, normal equations with the states eliminated, secant
+// updates, the score test.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -21,8 +22,10 @@ Eigen::VectorXd SolveFree(Eigen::MatrixXd hessian, Eigen::VectorXd right, const 
   return hessian.ldlt().solve(right);
 }
 
-// What the window's own states answer to a slope of all columns (the last ones are the states'): S^-1 times their part, S with what is known of them beforehand.
-Eigen::VectorXd StateAnswer(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& prior, const Eigen::VectorXd& slope) {
+// What the window's own states answer to a slope of all columns (the last ones are the states'): S^-1 times their part,
+// S with what is known of them beforehand.
+Eigen::VectorXd StateAnswer(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& prior,
+                            const Eigen::VectorXd& slope) {
   const Eigen::Index m = prior.size();
   Eigen::MatrixXd own = jacobian.rightCols(m).transpose() * jacobian.rightCols(m);
   own.diagonal() += prior.cwiseAbs2();
@@ -45,11 +48,14 @@ Linearization FitProblem::Linearize(const FitPoint& point, double step, Columns 
 
 void FitProblem::CountDifferences(Columns columns, bool base_known) {
   if (!base_known) ++evaluations_;
-  const std::size_t parameters = columns == Columns::kStates ? 0 : coordinates_.size() * (columns == Columns::kCentral ? 2 : 1);
-  replays_ += (base_known ? 0 : 1) + parameters + (columns != Columns::kStates && shift_scale_s_ > 0 ? 1 : 0) + (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
+  const std::size_t parameters =
+      columns == Columns::kStates ? 0 : coordinates_.size() * (columns == Columns::kCentral ? 2 : 1);
+  replays_ += (base_known ? 0 : 1) + parameters + (columns != Columns::kStates && shift_scale_s_ > 0 ? 1 : 0) +
+              (windows_.empty() ? 0 : static_cast<std::size_t>(windows_.front().prior.size()));
 }
 
-Snapshot FitProblem::Differentiate(const FitPoint& point, double step, Columns columns, std::vector<Eigen::VectorXd> base) {
+Snapshot FitProblem::Differentiate(const FitPoint& point, double step, Columns columns,
+                                   std::vector<Eigen::VectorXd> base) {
   CountDifferences(columns, !base.empty());
   Snapshot snapshot;
   snapshot.residuals = std::move(base);
@@ -58,16 +64,19 @@ Snapshot FitProblem::Differentiate(const FitPoint& point, double step, Columns c
   std::vector<char> good(windows_.size(), 0);
   const std::vector<double> values = Values(point);
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
-    good[w] = DifferentiateWindow(GetWorker(index), windows_[w], point, values, point.states[w], step, columns, snapshot.residuals[w], snapshot.jacobians[w]);
+    good[w] = DifferentiateWindow(GetWorker(index), windows_[w], point, values, point.states[w], step, columns,
+                                  snapshot.residuals[w], snapshot.jacobians[w]);
   });
   snapshot.valid = std::all_of(good.begin(), good.end(), [](char g) { return g != 0; });
   return snapshot;
 }
 
-bool FitProblem::DifferentiateWindow(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double step, Columns columns,
-                                     Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const {
+bool FitProblem::DifferentiateWindow(Worker& worker, const FitWindow& window, const FitPoint& point,
+                                     const std::vector<double>& values, const Eigen::VectorXd& state, double step,
+                                     Columns columns, Eigen::VectorXd& residual, Eigen::MatrixXd& jacobian) const {
   const bool all = columns != Columns::kStates;
-  const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0, m = state.size();
+  const Eigen::Index n = low_.size(), parameters = all ? static_cast<Eigen::Index>(coordinates_.size()) : 0,
+                     m = state.size();
   const double shift = Shift(point);
   if (residual.size() == 0) {
     if (!Simulate(worker, window, point, values, state, shift, worker.base)) return false;
@@ -100,7 +109,8 @@ bool FitProblem::DifferentiateWindow(Worker& worker, const FitWindow& window, co
   }
   if (all && shift_scale_s_ > 0) {
     constexpr double kShiftStep = 0.2;  // samples
-    difference(n - 1, kShiftStep, Simulate(worker, window, point, values, state, shift + kShiftStep * shift_scale_s_, worker.perturbed));
+    difference(n - 1, kShiftStep,
+               Simulate(worker, window, point, values, state, shift + kShiftStep * shift_scale_s_, worker.perturbed));
   }
   Eigen::VectorXd moved = state;
   for (Eigen::Index j = 0; j < m; ++j) {
@@ -126,9 +136,11 @@ bool FitProblem::DifferentiateWindow(Worker& worker, const FitWindow& window, co
       column = (worker.other - residual) / kOffsetStep;
     }
     const auto scored = static_cast<Eigen::Index>(window.rows.rows() - window.first_scored);
-    const double* measured = recordings_[window.log].measured[s].values.data() + window.rows.begin + window.first_scored;
+    const double* measured =
+        recordings_[window.log].measured[s].values.data() + window.rows.begin + window.first_scored;
     for (Eigen::Index r = 0; r < scored; ++r) {
-      if (std::isfinite(measured[r])) column[static_cast<Eigen::Index>(s) * scored + r] += scaling.weight * scaling.deviation;
+      if (std::isfinite(measured[r]))
+        column[static_cast<Eigen::Index>(s) * scored + r] += scaling.weight * scaling.deviation;
     }
   }
   return true;
@@ -154,8 +166,12 @@ Linearization FitProblem::Reduce(const FitPoint& point, const Snapshot& snapshot
     const Eigen::VectorXd& state = point.states[w];
     Part& part = parts[w];
     if (snapshot.residuals[w].size() == 0) {
-      part = {.cost = 0, .hessian = Eigen::MatrixXd::Zero(n, n), .gain = Eigen::MatrixXd::Zero(state.size(), n), .gradient = Eigen::VectorXd::Zero(n),
-              .state_step = Eigen::VectorXd::Zero(state.size()), .blocks = {}};
+      part = {.cost = 0,
+              .hessian = Eigen::MatrixXd::Zero(n, n),
+              .gain = Eigen::MatrixXd::Zero(state.size(), n),
+              .gradient = Eigen::VectorXd::Zero(n),
+              .state_step = Eigen::VectorXd::Zero(state.size()),
+              .blocks = {}};
       return;
     }
     part.cost = WindowCost(snapshot.residuals[w], window, state);
@@ -236,7 +252,8 @@ void FitProblem::ApplyRobustWeights(Eigen::VectorXd& residual, Eigen::MatrixXd& 
   }
 }
 
-void FitProblem::UpdateSecant(Snapshot& snapshot, const FitPoint& from, const FitPoint& to, std::vector<Eigen::VectorXd> residuals) {
+void FitProblem::UpdateSecant(Snapshot& snapshot, const FitPoint& from, const FitPoint& to,
+                              std::vector<Eigen::VectorXd> residuals) {
   const Eigen::VectorXd dy = to.y - from.y;
   pool_.ForEach(windows_.size(), [&](std::size_t w, int) {
     Eigen::MatrixXd& jacobian = snapshot.jacobians[w];
@@ -245,16 +262,25 @@ void FitProblem::UpdateSecant(Snapshot& snapshot, const FitPoint& from, const Fi
     // In the metric of the columns, so that coordinates of different units share the blame by their effect.
     Eigen::VectorXd weighted = moved.cwiseProduct(jacobian.colwise().squaredNorm().transpose());
     const double length = weighted.dot(moved);
-    if (length > 0) jacobian += (residuals[w] - snapshot.residuals[w] - jacobian * moved) * (weighted / length).transpose();
+    if (length > 0)
+      jacobian += (residuals[w] - snapshot.residuals[w] - jacobian * moved) * (weighted / length).transpose();
     snapshot.residuals[w] = std::move(residuals[w]);
   });
 }
 
-Linearization FitProblem::Bend(const Linearization& at, const Snapshot& snapshot, const FitPoint& from, const FitPoint& to, double share, const std::vector<Eigen::VectorXd>& probe) {
+Linearization FitProblem::Bend(const Linearization& at, const Snapshot& snapshot, const FitPoint& from,
+                               const FitPoint& to, double share, const std::vector<Eigen::VectorXd>& probe) {
   const Eigen::Index n = low_.size();
   const Eigen::VectorXd dy = to.y - from.y;
   std::vector<Eigen::VectorXd> gradients(windows_.size());
-  Linearization bend{.cost = at.cost, .hessian = at.hessian, .gradient = Eigen::VectorXd::Zero(n), .block_gradients = {}, .block_logs = {}, .state_gain = at.state_gain, .state_step = at.state_step, .valid = true};
+  Linearization bend{.cost = at.cost,
+                     .hessian = at.hessian,
+                     .gradient = Eigen::VectorXd::Zero(n),
+                     .block_gradients = {},
+                     .block_logs = {},
+                     .state_gain = at.state_gain,
+                     .state_step = at.state_step,
+                     .valid = true};
   pool_.ForEach(windows_.size(), [&](std::size_t w, int) {
     const Eigen::MatrixXd& jacobian = snapshot.jacobians[w];
     Eigen::VectorXd moved(jacobian.cols());
@@ -276,7 +302,8 @@ Snapshot FitProblem::Capture(const FitPoint& point, double step) {
   Snapshot snapshot = Differentiate(point, step, Columns::kAll);
   snapshot.linearization = Reduce(point, snapshot, false);
   snapshot.cost = snapshot.linearization.cost;
-  for (std::size_t w = 0; w < windows_.size() && snapshot.valid; ++w) ApplyRobustWeights(snapshot.residuals[w], snapshot.jacobians[w]);
+  for (std::size_t w = 0; w < windows_.size() && snapshot.valid; ++w)
+    ApplyRobustWeights(snapshot.residuals[w], snapshot.jacobians[w]);
   return snapshot;
 }
 
@@ -297,11 +324,12 @@ Snapshot FitProblem::Thin(const Snapshot& snapshot, const FitPoint& point, std::
   return thin;
 }
 
-ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const FitPoint& parent_point, const Snapshot& base) {
+ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& parent, const FitPoint& parent_point,
+                                  const Snapshot& base) {
   GS_CHECK(parent.windows_.size() == windows_.size());
   const Eigen::Index n = base.linearization.gradient.size();
   struct Part {
-    Eigen::VectorXd cross;   // reduced J' c
+    Eigen::VectorXd cross;  // reduced J' c
     double square = 0, slope = 0, raw = 0;
     bool valid = false;
   };
@@ -347,8 +375,9 @@ ColumnTest FitProblem::TestColumn(const FitPoint& point, const FitProblem& paren
   }
   test.valid = true;
   if (!(raw > 0)) return test;
-  // A coordinate on its bound cannot go further: the nuisance shift of a command that is later than one sample. Those that push outward already are
-  // held; one that the column would pull back inside is let go, one that it would push out is held too.
+  // A coordinate on its bound cannot go further: the nuisance shift of a command that is later than one sample. Those
+  // that push outward already are held; one that the column would pull back inside is let go, one that it would push
+  // out is held too.
   std::vector<int> bound(static_cast<std::size_t>(n), 0);  // 1: on its upper bound, -1: on its lower one
   std::vector<char> fixed(static_cast<std::size_t>(n), 0);
   const Eigen::VectorXd& gradient = base.linearization.gradient;

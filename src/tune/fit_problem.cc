@@ -14,7 +14,8 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The log's own initial state counts as much as this many samples at the window's start.
 constexpr double kStatePriorSamples = 5;
-constexpr double kMotorSidePrior_rad = 0.02;  // how well the pre-roll knows where a transmission's motor side stands beside its load
+constexpr double kMotorSidePrior_rad =
+    0.02;  // how well the pre-roll knows where a transmission's motor side stands beside its load
 constexpr double kOffsetBound_rad = 0.3;
 // Of the sum of squares, per residual and squared range of a coordinate.
 constexpr double kAnchor = 1e-8;
@@ -23,17 +24,27 @@ constexpr double kAnchor = 1e-8;
 
 FitProblem::~FitProblem() = default;
 
-FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options, std::vector<double> values, ThreadPool& pool)
-    : model_(model), recordings_(recordings), options_(std::move(options)), values_(std::move(values)), pool_(pool), workers_(pool.workers()), huber_threshold_(kInfinity) {
+FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options,
+                       std::vector<double> values, ThreadPool& pool)
+    : model_(model),
+      recordings_(recordings),
+      options_(std::move(options)),
+      values_(std::move(values)),
+      pool_(pool),
+      workers_(pool.workers()),
+      huber_threshold_(kInfinity) {
   std::vector<double> low, high;
   for (const int index : options_.free) {
     const Parameter& p = model.parameters()[index];
     Coordinate c{.parameter = index, .logarithmic = p.low > 0};
-    c.scale = c.logarithmic ? 1 : std::max({std::abs(p.nominal), 0.05 * (p.high - p.low), std::numeric_limits<double>::min()});
+    c.scale = c.logarithmic
+                  ? 1
+                  : std::max({std::abs(p.nominal), 0.05 * (p.high - p.low), std::numeric_limits<double>::min()});
     c.low = c.ToSearch(p.low);
     c.high = c.ToSearch(p.high);
     const double value = values_[index];
-    if (options_.logarithmic_effects && !c.logarithmic && value != 0 && p.name.find('@') != std::string::npos && p.unit.starts_with("N m")) {
+    if (options_.logarithmic_effects && !c.logarithmic && value != 0 && p.name.find('@') != std::string::npos &&
+        p.unit.starts_with("N m")) {
       constexpr double kLeast = 1e-3;  // of the value: zero is out of reach, and was not the answer
       c.logarithmic = true;
       c.scale = value > 0 ? 1 : -1;
@@ -57,7 +68,11 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       const double deviation = std::max(moments.deviation, measured.spec.resolution);
       if (!(deviation > 0)) continue;
       scalings[s].deviation = deviation;
-      if (measured.spec.scored) scalings[s].weight = options_.weights.empty() ? 1 / (options_.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean)) : options_.weights[measured.index];
+      if (measured.spec.scored)
+        scalings[s].weight = options_.weights.empty() ? 1 / (options_.normalization == Normalization::kDeviation
+                                                                 ? deviation
+                                                                 : std::hypot(deviation, moments.mean))
+                                                      : options_.weights[measured.index];
       if (measured.spec.kind != SignalKind::kPosition) continue;
       const SignalSource& source = model.source(measured.index);
       if (options_.fit_offsets) {
@@ -67,7 +82,8 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       }
       if (options_.fit_states) {
         scalings[s].joint_state = static_cast<int>(prior.size());
-        const double weight = std::sqrt(kStatePriorSamples) * (scalings[s].weight > 0 ? scalings[s].weight : 1 / deviation);
+        const double weight =
+            std::sqrt(kStatePriorSamples) * (scalings[s].weight > 0 ? scalings[s].weight : 1 / deviation);
         prior.push_back(weight);
         prior.push_back(weight * kSpeedPrior_s);
       }
@@ -90,7 +106,9 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
         const double begin = recording.time_s[window.begin];
         w.first_scored = 1;
         if (mode == ReplayMode::kWindows) {
-          while (w.first_scored + 2 < window.rows() && recording.time_s[window.begin + w.first_scored] - begin < options_.lead_in_s) ++w.first_scored;
+          while (w.first_scored + 2 < window.rows() &&
+                 recording.time_s[window.begin + w.first_scored] - begin < options_.lead_in_s)
+            ++w.first_scored;
         }
         windows_.push_back(std::move(w));
       }
@@ -100,15 +118,17 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
   }
   if (options_.max_windows > 0 && windows_.size() > options_.max_windows) {
     std::vector<FitWindow> kept;
-    for (std::size_t i = 0; i < options_.max_windows; ++i) kept.push_back(std::move(windows_[i * windows_.size() / options_.max_windows]));
+    for (std::size_t i = 0; i < options_.max_windows; ++i)
+      kept.push_back(std::move(windows_[i * windows_.size() / options_.max_windows]));
     windows_ = std::move(kept);
   }
   if (options_.fit_shift && model.command_delay() < 0) {
-    // In samples. A torque is read at a stamp under the command before: it jumps to the next command as soon as commands come early, and no descent gets past
-    // that. Where one is scored commands are late or on time.
+    // In samples. A torque is read at a stamp under the command before: it jumps to the next command as soon as
+    // commands come early, and no descent gets past that. Where one is scored commands are late or on time.
     bool torque = false;
     for (std::size_t l = 0; l < recordings.size(); ++l) {
-      for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) torque = torque || (recordings[l].measured[s].spec.kind == SignalKind::kTorque && scaling_[l][s].weight > 0);
+      for (std::size_t s = 0; s < recordings[l].measured.size(); ++s)
+        torque = torque || (recordings[l].measured[s].spec.kind == SignalKind::kTorque && scaling_[l][s].weight > 0);
     }
     low.push_back(torque ? 0 : -1);
     high.push_back(1);
@@ -127,7 +147,8 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     }
     scale *= scale;
   }
-  anchor_weight_ = kAnchor * scale * static_cast<double>(residuals()) * (high_ - low_).cwiseAbs2().cwiseMax(1e-12).cwiseInverse();
+  anchor_weight_ =
+      kAnchor * scale * static_cast<double>(residuals()) * (high_ - low_).cwiseAbs2().cwiseMax(1e-12).cwiseInverse();
   prior_weight_ = Eigen::VectorXd::Zero(low_.size());
   for (std::size_t i = 0; i < coordinates_.size() && options_.prior_share > 0; ++i) {
     // In units of the noise: only meaningful with weights of 1 / noise. An effect's parameters are what is asked for.
@@ -138,7 +159,8 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
   }
   for (std::size_t l = 0; l < scaling_.size() && options_.prior_offset_rad > 0; ++l) {
     for (const auto& scaling : scaling_[l]) {
-      if (scaling.offset >= 0) prior_weight_[scaling.offset] = std::pow(scaling.deviation / options_.prior_offset_rad, 2);
+      if (scaling.offset >= 0)
+        prior_weight_[scaling.offset] = std::pow(scaling.deviation / options_.prior_offset_rad, 2);
     }
   }
   anchor_weight_ += prior_weight_;
@@ -147,7 +169,8 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
 void FitProblem::CentrePrior(const std::vector<double>& values) {
   for (std::size_t i = 0; i < coordinates_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if (prior_weight_[k] > 0) anchor_[k] = std::clamp(coordinates_[i].ToSearch(values[coordinates_[i].parameter]), low_[k], high_[k]);
+    if (prior_weight_[k] > 0)
+      anchor_[k] = std::clamp(coordinates_[i].ToSearch(values[coordinates_[i].parameter]), low_[k], high_[k]);
   }
 }
 
@@ -156,7 +179,9 @@ void FitProblem::ScalePrior(double factor) {
   prior_weight_ *= factor;
 }
 
-double FitProblem::AnchorCost(const FitPoint& point) const { return 0.5 * anchor_weight_.cwiseProduct((point.y - anchor_).cwiseAbs2()).sum(); }
+double FitProblem::AnchorCost(const FitPoint& point) const {
+  return 0.5 * anchor_weight_.cwiseProduct((point.y - anchor_).cwiseAbs2()).sum();
+}
 
 std::size_t FitProblem::windows() const { return windows_.size(); }
 
@@ -185,7 +210,8 @@ FitPoint FitProblem::At(const std::vector<double>& values, FitPoint point) const
 
 std::vector<double> FitProblem::Values(const FitPoint& point) const {
   std::vector<double> values = values_;
-  for (std::size_t i = 0; i < coordinates_.size(); ++i) values[coordinates_[i].parameter] = coordinates_[i].ToValue(point.y[static_cast<Eigen::Index>(i)]);
+  for (std::size_t i = 0; i < coordinates_.size(); ++i)
+    values[coordinates_[i].parameter] = coordinates_[i].ToValue(point.y[static_cast<Eigen::Index>(i)]);
   for (const Couple& couple : couples_) SetCouple(couple, point.y[couple.size], point.y[couple.other], &values);
   return values;
 }
@@ -195,14 +221,17 @@ double FitProblem::Offset(const FitPoint& point, std::size_t log, std::size_t si
   return scaling.offset < 0 ? 0 : point.y[scaling.offset] * scaling.deviation;
 }
 
-double FitProblem::Shift(const FitPoint& point) const { return shift_scale_s_ == 0 ? options_.shift_s : point.y[point.y.size() - 1] * shift_scale_s_; }
+double FitProblem::Shift(const FitPoint& point) const {
+  return shift_scale_s_ == 0 ? options_.shift_s : point.y[point.y.size() - 1] * shift_scale_s_;
+}
 
 FitProblem::Worker& FitProblem::GetWorker(int index) {
   if (!workers_[index]) workers_[index] = std::make_unique<Worker>(model_, options_.time_step_s);
   return *workers_[index];
 }
 
-bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift,
+bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoint& point,
+                          const std::vector<double>& values, const Eigen::VectorXd& state, double shift,
                           std::vector<double>& predicted) const {
   const Recording& recording = recordings_[window.log];
   const std::size_t signals = recording.measured.size();
@@ -210,7 +239,9 @@ bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoin
   worker.simulator.set_shift_s(shift);
   if (!worker.simulator.SetParameters(values, recording)) return false;
   // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
-  const bool late = std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) { return source.delay >= 0 && values[source.delay] != values_[source.delay]; });
+  const bool late = std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) {
+    return source.delay >= 0 && values[source.delay] != values_[source.delay];
+  });
   worker.start = late ? InitialStateAt(model_, recording, window.rows.begin, values) : window.start;
   for (std::size_t s = 0; s < signals; ++s) {
     const Scaling& scaling = scaling_[window.log][s];
@@ -237,7 +268,8 @@ bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoin
   return worker.simulator.Run(recording, window.rows, worker.start, predicted).outcome == Outcome::kCompleted;
 }
 
-void FitProblem::Residuals(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted, Eigen::VectorXd& residual) const {
+void FitProblem::Residuals(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
+                           Eigen::VectorXd& residual) const {
   const Recording& recording = recordings_[window.log];
   const std::size_t signals = recording.measured.size(), rows = window.rows.rows();
   residual.resize(static_cast<Eigen::Index>((rows - window.first_scored) * signals));
@@ -252,7 +284,8 @@ void FitProblem::Residuals(const FitWindow& window, const FitPoint& point, const
   }
 }
 
-double FitProblem::WindowCost(const Eigen::VectorXd& residual, const FitWindow& window, const Eigen::VectorXd& state) const {
+double FitProblem::WindowCost(const Eigen::VectorXd& residual, const FitWindow& window,
+                              const Eigen::VectorXd& state) const {
   double cost = 0;
   if (huber_threshold_ == kInfinity) {
     cost = residual.squaredNorm();
@@ -265,7 +298,8 @@ double FitProblem::WindowCost(const Eigen::VectorXd& residual, const FitWindow& 
   return 0.5 * (cost + window.prior.cwiseProduct(state).squaredNorm());
 }
 
-double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs, std::vector<Eigen::VectorXd>* residuals) {
+double FitProblem::Cost(const FitPoint& point, std::vector<double>* log_costs,
+                        std::vector<Eigen::VectorXd>* residuals) {
   ++evaluations_;
   ++replays_;
   if (!journal_) return CostNow(point, log_costs, residuals);
@@ -286,10 +320,13 @@ double FitProblem::CostAndResiduals(const FitPoint& point, std::vector<Eigen::Ve
   return CostNow(point, nullptr, residuals);
 }
 
-double FitProblem::TakeBetterStates(FitPoint& point, std::vector<Eigen::VectorXd>& residuals, const FitPoint& other, std::vector<Eigen::VectorXd>& others) const {
+double FitProblem::TakeBetterStates(FitPoint& point, std::vector<Eigen::VectorXd>& residuals, const FitPoint& other,
+                                    std::vector<Eigen::VectorXd>& others) const {
   double total = AnchorCost(point);
   for (std::size_t w = 0; w < windows_.size(); ++w) {
-    const auto cost = [&](const FitPoint& at, const std::vector<Eigen::VectorXd>& of) { return of[w].size() > 0 ? WindowCost(of[w], windows_[w], at.states[w]) : kInfinity; };
+    const auto cost = [&](const FitPoint& at, const std::vector<Eigen::VectorXd>& of) {
+      return of[w].size() > 0 ? WindowCost(of[w], windows_[w], at.states[w]) : kInfinity;
+    };
     const double here = cost(point, residuals), there = cost(other, others);
     if (there < here) {
       point.states[w] = other.states[w];
@@ -306,7 +343,8 @@ std::vector<Eigen::VectorXd> FitProblem::ResidualsAgain(const FitPoint& point) {
   return residuals;
 }
 
-double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs, std::vector<Eigen::VectorXd>* residuals) {
+double FitProblem::CostNow(const FitPoint& point, std::vector<double>* log_costs,
+                           std::vector<Eigen::VectorXd>* residuals) {
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<double> costs(windows_.size());
@@ -340,7 +378,8 @@ void FitProblem::WeighStates(const FitPoint& point) {
     const FitWindow& window = windows_[w];
     const auto scored = static_cast<Eigen::Index>(window.rows.rows() - window.first_scored);
     squares[window.log].resize(scaling_[window.log].size());
-    for (std::size_t s = 0; s < scaling_[window.log].size() && residuals[w].size() > 0; ++s) squares[window.log][s] += residuals[w].segment(static_cast<Eigen::Index>(s) * scored, scored).squaredNorm();
+    for (std::size_t s = 0; s < scaling_[window.log].size() && residuals[w].size() > 0; ++s)
+      squares[window.log][s] += residuals[w].segment(static_cast<Eigen::Index>(s) * scored, scored).squaredNorm();
     rows[window.log] += static_cast<std::size_t>(scored);
   }
   for (std::size_t l = 0; l < scaling_.size(); ++l) {
@@ -348,7 +387,8 @@ void FitProblem::WeighStates(const FitPoint& point) {
       const auto& measured = recordings_[l].measured[s];
       // Behind a filter a joint is not where the log says.
       if (scaling_[l][s].joint_state < 0 || model_.source(measured.index).cutoff >= 0) continue;
-      const double noise = EstimateNoise(recordings_[l].time_s, measured.values, {.resolution = measured.spec.resolution}).total_std;
+      const double noise =
+          EstimateNoise(recordings_[l].time_s, measured.values, {.resolution = measured.spec.resolution}).total_std;
       const double mismatch = std::sqrt(squares[l][s] / static_cast<double>(rows[l]));
       if (!(noise > 0)) continue;
       for (auto& window : windows_) {
@@ -380,7 +420,8 @@ void FitProblem::UpdateRobustScale(const FitPoint& point) {
   huber_threshold_ = options_.huber * 1.4826 * all[all.size() / 2];  // the median of |r| as a standard deviation
 }
 
-FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent_point, const std::vector<double>& values, const Eigen::VectorXd& parent_dy) const {
+FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent_point,
+                                const std::vector<double>& values, const Eigen::VectorXd& parent_dy) const {
   FitPoint point = Start();
   Eigen::VectorXd y = parent_point.y;
   if (parent_dy.size() == y.size()) y = (y + parent_dy).cwiseMax(parent.low_).cwiseMin(parent.high_);
@@ -388,13 +429,15 @@ FitPoint FitProblem::FromParent(const FitProblem& parent, const FitPoint& parent
   std::vector<double> mine = values;
   for (const Coordinate& c : coordinates_) {
     for (const Coordinate& other : parent.coordinates_) {
-      if (parent.model_.parameters()[other.parameter].name == model_.parameters()[c.parameter].name) mine[c.parameter] = known[other.parameter];
+      if (parent.model_.parameters()[other.parameter].name == model_.parameters()[c.parameter].name)
+        mine[c.parameter] = known[other.parameter];
     }
   }
   point.y.head(static_cast<Eigen::Index>(coordinates_.size())) = ToSearch(mine);
   for (std::size_t l = 0; l < scaling_.size(); ++l) {
     for (std::size_t s = 0; s < scaling_[l].size(); ++s) {
-      if (scaling_[l][s].offset >= 0 && parent.scaling_[l][s].offset >= 0) point.y[scaling_[l][s].offset] = y[parent.scaling_[l][s].offset];
+      if (scaling_[l][s].offset >= 0 && parent.scaling_[l][s].offset >= 0)
+        point.y[scaling_[l][s].offset] = y[parent.scaling_[l][s].offset];
     }
   }
   if (shift_scale_s_ > 0 && parent.shift_scale_s_ > 0) point.y[point.y.size() - 1] = y[y.size() - 1];
@@ -416,7 +459,8 @@ std::vector<double> FitProblem::BlockCosts(const FitPoint& point) {
     const FitWindow& window = windows_[w];
     if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) return;
     Residuals(window, point, worker.base, worker.residual);
-    const std::size_t signals = recordings_[window.log].measured.size(), scored = window.rows.rows() - window.first_scored;
+    const std::size_t signals = recordings_[window.log].measured.size(),
+                      scored = window.rows.rows() - window.first_scored;
     const double* time = recordings_[window.log].time_s.data() + window.rows.begin + window.first_scored;
     for (std::size_t begin = 0; begin < scored;) {
       std::size_t end = begin + 1;
@@ -459,7 +503,8 @@ std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
     // Windows share their border row; the later one leaves it to the earlier.
     for (std::size_t s = 0; s < signals.size(); ++s) {
       const double offset = Offset(point, window.log, s);
-      for (std::size_t r = window.rows.begin == 0 ? 0 : 1; r < window.rows.rows(); ++r) signals[s].predicted[window.rows.begin + r] = worker.base[r * signals.size() + s] + offset;
+      for (std::size_t r = window.rows.begin == 0 ? 0 : 1; r < window.rows.rows(); ++r)
+        signals[s].predicted[window.rows.begin + r] = worker.base[r * signals.size() + s] + offset;
     }
   });
   for (std::size_t w = 0; w < windows_.size(); ++w) {

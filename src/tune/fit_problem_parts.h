@@ -12,7 +12,7 @@ inline constexpr double kBlock_s = 0.5;  // length of a block of residuals that 
 
 // How a signal of a log enters the cost.
 struct FitProblem::Scaling {
-  double weight = 0;     // 1 / standard deviation of the signal; 0: not scored
+  double weight = 0;  // 1 / standard deviation of the signal; 0: not scored
   double deviation = 1;
   int offset = -1;       // index in y
   int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
@@ -23,8 +23,9 @@ struct FitProblem::FitWindow {
   Window rows;
   std::size_t first_scored = 0;  // row in the window
   double weight = 1;
-  InitialState start;            // from the log, without offsets
-  Eigen::VectorXd prior;         // weight of each state correction: angle and speed of each measured joint, then of each hidden motor side
+  InitialState start;  // from the log, without offsets
+  Eigen::VectorXd
+      prior;  // weight of each state correction: angle and speed of each measured joint, then of each hidden motor side
 };
 
 struct FitProblem::Worker {

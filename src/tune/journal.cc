@@ -16,7 +16,8 @@ constexpr char kMagic[8] = {'g', 's', 'j', 'o', 'u', 'r', 'n', '1'};
 
 std::uint64_t HashPoint(const FitPoint& point) {
   std::uint64_t hash = Hash(point.y.data(), sizeof(double) * static_cast<std::size_t>(point.y.size()));
-  for (const auto& state : point.states) hash = Hash(state.data(), sizeof(double) * static_cast<std::size_t>(state.size()), hash);
+  for (const auto& state : point.states)
+    hash = Hash(state.data(), sizeof(double) * static_cast<std::size_t>(state.size()), hash);
   return hash;
 }
 
@@ -48,10 +49,19 @@ Result<std::unique_ptr<Journal>> Journal::Open(const std::string& path, std::uin
   std::error_code failure;
   if (resume && std::filesystem::exists(path, failure)) {
     GS_ASSIGN(const std::string bytes, ReadFile(path));
-    std::uint64_t stored = bytes.size() < 16 && std::equal(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, bytes.size())), kMagic) ? key : 0;
+    std::uint64_t stored =
+        bytes.size() < 16 &&
+                std::equal(bytes.begin(),
+                           bytes.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(8, bytes.size())), kMagic)
+            ? key
+            : 0;
     if (bytes.size() >= 16 && std::memcmp(bytes.data(), kMagic, 8) == 0) std::memcpy(&stored, bytes.data() + 8, 8);
     if (stored != key) {
-      return Error{.what = "the journal belongs to another job", .where = path, .actual = "", .allowed = "the same experiment, logs and options", .cure = "run without --resume"};
+      return Error{.what = "the journal belongs to another job",
+                   .where = path,
+                   .actual = "",
+                   .allowed = "the same experiment, logs and options",
+                   .cure = "run without --resume"};
     }
     good = bytes.size() < 16 ? 0 : 16;  // cut in its head: nothing is lost
     while (good > 0 && good + 16 <= bytes.size()) {
@@ -70,7 +80,8 @@ Result<std::unique_ptr<Journal>> Journal::Open(const std::string& path, std::uin
   journal->file_ = std::fopen(path.c_str(), good > 0 ? "r+b" : "wb");
   if (!journal->file_) return Error{.what = "cannot open the journal", .where = path, .actual = std::strerror(errno)};
   if (good > 0) {
-    if (ftruncate(fileno(journal->file_), static_cast<off_t>(good)) != 0) return Error{.what = "cannot continue the journal", .where = path, .actual = std::strerror(errno)};
+    if (ftruncate(fileno(journal->file_), static_cast<off_t>(good)) != 0)
+      return Error{.what = "cannot continue the journal", .where = path, .actual = std::strerror(errno)};
     std::fseek(journal->file_, 0, SEEK_END);
   } else {
     std::fwrite(kMagic, 1, 8, journal->file_);
@@ -103,7 +114,8 @@ void Journal::Append(const FitPoint& point, const std::vector<double>& record) {
 }
 
 std::vector<double> Pack(const Linearization& l) {
-  std::vector<double> out = {l.cost, l.valid ? 1.0 : 0.0, static_cast<double>(l.block_gradients.size()), static_cast<double>(l.state_gain.size())};
+  std::vector<double> out = {l.cost, l.valid ? 1.0 : 0.0, static_cast<double>(l.block_gradients.size()),
+                             static_cast<double>(l.state_gain.size())};
   Put(out, l.hessian);
   Put(out, l.gradient);
   for (const auto& block : l.block_gradients) Put(out, block);

@@ -1,4 +1,5 @@
-// What a fit has computed so far, so that an interrupted one goes on to the same result: every evaluation or iteration in order, with a hash of its point and numbers.
+// What a fit has computed so far, so that an interrupted one goes on to the same result: every evaluation or iteration
+// in order, with a hash of its point and numbers.
 #ifndef GAPSCOPE_TUNE_JOURNAL_H_
 #define GAPSCOPE_TUNE_JOURNAL_H_
 
@@ -17,8 +18,9 @@ std::uint64_t Hash(const void* bytes, std::size_t size, std::uint64_t seed = 146
 
 class Journal {
  public:
-  // Opens `path`; `key` identifies the job (experiment, logs, options). With `resume`, records of the same job are kept and handed out again; a torn
-  // last record is dropped. Otherwise the journal starts empty. Errors: cannot open or write; with `resume`, a journal of another job.
+  // Opens `path`; `key` identifies the job (experiment, logs, options). With `resume`, records of the same job are kept
+  // and handed out again; a torn last record is dropped. Otherwise the journal starts empty. Errors: cannot open or
+  // write; with `resume`, a journal of another job.
   static Result<std::unique_ptr<Journal>> Open(const std::string& path, std::uint64_t key, bool resume);
   ~Journal();
 

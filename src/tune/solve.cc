@@ -14,12 +14,15 @@ constexpr double kLeastDamping = 1e-9, kSmallDamping = 1e-3;
 
 bool Late(const Deadline& deadline) { return deadline && std::chrono::steady_clock::now() >= *deadline; }
 
-// The damped step inside the bounds: a coordinate that the step would push through its bound is put on it and the rest is solved again.
-Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, const Eigen::VectorXd& low, const Eigen::VectorXd& high, double damping) {
+// The damped step inside the bounds: a coordinate that the step would push through its bound is put on it and the rest
+// is solved again.
+Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, const Eigen::VectorXd& low,
+                            const Eigen::VectorXd& high, double damping) {
   const Eigen::Index n = point.y.size();
   if (n == 0) return Eigen::VectorXd();
   Eigen::MatrixXd hessian = at.hessian;
-  hessian.diagonal() += damping * at.hessian.diagonal().cwiseMax(1e-12 * std::max(at.hessian.diagonal().maxCoeff(), 1e-300));
+  hessian.diagonal() +=
+      damping * at.hessian.diagonal().cwiseMax(1e-12 * std::max(at.hessian.diagonal().maxCoeff(), 1e-300));
   Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
   std::vector<char> fixed(static_cast<std::size_t>(n), 0);
   for (Eigen::Index round = 0; round <= n; ++round) {
@@ -36,7 +39,8 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
       for (Eigen::Index j = 0; j < n; ++j) {
         if (fixed[static_cast<std::size_t>(j)]) g[a] -= at.hessian(free[static_cast<std::size_t>(a)], j) * step[j];
       }
-      for (Eigen::Index b = 0; b < k; ++b) h(a, b) = hessian(free[static_cast<std::size_t>(a)], free[static_cast<std::size_t>(b)]);
+      for (Eigen::Index b = 0; b < k; ++b)
+        h(a, b) = hessian(free[static_cast<std::size_t>(a)], free[static_cast<std::size_t>(b)]);
     }
     const Eigen::VectorXd solution = h.ldlt().solve(g);
     bool again = false;
@@ -44,7 +48,8 @@ Eigen::VectorXd BoundedStep(const Linearization& at, const FitPoint& point, cons
       const Eigen::Index i = free[static_cast<std::size_t>(a)];
       const double target = point.y[i] + solution[a];
       step[i] = std::isfinite(solution[a]) ? std::clamp(target, low[i], high[i]) - point.y[i] : 0;
-      if (!std::isfinite(solution[a]) || target < low[i] || target > high[i]) fixed[static_cast<std::size_t>(i)] = 1, again = true;
+      if (!std::isfinite(solution[a]) || target < low[i] || target > high[i])
+        fixed[static_cast<std::size_t>(i)] = 1, again = true;
     }
     if (!again) break;
   }
@@ -62,8 +67,15 @@ struct LmState {
 };
 
 std::vector<double> Pack(const LmState& s, std::size_t evaluations, std::size_t replays) {
-  std::vector<double> record = {s.cost, s.damping, s.difference, static_cast<double>(s.quiet), static_cast<double>(s.iterations), static_cast<double>(s.done), static_cast<double>(s.termination),
-                                static_cast<double>(evaluations), static_cast<double>(replays)};
+  std::vector<double> record = {s.cost,
+                                s.damping,
+                                s.difference,
+                                static_cast<double>(s.quiet),
+                                static_cast<double>(s.iterations),
+                                static_cast<double>(s.done),
+                                static_cast<double>(s.termination),
+                                static_cast<double>(evaluations),
+                                static_cast<double>(replays)};
   record.insert(record.end(), s.point.y.begin(), s.point.y.end());
   for (const auto& state : s.point.states) record.insert(record.end(), state.begin(), state.end());
   return record;
@@ -82,8 +94,8 @@ void Unpack(const std::vector<double>& record, LmState* s, FitProblem* problem) 
   }
 }
 
-// Moves on with the Jacobian of the last linearization, kept up by secant updates: a step costs one replay instead of one per column. Ends when a step
-// gains less than promised, or little: only a true Jacobian can tell the bottom.
+// Moves on with the Jacobian of the last linearization, kept up by secant updates: a step costs one replay instead of
+// one per column. Ends when a step gains less than promised, or little: only a true Jacobian can tell the bottom.
 void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& options, LmState* s) {
   constexpr int kMostSteps = 8;
   constexpr double kPoorRatio = 0.2;  // of the promised gain
@@ -108,20 +120,26 @@ void SecantSteps(FitProblem& problem, Snapshot& snapshot, const SolveOptions& op
   }
 }
 
-// The step, bent along a curved valley by the residuals' second derivative along it (geodesic acceleration: Transtrum and Sethna, "Improvements to the
-// Levenberg-Marquardt algorithm for nonlinear least-squares minimization", arXiv:1201.5885, 2012): one replay, where straight steps down such a valley take many Jacobians.
-FitPoint BentStep(FitProblem& problem, const Snapshot& snapshot, const Linearization& at, const LmState& s, const Eigen::VectorXd& step) {
-  constexpr double kShare = 0.1;    // of the step, at which the bend is measured
-  constexpr double kMostBend = 0.75;  // |acceleration| / |velocity|, beyond which the second derivative tells nothing about the whole step
+// The step, bent along a curved valley by the residuals' second derivative along it (geodesic acceleration: Transtrum
+// and Sethna, "Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization",
+// arXiv:1201.5885, 2012): one replay, where straight steps down such a valley take many Jacobians.
+FitPoint BentStep(FitProblem& problem, const Snapshot& snapshot, const Linearization& at, const LmState& s,
+                  const Eigen::VectorXd& step) {
+  constexpr double kShare = 0.1;  // of the step, at which the bend is measured
+  constexpr double kMostBend =
+      0.75;  // |acceleration| / |velocity|, beyond which the second derivative tells nothing about the whole step
   const FitPoint straight = problem.Move(s.point, at, step);
   FitPoint probe = s.point;
   probe.y += kShare * (straight.y - s.point.y);
-  for (std::size_t w = 0; w < probe.states.size(); ++w) probe.states[w] += kShare * (straight.states[w] - s.point.states[w]);
+  for (std::size_t w = 0; w < probe.states.size(); ++w)
+    probe.states[w] += kShare * (straight.states[w] - s.point.states[w]);
   std::vector<Eigen::VectorXd> residuals;
   if (!std::isfinite(problem.CostAndResiduals(probe, &residuals))) return straight;
   const Linearization bend = problem.Bend(at, snapshot, s.point, straight, kShare, residuals);
   const Eigen::VectorXd correction = BoundedStep(bend, straight, problem.low(), problem.high(), s.damping);
-  const auto length = [&](const Eigen::VectorXd& v) { return std::sqrt(std::max(0.0, v.dot(at.hessian * v) + s.damping * v.cwiseAbs2().dot(at.hessian.diagonal()))); };
+  const auto length = [&](const Eigen::VectorXd& v) {
+    return std::sqrt(std::max(0.0, v.dot(at.hessian * v) + s.damping * v.cwiseAbs2().dot(at.hessian.diagonal())));
+  };
   if (2 * length(correction) > kMostBend * length(step)) return straight;
   return problem.Move(straight, bend, correction);
 }
@@ -129,7 +147,9 @@ FitPoint BentStep(FitProblem& problem, const Snapshot& snapshot, const Lineariza
 // One Jacobian, and the steps made with it.
 void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
   constexpr double kMostDamping = 1e8, kWorthwhile = 0.1, kWorthwhileCoarse = 10;  // shares of the tolerance
-  Snapshot snapshot = problem.Differentiate(s->point, s->difference, options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll, std::move(s->residuals));
+  Snapshot snapshot = problem.Differentiate(s->point, s->difference,
+                                            options.central ? FitProblem::Columns::kCentral : FitProblem::Columns::kAll,
+                                            std::move(s->residuals));
   s->residuals = snapshot.residuals;
   const Linearization at = problem.Reduce(s->point, snapshot, false);
   const auto end = [&](Termination termination) { s->done = true, s->termination = termination; };
@@ -141,12 +161,15 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
     const double promised = -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
     // What little is left is for the finer difference to find.
     const bool coarse = s->difference > options.fine_step;
-    if (rejected >= (coarse ? 1 : 2) && promised < (coarse ? kWorthwhileCoarse : kWorthwhile) * options.tolerance * s->cost) break;
+    if (rejected >= (coarse ? 1 : 2) &&
+        promised < (coarse ? kWorthwhileCoarse : kWorthwhile) * options.tolerance * s->cost)
+      break;
     FitPoint trial = BentStep(problem, snapshot, at, *s, step);
     std::vector<Eigen::VectorXd> residuals;
     double cost = problem.CostAndResiduals(trial, &residuals);
     if (!(cost < s->cost)) {
-      // States take whole steps, however damped y is: where a window's motion tips over at the least touch, better none.
+      // States take whole steps, however damped y is: where a window's motion tips over at the least touch, better
+      // none.
       std::vector<Eigen::VectorXd> others;
       const FitPoint still{.y = trial.y, .states = s->point.states};
       problem.CostAndResiduals(still, &others);
@@ -186,7 +209,8 @@ void Iterate(FitProblem& problem, const SolveOptions& options, LmState* s) {
 SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
   LmState s{.point = start, .damping = options.damping, .difference = options.coarse_step};
   s.cost = problem.Cost(start, nullptr, &s.residuals);
-  const bool any_state = std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
+  const bool any_state =
+      std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
   if (!std::isfinite(s.cost)) {
     s.termination = Termination::kNotSimulated;
   } else if (start.y.size() == 0 && !any_state) {
@@ -210,9 +234,11 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
       if (s.residuals.empty()) s.residuals = problem.ResidualsAgain(s.point);  // resumed
       const std::size_t evaluations = problem.evaluations(), replays = problem.replays();
       Iterate(problem, options, &s);
-      if (options.progress) options.progress({.best = s.cost, .evaluations = problem.evaluations(), .iteration = s.iterations});
+      if (options.progress)
+        options.progress({.best = s.cost, .evaluations = problem.evaluations(), .iteration = s.iterations});
       // An iteration that the deadline cut short is made anew.
-      if (problem.journal() && !Late(options.deadline)) problem.journal()->Append(before, Pack(s, problem.evaluations() - evaluations, problem.replays() - replays));
+      if (problem.journal() && !Late(options.deadline))
+        problem.journal()->Append(before, Pack(s, problem.evaluations() - evaluations, problem.replays() - replays));
     }
   }
   return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations};
@@ -222,7 +248,7 @@ SolveResult LevenbergMarquardt(FitProblem& problem, const FitPoint& start, const
 struct NloptRun {
   FitProblem* problem;
   const SolveOptions* options;
-  FitPoint point;       // states are carried from one evaluation to the next
+  FitPoint point;  // states are carried from one evaluation to the next
   SolveResult best;
   bool gradient;
   bool stop = false;
@@ -240,7 +266,8 @@ double Evaluate(const std::vector<double>& y, std::vector<double>& gradient, voi
   if (!gradient.empty()) {
     const Linearization at = run->problem->Linearize(run->point, run->options->fine_step);
     cost = at.valid ? at.cost : HUGE_VAL;
-    for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] = at.valid ? at.gradient[static_cast<Eigen::Index>(i)] : 0;
+    for (std::size_t i = 0; i < gradient.size(); ++i)
+      gradient[i] = at.valid ? at.gradient[static_cast<Eigen::Index>(i)] : 0;
   } else {
     cost = run->problem->Cost(run->point);
   }
@@ -248,12 +275,15 @@ double Evaluate(const std::vector<double>& y, std::vector<double>& gradient, voi
     run->best.cost = cost;
     run->best.point = run->point;
   }
-  if (run->options->progress) run->options->progress({.best = run->best.cost, .evaluations = run->problem->evaluations(), .iteration = ++run->best.iterations});
+  if (run->options->progress)
+    run->options->progress(
+        {.best = run->best.cost, .evaluations = run->problem->evaluations(), .iteration = ++run->best.iterations});
   return std::isfinite(cost) ? cost : 1e300;
 }
 
 SolveResult WithNlopt(FitProblem& problem, const FitPoint& start, const SolveOptions& options) {
-  constexpr nlopt::algorithm kAlgorithms[] = {nlopt::LD_SLSQP, nlopt::LD_SLSQP, nlopt::LD_MMA, nlopt::LN_BOBYQA, nlopt::GN_CRS2_LM, nlopt::GN_ISRES, nlopt::GN_DIRECT_L};
+  constexpr nlopt::algorithm kAlgorithms[] = {nlopt::LD_SLSQP,   nlopt::LD_SLSQP, nlopt::LD_MMA,     nlopt::LN_BOBYQA,
+                                              nlopt::GN_CRS2_LM, nlopt::GN_ISRES, nlopt::GN_DIRECT_L};
   const auto n = static_cast<unsigned>(start.y.size());
   NloptRun run{.problem = &problem, .options = &options, .point = start};
   run.best.point = start;
@@ -294,12 +324,18 @@ const std::vector<std::string>& OptimizerNames() {
 
 std::string TerminationText(Termination termination) {
   switch (termination) {
-    case Termination::kConverged: return "converged";
-    case Termination::kIterations: return "iteration limit";
-    case Termination::kBudget: return "budget spent";
-    case Termination::kStalled: return "stalled at the start";
-    case Termination::kHopeless: return "given up: far behind";
-    case Termination::kNotSimulated: return "the start cannot be simulated";
+    case Termination::kConverged:
+      return "converged";
+    case Termination::kIterations:
+      return "iteration limit";
+    case Termination::kBudget:
+      return "budget spent";
+    case Termination::kStalled:
+      return "stalled at the start";
+    case Termination::kHopeless:
+      return "given up: far behind";
+    case Termination::kNotSimulated:
+      return "the start cannot be simulated";
   }
   return "";
 }

@@ -14,8 +14,15 @@ constexpr double kSingleLogHeldOut = 0.3;
 constexpr double kAgree = 0.01;  // starts agree when their costs differ by less than this share
 
 FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& free, double time_step_s) {
-  return {.free = free, .objective = options.objective, .window_s = options.window_s, .time_step_s = time_step_s, .fit_offsets = options.fit_offsets,
-          .fit_shift = options.fit_shift, .fit_states = options.fit_states, .normalization = options.normalization, .huber = options.huber};
+  return {.free = free,
+          .objective = options.objective,
+          .window_s = options.window_s,
+          .time_step_s = time_step_s,
+          .fit_offsets = options.fit_offsets,
+          .fit_shift = options.fit_shift,
+          .fit_states = options.fit_states,
+          .normalization = options.normalization,
+          .huber = options.huber};
 }
 
 // A random start inside the middle of the bounds.
@@ -29,20 +36,33 @@ FitPoint RandomStart(const FitProblem& problem, std::mt19937_64& random) {
   return point;
 }
 
-std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vector<double>& start, const TuneOptions& options) {
+std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vector<double>& start,
+                     const TuneOptions& options) {
   std::uint64_t key = Hash(start.data(), sizeof(double) * start.size());
   const auto add = [&](const std::string& text) { key = Hash(text.data(), text.size(), key); };
   for (const auto& p : model.parameters()) add(p.name);
   for (const auto* part : {&data.train, &data.held_out}) {
     for (const auto& recording : *part) {
-      for (const auto& measured : recording.measured) key = Hash(measured.values.data(), sizeof(double) * measured.values.size(), key);
-      for (const auto& command : recording.commands) key = Hash(command.values.data(), sizeof(double) * command.values.size(), key);
+      for (const auto& measured : recording.measured)
+        key = Hash(measured.values.data(), sizeof(double) * measured.values.size(), key);
+      for (const auto& command : recording.commands)
+        key = Hash(command.values.data(), sizeof(double) * command.values.size(), key);
       key = Hash(recording.time_s.data(), sizeof(double) * recording.time_s.size(), key);
     }
   }
-  const double numbers[] = {static_cast<double>(options.objective), options.window_s, static_cast<double>(options.fit_offsets), static_cast<double>(options.fit_shift),
-                            static_cast<double>(options.fit_states), options.huber, options.time_step_s, static_cast<double>(options.starts), static_cast<double>(options.solve.optimizer),
-                            options.solve.tolerance, static_cast<double>(options.normalization), static_cast<double>(options.solve.max_iterations), static_cast<double>(options.solve.seed)};
+  const double numbers[] = {static_cast<double>(options.objective),
+                            options.window_s,
+                            static_cast<double>(options.fit_offsets),
+                            static_cast<double>(options.fit_shift),
+                            static_cast<double>(options.fit_states),
+                            options.huber,
+                            options.time_step_s,
+                            static_cast<double>(options.starts),
+                            static_cast<double>(options.solve.optimizer),
+                            options.solve.tolerance,
+                            static_cast<double>(options.normalization),
+                            static_cast<double>(options.solve.max_iterations),
+                            static_cast<double>(options.solve.seed)};
   key = Hash(numbers, sizeof numbers, key);
   return Hash(options.free.data(), sizeof(int) * options.free.size(), key);
 }
@@ -52,7 +72,8 @@ std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vecto
 Recording Slice(const Recording& recording, std::size_t begin, std::size_t end) {
   Recording part = recording;
   const auto cut = [&](std::vector<double>& values) {
-    values = std::vector<double>(values.begin() + static_cast<std::ptrdiff_t>(begin), values.begin() + static_cast<std::ptrdiff_t>(end));
+    values = std::vector<double>(values.begin() + static_cast<std::ptrdiff_t>(begin),
+                                 values.begin() + static_cast<std::ptrdiff_t>(end));
   };
   cut(part.time_s);
   const double shift = part.time_s.front();
@@ -85,11 +106,14 @@ DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::si
     count += keep[i];
     (keep[i] ? split.held_out : split.train).push_back(std::move(recordings[i]));
   }
-  split.how = held_out.empty() ? "every third log, from the second on (" + std::to_string(count) + " of " + std::to_string(recordings.size()) + ")" : "as asked (" + std::to_string(count) + ")";
+  split.how = held_out.empty() ? "every third log, from the second on (" + std::to_string(count) + " of " +
+                                     std::to_string(recordings.size()) + ")"
+                               : "as asked (" + std::to_string(count) + ")";
   return split;
 }
 
-std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings, const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
+std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
+                                const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
                                 const TuneOptions& options, ThreadPool& pool) {
   if (recordings.empty()) return {};
   FitOptions fit = MakeFitOptions(options, {}, options.time_step_s);
@@ -107,19 +131,26 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   return problem.Predict(point);
 }
 
-Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::vector<double>& start, const TuneOptions& asked, ThreadPool& pool) {
+Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::vector<double>& start,
+                         const TuneOptions& asked, ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
   TuneOptions options = asked;
   std::vector<int> free = options.free;
   if (free.empty()) {
     for (std::size_t i = 0; i < model.parameters().size(); ++i) {
-      if (!model.parameters()[i].frozen && model.parameters()[i].low < model.parameters()[i].high) free.push_back(static_cast<int>(i));
+      if (!model.parameters()[i].frozen && model.parameters()[i].low < model.parameters()[i].high)
+        free.push_back(static_cast<int>(i));
     }
   }
-  if (free.empty()) return Error{.what = "no parameter is free", .where = model.experiment().path, .cure = "use --free NAME"};
-  TuneSummary summary{.optimizer = OptimizerNames()[static_cast<int>(options.solve.optimizer)], .values = start, .split = data.how};
+  if (free.empty())
+    return Error{.what = "no parameter is free", .where = model.experiment().path, .cure = "use --free NAME"};
+  TuneSummary summary{
+      .optimizer = OptimizerNames()[static_cast<int>(options.solve.optimizer)], .values = start, .split = data.how};
   if (options.time_step_s <= 0) {
-    options.time_step_s = ChooseTimeStep(model, data.train, {.mode = ReplayMode::kWindows, .window_s = options.window_s, .values = start}, pool).step_s;
+    options.time_step_s =
+        ChooseTimeStep(model, data.train, {.mode = ReplayMode::kWindows, .window_s = options.window_s, .values = start},
+                       pool)
+            .step_s;
   }
   summary.time_step_s = options.time_step_s;
   std::unique_ptr<Journal> journal;
@@ -128,21 +159,25 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   }
   const auto solve_begin = std::chrono::steady_clock::now();
   // Windows first: they converge from far; the free run then sees what is slow, when it can be simulated at all.
-  const auto solve_from = [&](const FitPoint* random, std::vector<double>* values, FitProblem** last, std::vector<std::unique_ptr<FitProblem>>* problems) -> SolveResult {
+  const auto solve_from = [&](const FitPoint* random, std::vector<double>* values, FitProblem** last,
+                              std::vector<std::unique_ptr<FitProblem>>* problems) -> SolveResult {
     TuneOptions stage = options;
     stage.objective = options.objective == Objective::kFreeRun ? Objective::kFreeRun : Objective::kWindows;
-    problems->push_back(std::make_unique<FitProblem>(model, data.train, MakeFitOptions(stage, free, options.time_step_s), start, pool));
+    problems->push_back(
+        std::make_unique<FitProblem>(model, data.train, MakeFitOptions(stage, free, options.time_step_s), start, pool));
     FitProblem* problem = problems->back().get();
     problem->set_journal(journal.get());
     FitPoint point = random ? *random : problem->Start();
     SolveResult found = Solve(*problem, point, options.solve);
-    if (options.objective != Objective::kBoth && (options.huber > 0 || options.fit_states) && found.termination != Termination::kNotSimulated) {
+    if (options.objective != Objective::kBoth && (options.huber > 0 || options.fit_states) &&
+        found.termination != Termination::kNotSimulated) {
       if (options.fit_states) problem->WeighStates(found.point);
       problem->UpdateRobustScale(found.point);
       found = Solve(*problem, found.point, options.solve);
     }
     if (options.objective == Objective::kBoth && found.termination != Termination::kNotSimulated) {
-      problems->push_back(std::make_unique<FitProblem>(model, data.train, MakeFitOptions(options, free, options.time_step_s), start, pool));
+      problems->push_back(std::make_unique<FitProblem>(
+          model, data.train, MakeFitOptions(options, free, options.time_step_s), start, pool));
       FitProblem* both = problems->back().get();
       both->set_journal(journal.get());
       FitPoint joint = both->Start();
@@ -190,11 +225,14 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     problems.clear();
   }
   if (best.termination == Termination::kNotSimulated) {
-    return Error{.what = "the model cannot be simulated at the start of the fit", .where = model.experiment().path, .cure = "check the parameters' nominal values, or use shorter windows (--window)"};
+    return Error{.what = "the model cannot be simulated at the start of the fit",
+                 .where = model.experiment().path,
+                 .cure = "check the parameters' nominal values, or use shorter windows (--window)"};
   }
   summary.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - solve_begin).count();
   summary.termination = best.termination;
-  for (const double cost : summary.start_costs) summary.starts_agree = summary.starts_agree && cost <= best.cost * (1 + kAgree);
+  for (const double cost : summary.start_costs)
+    summary.starts_agree = summary.starts_agree && cost <= best.cost * (1 + kAgree);
   summary.shift_s = best_problem->Shift(best.point);
   Uncertainty uncertainty = EstimateUncertainty(*best_problem, best.point, model, options.solve.fine_step);
   summary.tuned = std::move(uncertainty.tuned);

@@ -6,21 +6,24 @@
 namespace gapscope {
 namespace {
 
-constexpr double kFlatShare = 0.25;       // a direction whose deviation exceeds this share of the range is not known
+constexpr double kFlatShare = 0.25;  // a direction whose deviation exceeds this share of the range is not known
 constexpr double kCorrelated = 0.95;
-constexpr double kBoundShare = 1e-3;      // of the range
+constexpr double kBoundShare = 1e-3;        // of the range
 constexpr double kLeastEigenvalue = 1e-13;  // of the largest: below is rounding
 
 // 97.5 % quantile of Student's t (Abramowitz & Stegun 26.7.5, two terms).
 double StudentQuantile(double freedom) {
   const double z = 1.959964;
-  return freedom < 1 ? 12.7 : z + (z * z * z + z) / (4 * freedom) + (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96 * freedom * freedom);
+  return freedom < 1 ? 12.7
+                     : z + (z * z * z + z) / (4 * freedom) +
+                           (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96 * freedom * freedom);
 }
 
 }  // namespace
 
-// Cluster-robust ("sandwich") covariance: H^-1 (sum over half-second blocks of g g') H^-1, with the finite-sample factors of a clustered regression
-// (Liang & Zeger, Biometrika 73, 1986; Cameron & Miller, J. Human Resources 50, 2015): right for coloured residuals and for a wrong noise model.
+// Cluster-robust ("sandwich") covariance: H^-1 (sum over half-second blocks of g g') H^-1, with the finite-sample
+// factors of a clustered regression (Liang & Zeger, Biometrika 73, 1986; Cameron & Miller, J. Human Resources 50,
+// 2015): right for coloured residuals and for a wrong noise model.
 Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, const Model& model, double step) {
   Uncertainty result;
   const auto& coordinates = problem.coordinates();
@@ -43,18 +46,24 @@ Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, cons
   const double freedom = std::max(1.0, blocks - static_cast<double>(all));
   meat *= blocks / freedom;
   const Eigen::VectorXd range = problem.high() - problem.low();
-  // In units of each coordinate's range, so that flat directions mean the same for all. What the anchor adds is no knowledge.
+  // In units of each coordinate's range, so that flat directions mean the same for all. What the anchor adds is no
+  // knowledge.
   Eigen::MatrixXd hessian = at.hessian;
   hessian.diagonal() -= problem.anchor_weight();
   hessian = range.asDiagonal() * hessian * range.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(hessian);
   const double largest = std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
-  // Whitened: sandwich = W meat' W', the model's own covariance = noise W W'. A direction never counts as better known than the model's own covariance
-  // says, which few blocks could pretend; raising eigenvalues keeps the matrix consistent.
-  const Eigen::MatrixXd whitener = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kLeastEigenvalue * largest).cwiseSqrt().cwiseInverse().asDiagonal();
+  // Whitened: sandwich = W meat' W', the model's own covariance = noise W W'. A direction never counts as better known
+  // than the model's own covariance says, which few blocks could pretend; raising eigenvalues keeps the matrix
+  // consistent.
+  const Eigen::MatrixXd whitener =
+      eigen.eigenvectors() *
+      eigen.eigenvalues().cwiseMax(kLeastEigenvalue * largest).cwiseSqrt().cwiseInverse().asDiagonal();
   const double noise = 2 * at.cost / std::max<double>(1, static_cast<double>(problem.residuals()));
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(whitener.transpose() * range.asDiagonal() * meat * range.asDiagonal() * whitener);
-  const Eigen::MatrixXd half_covariance = whitener * spread.eigenvectors() * spread.eigenvalues().cwiseMax(noise).cwiseSqrt().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> spread(whitener.transpose() * range.asDiagonal() * meat *
+                                                              range.asDiagonal() * whitener);
+  const Eigen::MatrixXd half_covariance =
+      whitener * spread.eigenvectors() * spread.eigenvalues().cwiseMax(noise).cwiseSqrt().asDiagonal();
   const Eigen::MatrixXd covariance = half_covariance * half_covariance.transpose();
   const Eigen::MatrixXd model_based = noise * whitener * whitener.transpose();
 
@@ -86,15 +95,19 @@ Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, cons
     parts.cwiseAbs().maxCoeff(&leading);
     const double scale = parts[leading];
     for (Eigen::Index i = 0; i < n; ++i) {
-      if (std::abs(parts[i]) > 0.2 * std::abs(scale)) flat.parts.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter, parts[i] / scale);
+      if (std::abs(parts[i]) > 0.2 * std::abs(scale))
+        flat.parts.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter, parts[i] / scale);
     }
-    std::stable_sort(flat.parts.begin(), flat.parts.end(), [](const auto& a, const auto& b) { return std::abs(a.second) > std::abs(b.second); });
+    std::stable_sort(flat.parts.begin(), flat.parts.end(),
+                     [](const auto& a, const auto& b) { return std::abs(a.second) > std::abs(b.second); });
     result.flat.push_back(std::move(flat));
   }
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = i + 1; j < n; ++j) {
       const double correlation = model_based(i, j) / std::sqrt(model_based(i, i) * model_based(j, j));
-      if (std::abs(correlation) > kCorrelated) result.correlated.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter, coordinates[static_cast<std::size_t>(j)].parameter, correlation);
+      if (std::abs(correlation) > kCorrelated)
+        result.correlated.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter,
+                                       coordinates[static_cast<std::size_t>(j)].parameter, correlation);
     }
   }
   return result;

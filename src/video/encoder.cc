@@ -35,14 +35,27 @@ Result<std::string> TemporaryBeside(const std::string& path, const std::string& 
   return name;
 }
 
-std::vector<std::string> Arguments(VideoFormat format, int width, int height, double frames_per_s, const std::string& output) {
-  std::vector<std::string> arguments = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "bgr0", "-s", fmt::format("{}x{}", width, height),
-                                        "-r", fmt::format("{}", frames_per_s), "-i", "pipe:0", "-an"};
-  const auto add = [&](std::initializer_list<const char*> more) { arguments.insert(arguments.end(), more.begin(), more.end()); };
+std::vector<std::string> Arguments(VideoFormat format, int width, int height, double frames_per_s,
+                                   const std::string& output) {
+  std::vector<std::string> arguments = {"ffmpeg",   "-hide_banner",
+                                        "-nostdin", "-loglevel",
+                                        "error",    "-y",
+                                        "-f",       "rawvideo",
+                                        "-pix_fmt", "bgr0",
+                                        "-s",       fmt::format("{}x{}", width, height),
+                                        "-r",       fmt::format("{}", frames_per_s),
+                                        "-i",       "pipe:0",
+                                        "-an"};
+  const auto add = [&](std::initializer_list<const char*> more) {
+    arguments.insert(arguments.end(), more.begin(), more.end());
+  };
   if (format == VideoFormat::kMp4) {
-    add({"-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"});
+    add({"-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f",
+         "mp4"});
   } else {
-    add({"-filter_complex", "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle", "-f", "gif"});
+    add({"-filter_complex",
+         "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle",
+         "-f", "gif"});
   }
   arguments.push_back(output);
   return arguments;
@@ -50,13 +63,15 @@ std::vector<std::string> Arguments(VideoFormat format, int width, int height, do
 
 }  // namespace
 
-Result<std::unique_ptr<Encoder>> Encoder::Start(const std::string& path, VideoFormat format, int width, int height, double frames_per_s) {
+Result<std::unique_ptr<Encoder>> Encoder::Start(const std::string& path, VideoFormat format, int width, int height,
+                                                double frames_per_s) {
   GS_CHECK(width % 2 == 0 && height % 2 == 0 && frames_per_s > 0);
   std::unique_ptr<Encoder> made(new Encoder);
   made->path_ = path;
   GS_ASSIGN(made->temporary_, TemporaryBeside(path, ""));
   // What ffmpeg says goes to a file: a second pipe could fill up while we write into the first.
-  GS_ASSIGN(made->messages_path_, TemporaryBeside((std::filesystem::temp_directory_path() / "gapscope-ffmpeg").string(), ""));
+  GS_ASSIGN(made->messages_path_,
+            TemporaryBeside((std::filesystem::temp_directory_path() / "gapscope-ffmpeg").string(), ""));
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) return Error{.what = "cannot make a pipe to ffmpeg", .actual = std::strerror(errno)};
   std::vector<std::string> arguments = Arguments(format, width, height, frames_per_s, "file:" + made->temporary_);
@@ -113,7 +128,10 @@ Error Encoder::Failed() {
   // The first line is the cause, the rest its consequences; "[mp4 @ 0x55...] " is of no use to anyone.
   said = said.substr(0, said.find('\n'));
   if (said.starts_with('[') && said.find("] ") != std::string::npos) said = said.substr(said.find("] ") + 2);
-  return Error{.what = "ffmpeg could not write the video", .where = path_, .actual = said.empty() ? "it ended without a word" : said, .cure = "check the space on the disk and ffmpeg's libx264"};
+  return Error{.what = "ffmpeg could not write the video",
+               .where = path_,
+               .actual = said.empty() ? "it ended without a word" : said,
+               .cure = "check the space on the disk and ffmpeg's libx264"};
 }
 
 Status Encoder::Write(const Picture& frame) {
@@ -149,7 +167,9 @@ Status Encoder::Finish() {
   const bool said = std::filesystem::file_size(messages_path_, failure) > 0;
   const bool empty = std::filesystem::file_size(temporary_, failure) == 0;
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || said || empty) return Failed();
-  if (rename(temporary_.c_str(), path_.c_str()) != 0) return Error{.what = "cannot rename the finished video to its place", .where = path_, .actual = std::strerror(errno)};
+  if (rename(temporary_.c_str(), path_.c_str()) != 0)
+    return Error{
+        .what = "cannot rename the finished video to its place", .where = path_, .actual = std::strerror(errno)};
   temporary_.clear();
   return Ok();
 }

@@ -1,4 +1,5 @@
-// Frames become a file through ffmpeg, a child process fed on a pipe. The file appears under its name only when it is whole.
+// Frames become a file through ffmpeg, a child process fed on a pipe. The file appears under its name only when it is
+// whole.
 #ifndef GAPSCOPE_VIDEO_ENCODER_H_
 #define GAPSCOPE_VIDEO_ENCODER_H_
 
@@ -13,8 +14,10 @@ enum class VideoFormat { kMp4, kGif };
 
 class Encoder {
  public:
-  // Starts ffmpeg, writing to a temporary name beside `path`. `width` and `height` even. Errors: ffmpeg cannot be started, the folder cannot be written.
-  static Result<std::unique_ptr<Encoder>> Start(const std::string& path, VideoFormat format, int width, int height, double frames_per_s);
+  // Starts ffmpeg, writing to a temporary name beside `path`. `width` and `height` even. Errors: ffmpeg cannot be
+  // started, the folder cannot be written.
+  static Result<std::unique_ptr<Encoder>> Start(const std::string& path, VideoFormat format, int width, int height,
+                                                double frames_per_s);
   // Without Finish() the child is ended and the temporary file removed.
   ~Encoder();
   Encoder(const Encoder&) = delete;

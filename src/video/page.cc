@@ -15,7 +15,8 @@ namespace {
 struct Colour {
   double r, g, b;
 };
-constexpr Colour kInk = {0.11, 0.14, 0.18}, kFaint = {0.42, 0.46, 0.52}, kGrid = {0.89, 0.91, 0.93}, kPaper = {1, 1, 1}, kError = {0.86, 0.20, 0.18};
+constexpr Colour kInk = {0.11, 0.14, 0.18}, kFaint = {0.42, 0.46, 0.52}, kGrid = {0.89, 0.91, 0.93}, kPaper = {1, 1, 1},
+                 kError = {0.86, 0.20, 0.18};
 // Blue against orange: told apart by every eye.
 constexpr Colour kMeasured = {0.0, 0.50, 0.86};
 constexpr Colour kModels[] = {{0.91, 0.42, 0.04}, {0.18, 0.60, 0.28}, {0.55, 0.27, 0.78}, {0.60, 0.45, 0.10}};
@@ -30,12 +31,11 @@ constexpr std::size_t kMostSignals = 3;
 // -0.312, +1.2e-05: four digits and a sign.
 std::string Signed(double value) {
   if (!std::isfinite(value)) return "-";
-  const std::string size = std::abs(value) < 1e-3 && value != 0 ? fmt::format("{:.1e}", std::abs(value)) : fmt::format("{:.3f}", std::abs(value));
+  const std::string size = std::abs(value) < 1e-3 && value != 0 ? fmt::format("{:.1e}", std::abs(value))
+                                                                : fmt::format("{:.3f}", std::abs(value));
   return fmt::format("{}{}", value < 0 ? "\u2212" : "+", size);
 }
-std::string Short(double value) {
-  return fmt::format("{}{:.3g}", value < 0 ? "\u2212" : "", std::abs(value));
-}
+std::string Short(double value) { return fmt::format("{}{:.3g}", value < 0 ? "\u2212" : "", std::abs(value)); }
 
 double Interpolate(const std::vector<double>& time, const std::vector<double>& values, double t) {
   const std::size_t after = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), t) - time.begin());
@@ -65,7 +65,9 @@ double NiceStep(double range, double count) {
 // A cairo surface over a picture's pixels.
 struct Page::Canvas {
   explicit Canvas(Picture& picture)
-      : surface(cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(picture.pixels.data()), CAIRO_FORMAT_RGB24, picture.width, picture.height, 4 * picture.width)),
+      : surface(cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(picture.pixels.data()),
+                                                    CAIRO_FORMAT_RGB24, picture.width, picture.height,
+                                                    4 * picture.width)),
         cr(cairo_create(surface)) {
     cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
   }
@@ -78,7 +80,8 @@ struct Page::Canvas {
 
   void Ink(const Colour& c, double alpha = 1) { cairo_set_source_rgba(cr, c.r, c.g, c.b, alpha); }
   void Font(double size, bool bold = false) {
-    cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL, bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
+                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
     cairo_set_font_size(cr, size);
   }
   double Width(const std::string& text) {
@@ -118,29 +121,36 @@ struct Page::Canvas {
   cairo_t* cr;
 };
 
-std::array<float, 3> MeasuredColour() { return {static_cast<float>(kMeasured.r), static_cast<float>(kMeasured.g), static_cast<float>(kMeasured.b)}; }
+std::array<float, 3> MeasuredColour() {
+  return {static_cast<float>(kMeasured.r), static_cast<float>(kMeasured.g), static_cast<float>(kMeasured.b)};
+}
 std::array<float, 3> ModelColour(std::size_t model) {
   const Colour c = OfModel(model);
   return {static_cast<float>(c.r), static_cast<float>(c.g), static_cast<float>(c.b)};
 }
 
-Page::Page(PageOptions options, PageTraces traces, std::vector<PageModel> models) : options_(std::move(options)), traces_(std::move(traces)), models_(std::move(models)) {
+Page::Page(PageOptions options, PageTraces traces, std::vector<PageModel> models)
+    : options_(std::move(options)), traces_(std::move(traces)), models_(std::move(models)) {
   GS_CHECK(!models_.empty() && options_.to_s > options_.from_s && !traces_.signals.empty());
   unit_ = options_.height / 720.0;
   if (traces_.signals.size() > kMostSignals) traces_.signals.resize(kMostSignals);
   panels_ = models_.size() + (options_.side_by_side ? 1 : 0);
-  double height = kTopGap + kAxisHeight + static_cast<double>(traces_.signals.size()) * (kSignalRow + kRowGap) + (traces_.commands.empty() ? 0 : kCommandRow + kRowGap);
+  double height = kTopGap + kAxisHeight + static_cast<double>(traces_.signals.size()) * (kSignalRow + kRowGap) +
+                  (traces_.commands.empty() ? 0 : kCommandRow + kRowGap);
   scene_height_ = options_.height - static_cast<int>(height * unit_);
   scene_height_ -= scene_height_ % 2;
   scene_width_ = options_.width / static_cast<int>(panels_);
 
   // Limits of what is shown, from the rows within it; a model that runs away does not squeeze the measured trace.
-  const auto within = [&](std::size_t r) { return traces_.time_s[r] >= options_.from_s && traces_.time_s[r] <= options_.to_s; };
+  const auto within = [&](std::size_t r) {
+    return traces_.time_s[r] >= options_.from_s && traces_.time_s[r] <= options_.to_s;
+  };
   double top = kTopGap * unit_;
   for (const auto& signal : traces_.signals) {
     double low = INFINITY, high = -INFINITY;
     for (std::size_t r = 0; r < traces_.time_s.size(); ++r) {
-      if (within(r) && std::isfinite(signal.measured[r])) low = std::min(low, signal.measured[r]), high = std::max(high, signal.measured[r]);
+      if (within(r) && std::isfinite(signal.measured[r]))
+        low = std::min(low, signal.measured[r]), high = std::max(high, signal.measured[r]);
     }
     if (!(low <= high)) low = high = 0;
     const double room = std::max(1.5 * (high - low), 1e-9), measured_low = low, measured_high = high;
@@ -168,7 +178,8 @@ Page::Page(PageOptions options, PageTraces traces, std::vector<PageModel> models
   for (Picture* picture : {&future_, &past_}) {
     picture->width = options_.width;
     picture->height = options_.height - scene_height_;
-    picture->pixels.assign(static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height), 0xffffffffu);
+    picture->pixels.assign(static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height),
+                           0xffffffffu);
     Canvas canvas(*picture);
     DrawTraces(canvas, picture == &past_);
   }
@@ -181,7 +192,8 @@ double Page::XOf(double time_s) const {
   return left + (right - left) * (time_s - options_.from_s) / (options_.to_s - options_.from_s);
 }
 
-void Page::DrawScale(Canvas& c, double top, double height, const std::string& name, const std::string& unit, double low, double high) const {
+void Page::DrawScale(Canvas& c, double top, double height, const std::string& name, const std::string& unit, double low,
+                     double high) const {
   const double left = XOf(options_.from_s), right = XOf(options_.to_s);
   c.Ink({0.972, 0.976, 0.982});
   cairo_rectangle(c.cr, left, top, right - left, height);
@@ -209,8 +221,10 @@ void Page::DrawTraces(Canvas& c, bool past) const {
   cairo_paint(c.cr);
   const auto& time = traces_.time_s;
   const double strength = past ? 1 : 0.28;
-  const std::size_t first = static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), options_.from_s) - time.begin());
-  const std::size_t last = static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), options_.to_s) - time.begin());
+  const std::size_t first =
+      static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), options_.from_s) - time.begin());
+  const std::size_t last =
+      static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), options_.to_s) - time.begin());
   const std::size_t begin = first > 0 ? first - 1 : 0, end = std::min(last + 1, time.size());
   const auto line = [&](const Row& row, const std::vector<double>& values, bool steps) {
     const std::span<const double> part(values.data() + begin, end - begin);
@@ -234,7 +248,8 @@ void Page::DrawTraces(Canvas& c, bool past) const {
     const Row& row = rows_[s];
     const bool command = s >= traces_.signals.size();
     const std::string& name = command ? traces_.commands.front().name : traces_.signals[s].name;
-    DrawScale(c, row.top, row.height, name, command ? traces_.commands.front().unit : traces_.signals[s].unit, row.low, row.high);
+    DrawScale(c, row.top, row.height, name, command ? traces_.commands.front().unit : traces_.signals[s].unit, row.low,
+              row.high);
     cairo_save(c.cr);
     cairo_rectangle(c.cr, XOf(options_.from_s), row.top, XOf(options_.to_s) - XOf(options_.from_s), row.height);
     cairo_clip(c.cr);
@@ -289,10 +304,12 @@ void Page::DrawCursor(Canvas& c, double time_s) const {
     cairo_stroke(c.cr);
   };
   for (std::size_t s = 0; s < traces_.signals.size(); ++s) {
-    for (std::size_t m = 0; m < models_.size(); ++m) dot(rows_[s], Interpolate(traces_.time_s, traces_.signals[s].predicted[m], time_s), OfModel(m));
+    for (std::size_t m = 0; m < models_.size(); ++m)
+      dot(rows_[s], Interpolate(traces_.time_s, traces_.signals[s].predicted[m], time_s), OfModel(m));
     dot(rows_[s], Interpolate(traces_.time_s, traces_.signals[s].measured, time_s), kMeasured);
   }
-  if (!traces_.commands.empty()) dot(rows_.back(), Held(traces_.time_s, traces_.commands.front().values, time_s), kFaint);
+  if (!traces_.commands.empty())
+    dot(rows_.back(), Held(traces_.time_s, traces_.commands.front().values, time_s), kFaint);
 }
 
 void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
@@ -308,7 +325,8 @@ void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
   if (!measured_panel) {
     c.Font(12.5 * unit_);
     for (const auto& signal : traces_.signals) {
-      const double error = Interpolate(traces_.time_s, signal.measured, time_s) - Interpolate(traces_.time_s, signal.predicted[m], time_s);
+      const double error = Interpolate(traces_.time_s, signal.measured, time_s) -
+                           Interpolate(traces_.time_s, signal.predicted[m], time_s);
       lines.push_back({signal.name, Signed(error), signal.unit});
       width = std::max(width, c.Width(signal.name) + c.Width(signal.unit) + 118 * unit_);
     }
@@ -316,7 +334,9 @@ void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
   const bool diverged = !measured_panel && models_[m].diverged_at_s >= 0 && time_s > models_[m].diverged_at_s;
   const bool ghost = !measured_panel && !options_.side_by_side;
   const double line_height = 18 * unit_;
-  double height = 34 * unit_ + (ghost ? line_height : 0) + (lines.empty() ? 0 : line_height * (static_cast<double>(lines.size()) + 1) + 6 * unit_) + (diverged ? line_height : 0);
+  double height = 34 * unit_ + (ghost ? line_height : 0) +
+                  (lines.empty() ? 0 : line_height * (static_cast<double>(lines.size()) + 1) + 6 * unit_) +
+                  (diverged ? line_height : 0);
   c.Card(left, top, width, height, 7 * unit_);
   c.Ink(colour);
   c.Box(left + 12 * unit_, top + 11 * unit_, 14 * unit_, 14 * unit_, 3 * unit_);
@@ -371,14 +391,18 @@ void Page::DrawClock(Canvas& c, double time_s) const {
   c.Ink(kInk);
   c.Text(c.Fit(shown.name, 70 * unit_), left + 12 * unit_, top + 65 * unit_);
   c.Text(Signed(value) + " " + shown.unit, left + width - 12 * unit_, top + 65 * unit_, 1);
-  const double bar_left = left + 12 * unit_, bar_width = width - 24 * unit_, bar_top = top + 74 * unit_, bar_height = 7 * unit_;
-  const auto x_of = [&](double v) { return bar_left + bar_width * std::clamp((v - row.low) / (row.high - row.low), 0.0, 1.0); };
+  const double bar_left = left + 12 * unit_, bar_width = width - 24 * unit_, bar_top = top + 74 * unit_,
+               bar_height = 7 * unit_;
+  const auto x_of = [&](double v) {
+    return bar_left + bar_width * std::clamp((v - row.low) / (row.high - row.low), 0.0, 1.0);
+  };
   c.Box(bar_left, bar_top, bar_width, bar_height, bar_height / 2);
   c.Ink(kGrid);
   cairo_fill(c.cr);
   const double zero = x_of(std::clamp(0.0, row.low, row.high));
   c.Ink(kInk, 0.75);
-  cairo_rectangle(c.cr, std::min(zero, x_of(value)), bar_top, std::max(1.5 * unit_, std::abs(x_of(value) - zero)), bar_height);
+  cairo_rectangle(c.cr, std::min(zero, x_of(value)), bar_top, std::max(1.5 * unit_, std::abs(x_of(value) - zero)),
+                  bar_height);
   cairo_fill(c.cr);
 }
 
@@ -391,7 +415,8 @@ void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& fram
   for (std::size_t p = 0; p < panels_; ++p) {
     GS_CHECK(scenes[p].width == scene_width_ && scenes[p].height == scene_height_);
     for (std::size_t y = 0; y < static_cast<std::size_t>(scene_height_); ++y) {
-      std::copy_n(scenes[p].pixels.data() + y * static_cast<std::size_t>(scene_width_), scene_width_, frame.pixels.data() + y * width + p * static_cast<std::size_t>(scene_width_));
+      std::copy_n(scenes[p].pixels.data() + y * static_cast<std::size_t>(scene_width_), scene_width_,
+                  frame.pixels.data() + y * width + p * static_cast<std::size_t>(scene_width_));
     }
   }
   const std::size_t cursor = static_cast<std::size_t>(std::clamp(XOf(time_s), 0.0, static_cast<double>(width)));
@@ -413,15 +438,17 @@ void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& fram
 
 Status WritePng(const std::string& path, const Picture& picture) {
   std::string bytes;
-  cairo_surface_t* surface = cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(const_cast<std::uint32_t*>(picture.pixels.data())), CAIRO_FORMAT_RGB24, picture.width,
-                                                                 picture.height, 4 * picture.width);
+  cairo_surface_t* surface = cairo_image_surface_create_for_data(
+      reinterpret_cast<unsigned char*>(const_cast<std::uint32_t*>(picture.pixels.data())), CAIRO_FORMAT_RGB24,
+      picture.width, picture.height, 4 * picture.width);
   const auto append = [](void* to, const unsigned char* data, unsigned int size) {
     static_cast<std::string*>(to)->append(reinterpret_cast<const char*>(data), size);
     return CAIRO_STATUS_SUCCESS;
   };
   const cairo_status_t status = cairo_surface_write_to_png_stream(surface, append, &bytes);
   cairo_surface_destroy(surface);
-  if (status != CAIRO_STATUS_SUCCESS) return Error{.what = "cannot make the PNG", .where = path, .actual = cairo_status_to_string(status)};
+  if (status != CAIRO_STATUS_SUCCESS)
+    return Error{.what = "cannot make the PNG", .where = path, .actual = cairo_status_to_string(status)};
   return WriteFile(path, bytes);
 }
 

@@ -1,4 +1,5 @@
-// A frame of a comparison video: scenes above, each with its label and errors, and the traces below with a cursor at the frame's time. Drawn with cairo.
+// A frame of a comparison video: scenes above, each with its label and errors, and the traces below with a cursor at
+// the frame's time. Drawn with cairo.
 #ifndef GAPSCOPE_VIDEO_PAGE_H_
 #define GAPSCOPE_VIDEO_PAGE_H_
 
@@ -30,16 +31,16 @@ struct PageTraces {
 
 struct PageModel {
   std::string label;
-  double error = 0;               // of the log, normalised
-  double diverged_at_s = -1;      // from here on there is nothing to show; negative: never
+  double error = 0;           // of the log, normalised
+  double diverged_at_s = -1;  // from here on there is nothing to show; negative: never
 };
 
 struct PageOptions {
   int width = 1280, height = 720;
-  double from_s = 0, to_s = 0;    // what the time axis shows
+  double from_s = 0, to_s = 0;  // what the time axis shows
   double speed = 1;
   std::string title;
-  bool side_by_side = false;      // a panel with the measured mechanism first; else it is a ghost in every panel
+  bool side_by_side = false;  // a panel with the measured mechanism first; else it is a ghost in every panel
 };
 
 // The colour that stands for what was measured, and those of the models, as red, green, blue.
@@ -63,7 +64,8 @@ class Page {
  private:
   struct Canvas;
   void DrawTraces(Canvas& canvas, bool past) const;
-  void DrawScale(Canvas& canvas, double top, double height, const std::string& name, const std::string& unit, double low, double high) const;
+  void DrawScale(Canvas& canvas, double top, double height, const std::string& name, const std::string& unit,
+                 double low, double high) const;
   void DrawCursor(Canvas& canvas, double time_s) const;
   void DrawPanel(Canvas& canvas, std::size_t panel, double time_s) const;
   void DrawClock(Canvas& canvas, double time_s) const;
@@ -78,8 +80,8 @@ class Page {
   struct Row {
     double top, height, low, high;  // in pixels; in the signal's unit
   };
-  std::vector<Row> rows_;             // signals, then the first command
-  Picture future_, past_;             // the traces' part, pale and full
+  std::vector<Row> rows_;  // signals, then the first command
+  Picture future_, past_;  // the traces' part, pale and full
 };
 
 // Writes a picture as PNG, to a temporary name first. Error: cannot write.

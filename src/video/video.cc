@@ -26,7 +26,8 @@ struct Actor {
   double error = 0;
 };
 
-Result<Actor> Rehearse(const Recording& recording, const VideoModel& model, const VideoOptions& options, ThreadPool& pool) {
+Result<Actor> Rehearse(const Recording& recording, const VideoModel& model, const VideoOptions& options,
+                       ThreadPool& pool) {
   ReplayOptions replay{.mode = options.mode, .window_s = options.window_s, .values = model.values, .keep_poses = true};
   ReplayResult result = Replay(*model.model, {recording}, replay, pool);
   Actor actor{.drawn = nullptr, .predicted = {}, .measured = {}, .replay = std::move(result.logs.front()), .error = 0};
@@ -35,7 +36,9 @@ Result<Actor> Rehearse(const Recording& recording, const VideoModel& model, cons
   actor.measured = MeasuredPoses(*model.model, model.values, recording, actor.predicted);
   std::vector<SignalScore> scores;
   for (const auto& signal : actor.replay.signals) {
-    if (signal.scored) scores.push_back(ScoreSignal(signal.signal, actor.replay.time_s, signal.measured, signal.predicted, signal.resolution));
+    if (signal.scored)
+      scores.push_back(
+          ScoreSignal(signal.signal, actor.replay.time_s, signal.measured, signal.predicted, signal.resolution));
   }
   actor.error = actor.replay.outcome == Outcome::kDiverged ? INFINITY : CombinedError(scores);
   return actor;
@@ -49,7 +52,11 @@ PageTraces TracesOf(const Recording& recording, const Experiment& experiment, co
       for (std::size_t s = 0; s < recording.measured.size(); ++s) {
         const MeasuredSpec& spec = recording.measured[s].spec;
         if (spec.scored != scored || (spec.kind == SignalKind::kPosition) != position) continue;
-        traces.signals.push_back({.name = spec.signal, .unit = spec.unit, .moves = position, .measured = recording.measured[s].values, .predicted = {}});
+        traces.signals.push_back({.name = spec.signal,
+                                  .unit = spec.unit,
+                                  .moves = position,
+                                  .measured = recording.measured[s].values,
+                                  .predicted = {}});
         for (const Actor& actor : actors) traces.signals.back().predicted.push_back(actor.replay.signals[s].predicted);
       }
     }
@@ -57,7 +64,9 @@ PageTraces TracesOf(const Recording& recording, const Experiment& experiment, co
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];
     // An input that nothing was logged for says nothing.
-    if (command.column != "constant") traces.commands.push_back({.name = command.actuator, .unit = experiment.commands[c].unit, .values = command.values});
+    if (command.column != "constant")
+      traces.commands.push_back(
+          {.name = command.actuator, .unit = experiment.commands[c].unit, .values = command.values});
   }
   return traces;
 }
@@ -117,14 +126,17 @@ class Painter {
   static Result<std::unique_ptr<Painter>> Make(const Stage& stage) {
     std::unique_ptr<Painter> made(new Painter(stage));
     GS_ASSIGN(made->context_, GlContext::Make());
-    GS_ASSIGN(made->scene_, Scene::Make(*stage.actors.front().drawn, stage.framing, stage.page.scene_width(), stage.page.scene_height()));
+    GS_ASSIGN(made->scene_, Scene::Make(*stage.actors.front().drawn, stage.framing, stage.page.scene_width(),
+                                        stage.page.scene_height()));
     return made;
   }
 
   Status Paint(double time_s, Picture& frame) {
     std::size_t panel = 0;
     pictures_.resize(stage_.page.panels());
-    const auto draw = [&](std::span<const Mechanism> mechanisms) { return scene_->Draw(mechanisms, pictures_[panel++]); };
+    const auto draw = [&](std::span<const Mechanism> mechanisms) {
+      return scene_->Draw(mechanisms, pictures_[panel++]);
+    };
     const bool side = stage_.layout == Layout::kSide;
     for (std::size_t a = 0; a < stage_.actors.size(); ++a) {
       const Actor& actor = stage_.actors[a];
@@ -134,11 +146,17 @@ class Painter {
       auto &predicted = poses_[2 * a], &measured = poses_[2 * a + 1];
       if (predicted.empty()) predicted.assign(actor.drawn->qpos0, actor.drawn->qpos0 + nq);
       measured.resize(nq);
-      const double held = actor.replay.outcome == Outcome::kDiverged && time_s > actor.replay.diverged_at_s ? actor.replay.diverged_at_s : time_s;
-      if (!PoseAt(*actor.drawn, actor.predicted, time_s, predicted)) PoseAt(*actor.drawn, actor.predicted, held, predicted);
+      const double held = actor.replay.outcome == Outcome::kDiverged && time_s > actor.replay.diverged_at_s
+                              ? actor.replay.diverged_at_s
+                              : time_s;
+      if (!PoseAt(*actor.drawn, actor.predicted, time_s, predicted))
+        PoseAt(*actor.drawn, actor.predicted, held, predicted);
       if (!PoseAt(*actor.drawn, actor.measured, time_s, measured)) measured = predicted;
       const Mechanism simulated{.model = actor.drawn.get(), .qpos = predicted};
-      const Mechanism real{.model = actor.drawn.get(), .qpos = measured, .look = side ? Look::kSolid : Look::kGhost, .ghost_rgb = MeasuredColour()};
+      const Mechanism real{.model = actor.drawn.get(),
+                           .qpos = measured,
+                           .look = side ? Look::kSolid : Look::kGhost,
+                           .ghost_rgb = MeasuredColour()};
       const Mechanism both[] = {simulated, real};
       if (side && a == 0) GS_RETURN_IF_ERROR(draw(std::span(both + 1, 1)));
       GS_RETURN_IF_ERROR(draw(std::span(both, side ? 1 : 2)));
@@ -157,7 +175,8 @@ class Painter {
 };
 
 // Draws all frames with the pool's workers; `take` gets them in order.
-Status PaintAll(const Stage& stage, const std::vector<double>& times, const VideoOptions& options, ThreadPool& pool, const std::function<Status(const Picture&)>& take) {
+Status PaintAll(const Stage& stage, const std::vector<double>& times, const VideoOptions& options, ThreadPool& pool,
+                const std::function<Status(const Picture&)>& take) {
   InOrder order;
   std::atomic<std::size_t> next = 0;
   // Contexts take turns in Mesa's rasteriser, which has threads of its own: two painters keep it busy, more would wait.
@@ -174,7 +193,8 @@ Status PaintAll(const Stage& stage, const std::vector<double>& times, const Vide
         if (!made.ok()) return order.Fail(made.error());
         painter = std::move(made).value();
       }
-      if (options.stop && options.stop->load()) return order.Fail({.what = "interrupted: nothing was written", .where = options.out});
+      if (options.stop && options.stop->load())
+        return order.Fail({.what = "interrupted: nothing was written", .where = options.out});
       if (Status painted = painter->Paint(times[index], frame); !painted.ok()) return order.Fail(painted.error());
       const bool go_on = order.Pass(index, [&]() -> Status {
         GS_RETURN_IF_ERROR(take(frame));
@@ -202,45 +222,67 @@ std::vector<double> FrameTimes(const VideoOptions& options) {
   return times;
 }
 
-Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<VideoModel>& models, const VideoOptions& asked, ThreadPool& pool) {
+Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<VideoModel>& models,
+                                 const VideoOptions& asked, ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
   GS_CHECK(!models.empty());
   VideoOptions options = asked;
   const std::string extension = std::filesystem::path(options.out).extension().string();
   const bool still = extension == ".png";
-  if (!still && extension != ".mp4" && extension != ".gif") return Error{.what = "unknown kind of picture", .where = "--out " + options.out, .actual = "'" + extension + "'", .allowed = ".mp4, .gif, .png"};
-  if (std::none_of(recording.measured.begin(), recording.measured.end(), [](const auto& q) { return q.spec.kind == SignalKind::kPosition; })) {
+  if (!still && extension != ".mp4" && extension != ".gif")
+    return Error{.what = "unknown kind of picture",
+                 .where = "--out " + options.out,
+                 .actual = "'" + extension + "'",
+                 .allowed = ".mp4, .gif, .png"};
+  if (std::none_of(recording.measured.begin(), recording.measured.end(),
+                   [](const auto& q) { return q.spec.kind == SignalKind::kPosition; })) {
     return Error{.what = "no position is measured: there is no real mechanism to draw", .where = recording.log_path};
   }
   const double end = recording.time_s.back();
   if (options.to_s < 0) options.to_s = end;
   options.to_s = std::min(options.to_s, end);
   if (!(options.from_s >= 0 && options.from_s < options.to_s)) {
-    return Error{.what = "nothing of the log lies between --from and --to", .where = recording.log_path, .actual = fmt::format("{:g} .. {:g} s", options.from_s, options.to_s),
+    return Error{.what = "nothing of the log lies between --from and --to",
+                 .where = recording.log_path,
+                 .actual = fmt::format("{:g} .. {:g} s", options.from_s, options.to_s),
                  .allowed = fmt::format("within 0 .. {:g} s", end)};
   }
-  if ((options.to_s - options.from_s) / options.speed * options.frames_per_s > kMaxFrames) return Error{.what = "more than a million frames", .where = options.out, .cure = "raise --speed, or cut with --from and --to"};
+  if ((options.to_s - options.from_s) / options.speed * options.frames_per_s > kMaxFrames)
+    return Error{.what = "more than a million frames",
+                 .where = options.out,
+                 .cure = "raise --speed, or cut with --from and --to"};
   VideoSummary summary;
   GS_ASSIGN(summary.gl, OpenGl(options.gl, pool.workers(), &summary.note));
 
   std::vector<Actor> actors;
-  PageOptions page{.width = options.width, .height = options.height, .from_s = options.from_s, .to_s = options.to_s, .speed = options.speed,
-                   .title = std::filesystem::path(recording.log_path).filename().string(), .side_by_side = options.layout == Layout::kSide};
+  PageOptions page{.width = options.width,
+                   .height = options.height,
+                   .from_s = options.from_s,
+                   .to_s = options.to_s,
+                   .speed = options.speed,
+                   .title = std::filesystem::path(recording.log_path).filename().string(),
+                   .side_by_side = options.layout == Layout::kSide};
   std::vector<PageModel> labels;
   for (const auto& model : models) {
     GS_ASSIGN(Actor actor, Rehearse(recording, model, options, pool));
-    labels.push_back({.label = model.label, .error = actor.error, .diverged_at_s = actor.replay.outcome == Outcome::kDiverged ? actor.replay.diverged_at_s : -1});
+    labels.push_back({.label = model.label,
+                      .error = actor.error,
+                      .diverged_at_s = actor.replay.outcome == Outcome::kDiverged ? actor.replay.diverged_at_s : -1});
     summary.errors.push_back(actor.error);
     actors.push_back(std::move(actor));
   }
   PageTraces traces = TracesOf(recording, models.front().model->experiment(), actors);
-  const double at = options.at_s >= 0 ? std::min(options.at_s, end) : TimeOfGreatestError(traces, options.from_s, options.to_s);
+  const double at =
+      options.at_s >= 0 ? std::min(options.at_s, end) : TimeOfGreatestError(traces, options.from_s, options.to_s);
   const Page composed(page, std::move(traces), labels);
   std::vector<const PoseTrack*> tracks;
   for (const Actor& actor : actors) tracks.insert(tracks.end(), {&actor.measured, &actor.predicted});
   // Models may differ in joints, not in what is drawn: the first one's frames all.
-  if (std::any_of(actors.begin(), actors.end(), [&](const Actor& a) { return a.drawn->nq != actors.front().drawn->nq; })) tracks.resize(2);
-  const Framing framing = FrameMotion(*actors.front().drawn, tracks, options.view, static_cast<double>(composed.scene_width()) / composed.scene_height());
+  if (std::any_of(actors.begin(), actors.end(),
+                  [&](const Actor& a) { return a.drawn->nq != actors.front().drawn->nq; }))
+    tracks.resize(2);
+  const Framing framing = FrameMotion(*actors.front().drawn, tracks, options.view,
+                                      static_cast<double>(composed.scene_width()) / composed.scene_height());
   const Stage stage{actors, composed, framing, options.layout};
 
   if (still) {
@@ -254,8 +296,11 @@ Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<V
     summary.first_s = summary.last_s = at;
   } else {
     const std::vector<double> times = FrameTimes(options);
-    GS_ASSIGN(const auto encoder, Encoder::Start(options.out, extension == ".gif" ? VideoFormat::kGif : VideoFormat::kMp4, options.width, options.height, options.frames_per_s));
-    GS_RETURN_IF_ERROR(PaintAll(stage, times, options, pool, [&](const Picture& frame) { return encoder->Write(frame); }));
+    GS_ASSIGN(const auto encoder,
+              Encoder::Start(options.out, extension == ".gif" ? VideoFormat::kGif : VideoFormat::kMp4, options.width,
+                             options.height, options.frames_per_s));
+    GS_RETURN_IF_ERROR(
+        PaintAll(stage, times, options, pool, [&](const Picture& frame) { return encoder->Write(frame); }));
     GS_RETURN_IF_ERROR(encoder->Finish());
     summary.frames = times.size();
     summary.first_s = times.front();

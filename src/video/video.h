@@ -1,4 +1,5 @@
-// Measured against simulated mechanism as a video, a GIF or a still: replays drawn off-screen by several workers, composed and encoded in order.
+// Measured against simulated mechanism as a video, a GIF or a still: replays drawn off-screen by several workers,
+// composed and encoded in order.
 #ifndef GAPSCOPE_VIDEO_VIDEO_H_
 #define GAPSCOPE_VIDEO_VIDEO_H_
 
@@ -24,16 +25,16 @@ struct VideoModel {
 enum class Layout { kOverlay, kSide };
 
 struct VideoOptions {
-  std::string out;                // .mp4, .gif or .png (a still)
+  std::string out;  // .mp4, .gif or .png (a still)
   View view = View::kFixed;
   Layout layout = Layout::kOverlay;
   GlBackend gl = GlBackend::kAuto;
   ReplayMode mode = ReplayMode::kFreeRun;
   double window_s = 1;
-  double speed = 1;               // seconds of the log per second of the video
-  double from_s = 0, to_s = -1;   // of the log; to_s < 0: its end
-  double at_s = -1;               // of a still; < 0: where the first model's error is greatest
-  int width = 1280, height = 720; // even
+  double speed = 1;                // seconds of the log per second of the video
+  double from_s = 0, to_s = -1;    // of the log; to_s < 0: its end
+  double at_s = -1;                // of a still; < 0: where the first model's error is greatest
+  int width = 1280, height = 720;  // even
   double frames_per_s = 30;
   std::function<void(std::size_t done, std::size_t all)> progress;
   const std::atomic<bool>* stop = nullptr;  // set: give up
@@ -44,16 +45,18 @@ struct VideoSummary {
   double first_s = 0, last_s = 0;  // log times of the first and last frame
   double length_s = 0;             // of the video
   double wall_s = 0;
-  std::vector<double> errors;      // by model, normalised
+  std::vector<double> errors;  // by model, normalised
   GlBackend gl = GlBackend::kAuto;
-  std::string note;                // of OpenGl()
+  std::string note;  // of OpenGl()
 };
 
 // Log times of the frames: from `from_s` in steps of speed / frames_per_s, the last one not after `to_s`.
 std::vector<double> FrameTimes(const VideoOptions& options);
 
-// Errors: no position is measured, the interval is empty, the extension of `out`, OpenGL, ffmpeg, the disk, `stop`. No half file is left.
-Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<VideoModel>& models, const VideoOptions& options, ThreadPool& pool);
+// Errors: no position is measured, the interval is empty, the extension of `out`, OpenGL, ffmpeg, the disk, `stop`. No
+// half file is left.
+Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<VideoModel>& models,
+                                 const VideoOptions& options, ThreadPool& pool);
 
 }  // namespace gapscope
 

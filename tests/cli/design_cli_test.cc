@@ -14,13 +14,19 @@ namespace {
 
 class DesignCliTest : public ::testing::Test {
  protected:
-  Answer Run(const std::string& arguments) const { return scratch_.Shell("'" GAPSCOPE_PROGRAM "' design " + arguments); }
-  std::string Rig(const std::string& name) { return "'" + std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + name + "/experiment.yaml'"; }
+  Answer Run(const std::string& arguments) const {
+    return scratch_.Shell("'" GAPSCOPE_PROGRAM "' design " + arguments);
+  }
+  std::string Rig(const std::string& name) {
+    return "'" + std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + name + "/experiment.yaml'";
+  }
   Scratch scratch_;
 };
 
 TEST_F(DesignCliTest, ChirpJsonIsUnrounded) {
-  const Answer answer = Run("chirp --inertia-kg-m2 0.159221308 --natural-frequency-hz 5 --damping-ratio 0.707,1.2,2 --speed-limit-rpm 116 --amplitude-factor 0.8 --end-over-bandwidth 2,3,5 --json");
+  const Answer answer =
+      Run("chirp --inertia-kg-m2 0.159221308 --natural-frequency-hz 5 --damping-ratio 0.707,1.2,2 --speed-limit-rpm "
+          "116 --amplitude-factor 0.8 --end-over-bandwidth 2,3,5 --json");
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json["schema"], "gapscope.design.chirp/1");
@@ -43,7 +49,8 @@ TEST_F(DesignCliTest, SquareOfTheFlexibleJointIsWritten) {
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto json = nlohmann::json::parse(answer.out);
   EXPECT_NEAR(1 / json["low_hz"].get<double>(), 0.63, 1e-12);
-  for (const auto& limit : json["limits"]) EXPECT_LE(limit["reached"].get<double>(), 0.9001 * limit["limit"].get<double>()) << limit;
+  for (const auto& limit : json["limits"])
+    EXPECT_LE(limit["reached"].get<double>(), 0.9001 * limit["limit"].get<double>()) << limit;
   std::ifstream csv(file);
   std::string header;
   std::getline(csv, header);
@@ -63,7 +70,8 @@ TEST_F(DesignCliTest, InputsPastTheLimitsAreRefusedWithTheAmplitudeThatKeepsThem
 }
 
 TEST_F(DesignCliTest, OptimalPrintsACommandThatWorks) {
-  const Answer answer = Run("optimal " + Rig("flexlink") + " --separate coulomb_friction@hub --separate torque_bias@hub --duration 3 --json");
+  const Answer answer = Run("optimal " + Rig("flexlink") +
+                            " --separate coulomb_friction@hub --separate torque_bias@hub --duration 3 --json");
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto json = nlohmann::json::parse(answer.out);
   EXPECT_EQ(json["schema"], "gapscope.design.optimal/1");
@@ -98,10 +106,14 @@ TEST_F(DesignCliTest, StateFeedbackOfTheQubeReport) {
 
 TEST_F(DesignCliTest, BadArgumentsAreBadInput) {
   const std::string rig = Rig("flexjoint");
-  for (const std::string& arguments : {std::string("chirp"), std::string("chirp --inertia-kg-m2 nan --natural-frequency-hz 5 --damping-ratio 1 --speed-limit-rpm 100"),
-                                       std::string("square nowhere.yaml"), "square " + rig + " --set link.stifness=1", "square " + rig + " --period 0.001", "optimal " + rig,
-                                       "optimal " + rig + " --separate cable_spring@base", "optimal " + rig + " --separate cable_spring@base --separate cable_spring@base",
-                                       "optimal " + rig + " --separate cable_spring@nowhere --separate none", "optimal " + rig + " --parameter motor.gear_ratio", "square " + Rig("xl330")}) {
+  for (const std::string& arguments :
+       {std::string("chirp"),
+        std::string("chirp --inertia-kg-m2 nan --natural-frequency-hz 5 --damping-ratio 1 --speed-limit-rpm 100"),
+        std::string("square nowhere.yaml"), "square " + rig + " --set link.stifness=1",
+        "square " + rig + " --period 0.001", "optimal " + rig, "optimal " + rig + " --separate cable_spring@base",
+        "optimal " + rig + " --separate cable_spring@base --separate cable_spring@base",
+        "optimal " + rig + " --separate cable_spring@nowhere --separate none",
+        "optimal " + rig + " --parameter motor.gear_ratio", "square " + Rig("xl330")}) {
     const Answer answer = Run(arguments);
     EXPECT_EQ(answer.status, 2) << arguments << "\n" << answer.err;
     EXPECT_NE(answer.err, "") << arguments;

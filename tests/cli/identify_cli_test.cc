@@ -13,14 +13,19 @@ namespace {
 
 class IdentifyCliTest : public ::testing::Test {
  protected:
-  Answer Run(const std::string& arguments) const { return scratch_.Shell("'" GAPSCOPE_PROGRAM "' identify " + arguments); }
-  std::string Rig(const std::string& name) { return "'" + std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + name + "/experiment.yaml'"; }
+  Answer Run(const std::string& arguments) const {
+    return scratch_.Shell("'" GAPSCOPE_PROGRAM "' identify " + arguments);
+  }
+  std::string Rig(const std::string& name) {
+    return "'" + std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + name + "/experiment.yaml'";
+  }
   // A joint that follows a sweep: angle and torque as formulas.
   std::string ServoLog(double seconds) {
     std::string text = "time_s,target_rad,position_rad,torque_n_m\n";
     char line[128];
     for (int k = 0; k <= seconds * 500; ++k) {
-      const double t = 0.002 * k, phase = 3 * t + 1.5 * t * t, q = 0.3 * std::sin(phase), v = 0.3 * std::cos(phase) * (3 + 3 * t), target = 0.4 * std::sin(phase + 0.3);
+      const double t = 0.002 * k, phase = 3 * t + 1.5 * t * t, q = 0.3 * std::sin(phase),
+                   v = 0.3 * std::cos(phase) * (3 + 3 * t), target = 0.4 * std::sin(phase + 0.3);
       std::snprintf(line, sizeof line, "%.4f,%.9g,%.9g,%.9g\n", t, target, q, 50 * (target - q) - 2 * v);
       text += line;
     }
@@ -40,7 +45,8 @@ TEST_F(IdentifyCliTest, PdPrintsJsonAndWritesPoints) {
   EXPECT_LE(json["values"]["kp"]["low"].get<double>(), json["values"]["kp"]["value"].get<double>());
   EXPECT_GT(json["fit"]["r2"].get<double>(), 0.99);
   EXPECT_EQ(json["logs"][0], log);
-  for (const char* file : {"result.json", "delay_scan.csv", "by_error.csv"}) EXPECT_TRUE(std::filesystem::exists(out + "/" + file)) << file;
+  for (const char* file : {"result.json", "delay_scan.csv", "by_error.csv"})
+    EXPECT_TRUE(std::filesystem::exists(out + "/" + file)) << file;
 }
 
 TEST_F(IdentifyCliTest, SaysWhatIsNotFit) {

@@ -34,7 +34,9 @@ constexpr const char* kArm = R"(<mujoco model="two_link">
 
 class InitTest : public ::testing::Test {
  protected:
-  Answer Run(const std::string& arguments) const { return scratch_.Shell("cd '" + scratch_.Path("") + "' && '" GAPSCOPE_PROGRAM "' " + arguments); }
+  Answer Run(const std::string& arguments) const {
+    return scratch_.Shell("cd '" + scratch_.Path("") + "' && '" GAPSCOPE_PROGRAM "' " + arguments);
+  }
   // Shoulder follows its target late, elbow and wrist swing on their own; `names` are the columns' in this order:
   // time [ms], shoulder angle, elbow angle, wrist travel, shoulder target, elbow torque command, elbow speed.
   std::string Log(const std::vector<std::string>& names, const std::string& file = "log.csv") {

@@ -27,7 +27,8 @@ TEST(ExtremeRowsTest, KeepsEverySpikeOfEveryColumn) {
   EXPECT_EQ(std::adjacent_find(rows.begin(), rows.end()), rows.end());
   EXPECT_EQ(rows.front(), 0u);
   EXPECT_EQ(rows.back(), kRows - 1);
-  for (const std::size_t spike : {123456u, 654321u}) EXPECT_TRUE(std::binary_search(rows.begin(), rows.end(), spike)) << spike;
+  for (const std::size_t spike : {123456u, 654321u})
+    EXPECT_TRUE(std::binary_search(rows.begin(), rows.end(), spike)) << spike;
 }
 
 TEST(ExtremeRowsTest, ShowsWhereAGapBegins) {

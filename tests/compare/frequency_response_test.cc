@@ -53,7 +53,9 @@ TEST(EstimateResponseTest, SaysNothingOfWhatWasNotExcited) {
   for (const auto& p : EstimateResponse(time, u, u, u)) EXPECT_NEAR(p.hz, 2, 2.2 / (1024 * 0.002));
   EXPECT_TRUE(EstimateResponse(time, u, noise, u).empty());
   EXPECT_TRUE(EstimateResponse(time, still, u, u).empty());
-  EXPECT_TRUE(EstimateResponse(std::span(time).first(100), std::span(u).first(100), std::span(u).first(100), std::span(u).first(100)).empty());
+  EXPECT_TRUE(EstimateResponse(std::span(time).first(100), std::span(u).first(100), std::span(u).first(100),
+                               std::span(u).first(100))
+                  .empty());
 }
 
 }  // namespace

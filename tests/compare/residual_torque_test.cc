@@ -14,7 +14,8 @@ constexpr double kFriction_n_m = 0.002;
 // The Qube with dry friction on the arm, replayed as if it were a log.
 Recording WithFriction(const Experiment& experiment) {
   const auto model = MakeModel(experiment, {{"coulomb_friction", "arm"}});
-  Recording recording = MakeRecording(experiment, 4000, 0.002, [](int, double t) { return 3 * std::sin(4 * t) + std::sin(1.3 * t); });
+  Recording recording =
+      MakeRecording(experiment, 4000, 0.002, [](int, double t) { return 3 * std::sin(4 * t) + std::sin(1.3 * t); });
   recording.timeline.median_step_s = 0.002;
   const auto predicted = Predict(*model, recording, {{"coulomb_friction@arm.friction_n_m", kFriction_n_m}});
   for (std::size_t s = 0; s < predicted.size(); ++s) recording.measured[s].values = predicted[s];

@@ -25,11 +25,17 @@ TEST(ThreadPoolTest, EveryTaskRunsOnceOnAWorkerOfItsOwn) {
 
 TEST(ThreadPoolTest, ATasksExceptionReachesTheCallerAndThePoolLivesOn) {
   ThreadPool pool(2);
-  EXPECT_THROW(pool.ForEach(10, [](std::size_t i, int) { if (i == 3) throw std::runtime_error("x"); }),
+  EXPECT_THROW(pool.ForEach(10,
+                            [](std::size_t i, int) {
+                              if (i == 3) throw std::runtime_error("x");
+                            }),
                std::runtime_error);
   int sum = 0;
   std::mutex mutex;
-  pool.ForEach(4, [&](std::size_t i, int) { const std::lock_guard lock(mutex); sum += static_cast<int>(i); });
+  pool.ForEach(4, [&](std::size_t i, int) {
+    const std::lock_guard lock(mutex);
+    sum += static_cast<int>(i);
+  });
   EXPECT_EQ(sum, 6);
 }
 

@@ -15,7 +15,11 @@ namespace gapscope {
 namespace {
 
 ChirpRequest Document() {
-  return {.inertia_kg_m2 = 0.159221308, .natural_frequency_hz = 5, .damping_ratios = {0.707, 1.2, 2}, .speed_limit_rad_per_s = 116 * 2 * std::numbers::pi / 60, .amplitude_factor = 0.8,
+  return {.inertia_kg_m2 = 0.159221308,
+          .natural_frequency_hz = 5,
+          .damping_ratios = {0.707, 1.2, 2},
+          .speed_limit_rad_per_s = 116 * 2 * std::numbers::pi / 60,
+          .amplitude_factor = 0.8,
           .end_over_bandwidth = {2, 3, 5}};
 }
 
@@ -30,18 +34,12 @@ TEST(ChirpTest, TableHasTheDocumentsDigits) {
     for (std::string word; words >> word;) cells.back().push_back(word);
   }
   const std::vector<std::vector<std::string>> document = {
-      {"0.707", "1.2", "2.0"},
-      {"157.1451", "157.1451", "157.1451"},
-      {"7.0729", "12.005", "20.0083"},
-      {"22.2179", "13.0900", "7.8540"},
-      {"0.1801", "0.1061", "0.0637"},
-      {"5.0", "2.5", "1.33"},
-      {"10.0", "4.99", "2.67"},
-      {"8.860409", "17.744336", "33.241674"},
-      {"15.0", "7.49", "4.0"},
-      {"5.906939", "11.829558", "22.161116"},
-      {"25.0", "12.49", "6.66"},
-      {"3.544164", "7.097735", "13.29667"},
+      {"0.707", "1.2", "2.0"},         {"157.1451", "157.1451", "157.1451"},
+      {"7.0729", "12.005", "20.0083"}, {"22.2179", "13.0900", "7.8540"},
+      {"0.1801", "0.1061", "0.0637"},  {"5.0", "2.5", "1.33"},
+      {"10.0", "4.99", "2.67"},        {"8.860409", "17.744336", "33.241674"},
+      {"15.0", "7.49", "4.0"},         {"5.906939", "11.829558", "22.161116"},
+      {"25.0", "12.49", "6.66"},       {"3.544164", "7.097735", "13.29667"},
   };
   EXPECT_EQ(cells, document);
 }
@@ -89,7 +87,8 @@ TEST(ChirpTest, CsvKeepsTheSpeedLimitAndIsTheDocumentsFormula) {
 TEST(ChirpTest, RefusesWhatMakesNoChirp) {
   const double bad[] = {0, -1, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()};
   for (const double value : bad) {
-    for (double ChirpRequest::*field : {&ChirpRequest::inertia_kg_m2, &ChirpRequest::natural_frequency_hz, &ChirpRequest::speed_limit_rad_per_s, &ChirpRequest::amplitude_factor}) {
+    for (double ChirpRequest::* field : {&ChirpRequest::inertia_kg_m2, &ChirpRequest::natural_frequency_hz,
+                                         &ChirpRequest::speed_limit_rad_per_s, &ChirpRequest::amplitude_factor}) {
       ChirpRequest request = Document();
       request.*field = value;
       EXPECT_FALSE(DesignChirps(request).ok()) << value;

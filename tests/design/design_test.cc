@@ -1,4 +1,5 @@
-// Limits kept by rehearsal, and inputs chosen by what they show: against closed forms and fits that are simple enough to reason about.
+// Limits kept by rehearsal, and inputs chosen by what they show: against closed forms and fits that are simple enough
+// to reason about.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,13 +32,15 @@ std::vector<double> Wave(WaveShape shape, double low, double high, double rate) 
   return SampleWaveform({.shape = shape, .duration_s = 5, .low_hz = low, .high_hz = high, .seed = 1}, rate).value();
 }
 
-// The flexible joint is linear: what is reached grows with the amplitude, so the largest safe amplitude puts the worst limit at the margin.
+// The flexible joint is linear: what is reached grows with the amplitude, so the largest safe amplitude puts the worst
+// limit at the margin.
 TEST(RehearsalTest, LargestAmplitudeUsesTheMarginOnALinearRig) {
   const Rig rig = Load("flexjoint");
   Simulator simulator(*rig.model, 0);
   const RehearsalOptions options{.rate_hz = 500};
   const auto wave = Wave(WaveShape::kSquare, 1 / 0.63, 1, 500);
-  const auto amplitude = LargestAmplitude({{rig.model.get(), &simulator, rig.model->Nominal()}}, options, wave, 10, 0.9);
+  const auto amplitude =
+      LargestAmplitude({{rig.model.get(), &simulator, rig.model->Nominal()}}, options, wave, 10, 0.9);
   ASSERT_TRUE(amplitude.ok());
   std::vector<double> values = wave;
   for (double& v : values) v *= amplitude.value();
@@ -51,13 +54,15 @@ TEST(RehearsalTest, LargestAmplitudeUsesTheMarginOnALinearRig) {
   EXPECT_DOUBLE_EQ(rehearsal.extremes[0].reached, amplitude.value());
 }
 
-// At standstill the servo's first torque is kp times the step: 119.6 / 157.1451 rad is all that the torque limit allows.
+// At standstill the servo's first torque is kp times the step: 119.6 / 157.1451 rad is all that the torque limit
+// allows.
 TEST(RehearsalTest, TorqueLimitOfAStepIsTheServosStiffness) {
   const Rig rig = Load("joint");
   Simulator simulator(*rig.model, 0);
   std::vector<double> step(500, 0.0);
   for (std::size_t k = 50; k < step.size(); ++k) step[k] = 1;
-  const auto amplitude = LargestAmplitude({{rig.model.get(), &simulator, rig.model->Nominal()}}, {.rate_hz = 500}, step, 1.6, 1);
+  const auto amplitude =
+      LargestAmplitude({{rig.model.get(), &simulator, rig.model->Nominal()}}, {.rate_hz = 500}, step, 1.6, 1);
   ASSERT_TRUE(amplitude.ok());
   // Torque is read at the stamps: one sample (2 ms) after the step it is a few percent lower.
   EXPECT_GE(amplitude.value(), 119.6 / 157.1451 * 0.95);
@@ -70,7 +75,8 @@ TEST(RehearsalTest, CsvIsALogOfTheExperiment) {
   std::vector<double> values = Wave(WaveShape::kTriangle, 0.5, 1, 100);
   auto input = MakeInput(rig.experiment, {.rate_hz = 100}, values);
   ASSERT_TRUE(input.ok());
-  const std::string csv = InputCsv(rig.experiment, Rehearse(*rig.model, simulator, input.value(), rig.model->Nominal()));
+  const std::string csv =
+      InputCsv(rig.experiment, Rehearse(*rig.model, simulator, input.value(), rig.model->Nominal()));
   testing::Scratch scratch;
   const std::string path = scratch.Write("input.csv", csv);
   const auto log = ReadLog(path, rig.experiment.read);
@@ -85,20 +91,24 @@ TEST(RehearsalTest, CsvIsALogOfTheExperiment) {
 
 TEST(RehearsalTest, RefusesUnknownActuatorsAndMissingNumbers) {
   const Rig rig = Load("flexjoint"), servo = Load("xl330");
-  EXPECT_FALSE(MakeInput(rig.experiment, {.actuator = "moter", .hold = {}, .log_values = {}, .rate_hz = 100}, {0, 0}).ok());
-  EXPECT_FALSE(MakeInput(rig.experiment, {.actuator = "", .hold = {{"brake", 1}}, .log_values = {}, .rate_hz = 100}, {0, 0}).ok());
+  EXPECT_FALSE(
+      MakeInput(rig.experiment, {.actuator = "moter", .hold = {}, .log_values = {}, .rate_hz = 100}, {0, 0}).ok());
+  EXPECT_FALSE(
+      MakeInput(rig.experiment, {.actuator = "", .hold = {{"brake", 1}}, .log_values = {}, .rate_hz = 100}, {0, 0})
+          .ok());
   const auto missing = MakeInput(servo.experiment, {.rate_hz = 100}, {0, 0});
   ASSERT_FALSE(missing.ok());
   EXPECT_NE(missing.error().Text().find("--value log.kp"), std::string::npos);
 }
 
-// The flexible joint is linear: a quarter of the amplitude has a sixteenth of the information, so four times the standard deviation, or less where what is known
-// beforehand of the other parameters helps.
+// The flexible joint is linear: a quarter of the amplitude has a sixteenth of the information, so four times the
+// standard deviation, or less where what is known beforehand of the other parameters helps.
 TEST(OptimalTest, DeviationsGrowAsTheAmplitudeShrinks) {
   const Rig rig = Load("flexjoint");
   ThreadPool pool(1);
   const Hypothesis base = MakeHypothesis("none", rig.model, rig.model->Nominal());
-  const auto design = DesignForParameters(base, {rig.model->IndexOf("link.stiffness")}, {.rehearsal = {.rate_hz = 250}, .duration_s = 4}, pool);
+  const auto design = DesignForParameters(base, {rig.model->IndexOf("link.stiffness")},
+                                          {.rehearsal = {.rate_hz = 250}, .duration_s = 4}, pool);
   ASSERT_TRUE(design.ok()) << design.error().Text();
   const auto& inputs = design.value().inputs;
   ASSERT_GE(inputs.size(), 5u);
@@ -116,7 +126,8 @@ TEST(OptimalTest, DeviationsGrowAsTheAmplitudeShrinks) {
   EXPECT_LE(small.second / large.second, 4 * (1 + 1e-6));
   EXPECT_GT(small.second / large.second, 2.5);
 
-  const auto frozen = DesignForParameters(MakeHypothesis("none", Load("qube").model, Load("qube").model->Nominal()), {0, 3}, {.rehearsal = {.rate_hz = 250}, .duration_s = 3}, pool);
+  const auto frozen = DesignForParameters(MakeHypothesis("none", Load("qube").model, Load("qube").model->Nominal()),
+                                          {0, 3}, {.rehearsal = {.rate_hz = 250}, .duration_s = 3}, pool);
   EXPECT_FALSE(frozen.ok());
 }
 
@@ -135,7 +146,8 @@ TEST(OptimalTest, SeparatingInputMovesWhereTheRivalsDiffer) {
   };
   const Hypothesis base = MakeHypothesis("none", rig.model, rig.model->Nominal());
   const std::vector<Hypothesis> rivals = {
-      rival("cable_spring@base", {{"cable_spring@base.stiffness_n_m_per_rad", 0.02}, {"cable_spring@base.rest_rad", 0.3}}),
+      rival("cable_spring@base",
+            {{"cable_spring@base.stiffness_n_m_per_rad", 0.02}, {"cable_spring@base.rest_rad", 0.3}}),
       rival("torque_bias@base", {{"torque_bias@base.torque_n_m", 0.006}}),
   };
   const OptimalOptions options{.rehearsal = {.rate_hz = 250}, .duration_s = 2.5};

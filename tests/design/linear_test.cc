@@ -11,7 +11,8 @@ namespace {
 using Eigen::MatrixXd;
 using Complex = std::complex<double>;
 
-// x'' = u, weights q on the position and r: K = [sqrt(q/r), sqrt(2) (q/r)^(1/4)] (Anderson and Moore, "Optimal Control", 1990, 3.1).
+// x'' = u, weights q on the position and r: K = [sqrt(q/r), sqrt(2) (q/r)^(1/4)] (Anderson and Moore, "Optimal
+// Control", 1990, 3.1).
 TEST(LqrTest, DoubleIntegrator) {
   constexpr double kTolerance = 1e-10;
   MatrixXd a(2, 2), b(2, 1), q = MatrixXd::Zero(2, 2), r(1, 1);
@@ -28,19 +29,22 @@ TEST(LqrTest, DoubleIntegrator) {
 
 // An unstable pole s = p with no weight is mirrored: the cheapest stabilising feedback is 2 p / b, at the pole -p.
 TEST(LqrTest, MirrorsAnUnstablePoleWithoutWeight) {
-  const MatrixXd a = MatrixXd::Constant(1, 1, 3), b = MatrixXd::Constant(1, 1, 2), q = MatrixXd::Zero(1, 1), r = MatrixXd::Constant(1, 1, 5);
+  const MatrixXd a = MatrixXd::Constant(1, 1, 3), b = MatrixXd::Constant(1, 1, 2), q = MatrixXd::Zero(1, 1),
+                 r = MatrixXd::Constant(1, 1, 5);
   const auto k = Lqr(a, b, q, r);
   ASSERT_TRUE(k.ok());
   EXPECT_NEAR(k.value().gain(0, 0), 3, 1e-10);
   EXPECT_NEAR(k.value().poles[0].real(), -3, 1e-10);
 }
 
-// The inverted pendulum on a cart of the Michigan control tutorials (ctms.engin.umich.edu, "Inverted Pendulum: State-Space Methods for Controller Design"): M 0.5, m 0.2, b 0.1, I 0.006,
-// l 0.3; Q = diag(1, 0, 1, 0), R = 1 gives K = [-1.0000 -1.6567 18.6854 3.4594]; Q = diag(5000, 0, 100, 0): K = [-70.7107 -37.8345 105.5298 20.9238].
+// The inverted pendulum on a cart of the Michigan control tutorials (ctms.engin.umich.edu, "Inverted Pendulum:
+// State-Space Methods for Controller Design"): M 0.5, m 0.2, b 0.1, I 0.006, l 0.3; Q = diag(1, 0, 1, 0), R = 1 gives K
+// = [-1.0000 -1.6567 18.6854 3.4594]; Q = diag(5000, 0, 100, 0): K = [-70.7107 -37.8345 105.5298 20.9238].
 TEST(LqrTest, PublishedCartPendulum) {
   const double M = 0.5, m = 0.2, damping = 0.1, I = 0.006, g = 9.8, l = 0.3, p = I * (M + m) + M * m * l * l;
   MatrixXd a(4, 4), b(4, 1), q = MatrixXd::Zero(4, 4);
-  a << 0, 1, 0, 0, 0, -(I + m * l * l) * damping / p, m * m * g * l * l / p, 0, 0, 0, 0, 1, 0, -m * l * damping / p, m * g * l * (M + m) / p, 0;
+  a << 0, 1, 0, 0, 0, -(I + m * l * l) * damping / p, m * m * g * l * l / p, 0, 0, 0, 0, 1, 0, -m * l * damping / p,
+      m * g * l * (M + m) / p, 0;
   b << 0, (I + m * l * l) / p, 0, m * l / p;
   const MatrixXd r = MatrixXd::Identity(1, 1);
   constexpr double kPrinted = 6e-5;
@@ -90,7 +94,8 @@ TEST(PlacePolesTest, PutsThemWhereAsked) {
   EXPECT_FALSE(PlacePoles(a2, unreachable, {{-1, 0}, {-2, 0}}).ok());
 }
 
-// Constant speed seen through a noisy position: the Kalman-Bucy gain of the double integrator is [sqrt(2) (w/v)^(1/4), sqrt(w/v)].
+// Constant speed seen through a noisy position: the Kalman-Bucy gain of the double integrator is [sqrt(2) (w/v)^(1/4),
+// sqrt(w/v)].
 TEST(ObserverTest, DualsOfTheFeedbacks) {
   MatrixXd a(2, 2), c(1, 2), w = MatrixXd::Zero(2, 2), v(1, 1);
   a << 0, 1, 0, 0;
@@ -112,9 +117,12 @@ TEST(LinearizeTest, QubeIsItsTextbookMatrices) {
   ASSERT_TRUE(experiment.ok());
   const auto model = Model::Build(experiment.value());
   ASSERT_TRUE(model.ok()) << model.error().Text();
-  const double mp = 0.024, l = 0.0645, L = 0.085, J = mp * 4 * l * l / 3, I = 4.6e-6 + 0.095 * L * L / 3 + mp * L * L, kt = 0.042, R = 8.4, ba = 1.5e-4 + kt * kt / R, bp = 3e-5, g = 9.81;
+  const double mp = 0.024, l = 0.0645, L = 0.085, J = mp * 4 * l * l / 3, I = 4.6e-6 + 0.095 * L * L / 3 + mp * L * L,
+               kt = 0.042, R = 8.4, ba = 1.5e-4 + kt * kt / R, bp = 3e-5, g = 9.81;
   for (const double up : {1.0, -1.0}) {  // hanging, upright
-    const auto system = Linearize(*model.value(), model.value()->Nominal(), {}, up > 0 ? std::map<std::string, double>{} : std::map<std::string, double>{{"pendulum", std::numbers::pi}}, 0);
+    const auto system = Linearize(
+        *model.value(), model.value()->Nominal(), {},
+        up > 0 ? std::map<std::string, double>{} : std::map<std::string, double>{{"pendulum", std::numbers::pi}}, 0);
     ASSERT_TRUE(system.ok()) << system.error().Text();
     Eigen::Matrix2d mass, right_q, right_v;
     mass << I, up * mp * L * l, up * mp * L * l, J;
@@ -124,7 +132,8 @@ TEST(LinearizeTest, QubeIsItsTextbookMatrices) {
     const double kScale = (inverse * right_q).cwiseAbs().maxCoeff();
     EXPECT_LT((system.value().a.block(2, 0, 2, 2) - inverse * right_q).cwiseAbs().maxCoeff(), 1e-5 * kScale);
     EXPECT_LT((system.value().a.block(2, 2, 2, 2) - inverse * right_v).cwiseAbs().maxCoeff(), 1e-5 * kScale);
-    EXPECT_LT((system.value().b.bottomRows(2) - inverse * Eigen::Vector2d(kt / R, 0)).cwiseAbs().maxCoeff(), 1e-5 * kScale);
+    EXPECT_LT((system.value().b.bottomRows(2) - inverse * Eigen::Vector2d(kt / R, 0)).cwiseAbs().maxCoeff(),
+              1e-5 * kScale);
   }
   EXPECT_FALSE(Linearize(*model.value(), model.value()->Nominal(), {}, {{"pendulum", 1.0}}, 0).ok());
   EXPECT_FALSE(Linearize(*model.value(), model.value()->Nominal(), {}, {{"pendulm", 0.0}}, 0).ok());

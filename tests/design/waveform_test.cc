@@ -17,7 +17,8 @@ double Peak(const std::vector<double>& values) {
 }
 
 TEST(WaveformTest, AllBeginAtZeroAndPeakAtOne) {
-  for (const WaveShape shape : {WaveShape::kChirp, WaveShape::kSteps, WaveShape::kTriangle, WaveShape::kMultisine, WaveShape::kSquare}) {
+  for (const WaveShape shape :
+       {WaveShape::kChirp, WaveShape::kSteps, WaveShape::kTriangle, WaveShape::kMultisine, WaveShape::kSquare}) {
     const auto values = SampleWaveform({.shape = shape, .duration_s = 10, .low_hz = 0.5, .high_hz = 5, .seed = 3}, 400);
     ASSERT_TRUE(values.ok()) << WaveShapeName(shape);
     EXPECT_EQ(values.value().size(), 4001u);
@@ -35,7 +36,8 @@ TEST(WaveformTest, SquareOfTheFlexibleJointTurnsEvery315Milliseconds) {
 TEST(WaveformTest, TriangleHasConstantSlope) {
   const auto values = SampleWaveform({.shape = WaveShape::kTriangle, .duration_s = 4, .low_hz = 0.5}, 100);
   ASSERT_TRUE(values.ok());
-  for (std::size_t k = 0; k + 1 < values.value().size(); ++k) EXPECT_NEAR(std::abs(values.value()[k + 1] - values.value()[k]), 0.02, 1e-9) << k;
+  for (std::size_t k = 0; k + 1 < values.value().size(); ++k)
+    EXPECT_NEAR(std::abs(values.value()[k + 1] - values.value()[k]), 0.02, 1e-9) << k;
   EXPECT_NEAR(values.value()[50], 1, 1e-9);
   EXPECT_NEAR(values.value()[150], -1, 1e-9);
 }
@@ -43,16 +45,19 @@ TEST(WaveformTest, TriangleHasConstantSlope) {
 // Past the fade-in only multiples of 1 / duration inside the band hold power.
 TEST(WaveformTest, MultisineKeepsItsBand) {
   const double duration = 20, rate = 100;
-  const auto values = SampleWaveform({.shape = WaveShape::kMultisine, .duration_s = duration, .low_hz = 1, .high_hz = 5}, rate);
+  const auto values =
+      SampleWaveform({.shape = WaveShape::kMultisine, .duration_s = duration, .low_hz = 1, .high_hz = 5}, rate);
   ASSERT_TRUE(values.ok());
   double inside = 0, outside = 0;
   for (int line = 1; line < 1000; ++line) {
     std::complex<double> sum = 0;
-    for (std::size_t k = 0; k < 2000; ++k) sum += values.value()[k] * std::polar(1.0, -2 * std::numbers::pi * line * static_cast<double>(k) / 2000);
+    for (std::size_t k = 0; k < 2000; ++k)
+      sum += values.value()[k] * std::polar(1.0, -2 * std::numbers::pi * line * static_cast<double>(k) / 2000);
     (line >= 18 && line <= 102 ? inside : outside) += std::norm(sum);
   }
   EXPECT_LT(outside, 0.02 * inside);
-  // A low peak: less than half of what 24 sines of equal size have when all pass their peaks at once, sqrt(2 * 24) = 6.9 root mean squares.
+  // A low peak: less than half of what 24 sines of equal size have when all pass their peaks at once, sqrt(2 * 24)
+  // = 6.9 root mean squares.
   double square = 0;
   for (std::size_t k = 200; k < 2000; ++k) square += values.value()[k] * values.value()[k];
   EXPECT_LT(1 / std::sqrt(square / 1800), 0.5 * std::sqrt(48.0));

@@ -7,7 +7,8 @@
 namespace gapscope {
 namespace {
 
-Recording MakeRecording(const std::vector<double>& time, const std::vector<double>& command, const std::vector<double>& measured) {
+Recording MakeRecording(const std::vector<double>& time, const std::vector<double>& command,
+                        const std::vector<double>& measured) {
   Recording r;
   r.time_s = time;
   r.commands.push_back({.actuator = "motor", .column = "u", .values = command});
@@ -23,7 +24,8 @@ double Impulse(const Recording& r) {
 }
 
 TEST(CoarsenTest, KeepsSamplesAndImpulse) {
-  const Recording fine = MakeRecording({0, 0.001, 0.002, 0.003, 0.004, 0.005, 0.006, 0.007, 0.008}, {1, 2, 3, 4, -1, -2, -3, 6, 0}, {0, 1, 2, 3, 4, 5, 6, 7, 8});
+  const Recording fine = MakeRecording({0, 0.001, 0.002, 0.003, 0.004, 0.005, 0.006, 0.007, 0.008},
+                                       {1, 2, 3, 4, -1, -2, -3, 6, 0}, {0, 1, 2, 3, 4, 5, 6, 7, 8});
   const Recording coarse = Coarsen(fine, 0.004);
   EXPECT_EQ(coarse.time_s, (std::vector<double>{0, 0.004, 0.008}));
   EXPECT_EQ(coarse.measured[0].values, (std::vector<double>{0, 4, 8}));

@@ -1,5 +1,5 @@
-// The diagnosis on logs of the independent twin plant (tests/twin), whose cause is known here and not to the program. The full blind check is
-// scripts/blind_check.
+// The diagnosis on logs of the independent twin plant (tests/twin), whose cause is known here and not to the program.
+// The full blind check is scripts/blind_check.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -22,7 +22,8 @@ struct Logs {
   std::vector<twin::EffectLabel> effects;
 };
 
-Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect, std::uint64_t seed, std::uint64_t index = 0) {
+Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect, std::uint64_t seed,
+              std::uint64_t index = 0) {
   twin::Case c;
   std::string problem;
   twin::CaseRequest request;
@@ -88,7 +89,8 @@ TEST(DiagnoseTest, NamesNothingWhereNothingIsMissing) {
   EXPECT_TRUE(d.effects.empty());
 }
 
-// A cable and dry friction: each alone bends to do what the other one does, and fails on the windows that were held out.
+// A cable and dry friction: each alone bends to do what the other one does, and fails on the windows that were held
+// out.
 TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
   const Diagnosis d = DiagnoseLogs(MakeLogs("flexlink", twin::Kind::kAuto, "", 913, 19));
   ASSERT_EQ(d.verdict, Verdict::kEffects) << d.explanation;
@@ -103,7 +105,8 @@ TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
 TEST(DiagnoseTest, ShuffledCommandsAreNoEffect) {
   Logs logs = MakeLogs("flexlink", twin::Kind::kNone, "", 34);
   std::mt19937_64 random(5);
-  for (auto& recording : logs.recordings) std::shuffle(recording.commands[0].values.begin(), recording.commands[0].values.end(), random);
+  for (auto& recording : logs.recordings)
+    std::shuffle(recording.commands[0].values.begin(), recording.commands[0].values.end(), random);
   const Diagnosis d = DiagnoseLogs(logs);
   EXPECT_EQ(d.verdict, Verdict::kUnknown) << d.explanation;
 }

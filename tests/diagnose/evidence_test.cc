@@ -72,7 +72,9 @@ TEST(EvidenceTest, FewHeldOutBlocksWithMostOfTheCostConvince) {
 
 // A gain on the training logs that the held-out ones do not show is none.
 TEST(EvidenceTest, HeldOutMustGainToo) {
-  EXPECT_FALSE(Convincing(Compare(WithBlocks(std::vector<double>(30, 9.0), std::vector<double>(10, 2.0)), WithBlocks(std::vector<double>(30, 1.0), std::vector<double>(10, 2.1))), {.share = 0.01, .z = 2.5}));
+  EXPECT_FALSE(Convincing(Compare(WithBlocks(std::vector<double>(30, 9.0), std::vector<double>(10, 2.0)),
+                                  WithBlocks(std::vector<double>(30, 1.0), std::vector<double>(10, 2.1))),
+                          {.share = 0.01, .z = 2.5}));
 }
 
 TEST(EvidenceTest, WhatCannotBeSimulatedLoses) {

@@ -16,7 +16,8 @@ std::unique_ptr<Candidate> WithBlocks(const char* effect, std::size_t parameters
   if (*effect) candidate->effects = {{effect, "joint"}};
   candidate->parameters = parameters;
   candidate->block_floor = 1;
-  candidate->held_out_floors = std::sqrt(std::accumulate(blocks.begin(), blocks.end(), 0.0) / static_cast<double>(blocks.size()));
+  candidate->held_out_floors =
+      std::sqrt(std::accumulate(blocks.begin(), blocks.end(), 0.0) / static_cast<double>(blocks.size()));
   candidate->train_blocks = candidate->held_out_blocks = std::move(blocks);
   return candidate;
 }
@@ -43,7 +44,8 @@ TEST(ExploreTest, TheSimplerOfTwoThatDoAsWellIsTaken) {
 
 // What a model at the noise leaves has its own colour, which some effect always imitates a little.
 TEST(ExploreTest, BesideAModelAtTheNoiseAFewPercentAreNoEffect) {
-  const auto base = WithBlocks("", 0, std::vector<double>(40, 0.86)), better = WithBlocks("joint_compliance", 3, std::vector<double>(40, 0.77));
+  const auto base = WithBlocks("", 0, std::vector<double>(40, 0.86)),
+             better = WithBlocks("joint_compliance", 3, std::vector<double>(40, 0.77));
   base->held_out_floors = 1.1;
   EXPECT_TRUE(Convincing(Compare(*base, *better), FirstLimits(*base)));
   base->held_out_floors = 0.93;

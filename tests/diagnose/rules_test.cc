@@ -19,7 +19,8 @@ Candidate Of(const Rig& rig, const std::vector<EffectUse>& effects) {
 
 TEST(RulesTest, OnlyEffectsOnOnePlaceContainEachOther) {
   const Rig rig = LoadRig("qube");
-  const Candidate bias = Of(rig, {{"torque_bias", "arm"}}), of_joint = Of(rig, {{"direction_asymmetry", "arm"}}), of_motor = Of(rig, {{"direction_asymmetry", "motor"}});
+  const Candidate bias = Of(rig, {{"torque_bias", "arm"}}), of_joint = Of(rig, {{"direction_asymmetry", "arm"}}),
+                  of_motor = Of(rig, {{"direction_asymmetry", "motor"}});
   EXPECT_TRUE(Contains(of_joint, bias));
   EXPECT_FALSE(Contains(of_motor, bias));
   EXPECT_FALSE(Contains(bias, of_joint));
@@ -31,16 +32,23 @@ TEST(RulesTest, OnlyEffectsOnOnePlaceContainEachOther) {
   EXPECT_TRUE(Contains(cable, bias));
   EXPECT_FALSE(Contains(cable, bias, true));
   // Beside the same other effect, and not beside another.
-  EXPECT_TRUE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}), Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
-  EXPECT_FALSE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}), Of(rig, {{"torque_limit", "motor"}, {"coulomb_friction", "arm"}})));
+  EXPECT_TRUE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}),
+                       Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
+  EXPECT_FALSE(Contains(Of(rig, {{"dead_zone", "motor"}, {"stribeck_friction", "arm"}}),
+                        Of(rig, {{"torque_limit", "motor"}, {"coulomb_friction", "arm"}})));
   // In whichever order a pair was found.
-  EXPECT_TRUE(Contains(Of(rig, {{"stribeck_friction", "arm"}, {"dead_zone", "motor"}}), Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
+  EXPECT_TRUE(Contains(Of(rig, {{"stribeck_friction", "arm"}, {"dead_zone", "motor"}}),
+                       Of(rig, {{"dead_zone", "motor"}, {"coulomb_friction", "arm"}})));
   EXPECT_FALSE(Contains(bias, bias));
 }
 
 TEST(RulesTest, ABiasIsNoFindingOnAPositionServo) {
-  // A servo of MuJoCo's own and one of the duty law; a voltage drive, and a drive of the position law whose logs need not use its gain.
-  for (const auto& [name, joint, finding] : {std::tuple{"joint", "joint", false}, {"xl330", "joint", false}, {"qube", "arm", true}, {"ak80", "joint", true}}) {
+  // A servo of MuJoCo's own and one of the duty law; a voltage drive, and a drive of the position law whose logs need
+  // not use its gain.
+  for (const auto& [name, joint, finding] : {std::tuple{"joint", "joint", false},
+                                             {"xl330", "joint", false},
+                                             {"qube", "arm", true},
+                                             {"ak80", "joint", true}}) {
     const Rig rig = LoadRig(name);
     EXPECT_EQ(IsFinding({"torque_bias", joint}, *rig.model), finding) << name;
     EXPECT_TRUE(IsFinding({"coulomb_friction", joint}, *rig.model)) << name;
@@ -49,7 +57,8 @@ TEST(RulesTest, ABiasIsNoFindingOnAPositionServo) {
 
 TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {
   const Rig rig = LoadRig("qube");
-  const Candidate sensors = Of(rig, {{"sensor_delay", "arm_rad"}, {"sensor_delay", "pendulum_rad"}}), command = Of(rig, {{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}});
+  const Candidate sensors = Of(rig, {{"sensor_delay", "arm_rad"}, {"sensor_delay", "pendulum_rad"}}),
+                  command = Of(rig, {{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}});
   EXPECT_TRUE(IsLessLikely(sensors, command));
   EXPECT_FALSE(IsLessLikely(command, sensors));
   EXPECT_FALSE(MayBeRivals(sensors, command));
@@ -59,11 +68,13 @@ TEST(RulesTest, TwoLateSensorsAreNoRivalOfALateCommand) {
 
 // A soft spring, at a hundredth of the stiff end of its range of four decades, is no bound.
 TEST(RulesTest, OnlyTheEndOfARangeIsStretched) {
-  const PlacedParameter stiffness{.name = {}, .key = {}, .unit = {}, .neutral = 3000, .low = 0.5, .high = 3000, .start = 100, .trials = {}};
+  const PlacedParameter stiffness{
+      .name = {}, .key = {}, .unit = {}, .neutral = 3000, .low = 0.5, .high = 3000, .start = 100, .trials = {}};
   EXPECT_FALSE(IsStretched(stiffness, 2));
   EXPECT_TRUE(IsStretched(stiffness, 0.5));
   EXPECT_FALSE(IsStretched(stiffness, 3000)) << "no effect";
-  const PlacedParameter angle{.name = {}, .key = {}, .unit = {}, .neutral = 0, .low = -2, .high = 2, .start = 0.1, .trials = {}};
+  const PlacedParameter angle{
+      .name = {}, .key = {}, .unit = {}, .neutral = 0, .low = -2, .high = 2, .start = 0.1, .trials = {}};
   EXPECT_TRUE(IsStretched(angle, -2));
   EXPECT_TRUE(IsStretched(angle, 1.999));
   EXPECT_FALSE(IsStretched(angle, 1.9));
@@ -72,7 +83,8 @@ TEST(RulesTest, OnlyTheEndOfARangeIsStretched) {
 TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {
   Recording servo;
   servo.measured.resize(1);
-  servo.commands = {{.actuator = "motor", .column = "goal", .values = {0, 1, 0}}, {.actuator = "motor.supply", .column = "constant", .values = {7, 7, 7}}};
+  servo.commands = {{.actuator = "motor", .column = "goal", .values = {0, 1, 0}},
+                    {.actuator = "motor.supply", .column = "constant", .values = {7, 7, 7}}};
   EXPECT_TRUE(IsOneSignal({servo}));
   Recording supplied = servo;
   supplied.commands[1].values[2] = 6;

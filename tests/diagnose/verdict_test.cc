@@ -8,7 +8,8 @@
 namespace gapscope::testing {
 namespace {
 
-// A search that accepted a cable spring, whose blocks hold so many times the noise in every half second before and after.
+// A search that accepted a cable spring, whose blocks hold so many times the noise in every half second before and
+// after.
 struct Found {
   Rig rig;
   SearchResult result;
@@ -50,23 +51,28 @@ TEST(VerdictTest, WhatStandsForAnotherCauseHelpsWindowsOrFreeRunsOnly) {
   EXPECT_EQ(VerdictOf(10, 3.5, -0.2), Verdict::kEffects);
 }
 
-// Found beside the second effect, another one does what the first one does: the pair is not told apart in its first effect.
+// Found beside the second effect, another one does what the first one does: the pair is not told apart in its first
+// effect.
 TEST(VerdictTest, APairsFirstEffectMayHaveRivals) {
   Found found(10, 2);
   SearchResult& result = found.result;
   result.second.children.push_back(found.Make({{"cable_spring", "arm"}, {"command_delay", "motor"}}, 1.1));
   result.chosen = result.second.children.front().get();
   EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
-  result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"cable_spring", "arm"}}, 1.1));  // the same pair
-  result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"coulomb_friction", "arm"}}, 5));  // far behind
+  result.exchange.children.push_back(
+      found.Make({{"command_delay", "motor"}, {"cable_spring", "arm"}}, 1.1));  // the same pair
+  result.exchange.children.push_back(
+      found.Make({{"command_delay", "motor"}, {"coulomb_friction", "arm"}}, 5));  // far behind
   EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
   result.exchange.children.push_back(found.Make({{"command_delay", "motor"}, {"gravity_offset", "arm"}}, 1.1));
   const Judgement judgement = Judge(result);
   EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
-  EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"cable_spring", "arm"}, {"gravity_offset", "arm"}}}));
+  EXPECT_EQ(judgement.groups,
+            (std::vector<std::vector<EffectUse>>{{{"cable_spring", "arm"}, {"gravity_offset", "arm"}}}));
 }
 
-// Where one sensor is all that is measured, a late sensor and a late command are the same motion, whatever their fits cost.
+// Where one sensor is all that is measured, a late sensor and a late command are the same motion, whatever their fits
+// cost.
 TEST(VerdictTest, OneSignalCannotTellALateSensorFromALateCommand) {
   Found found(10, 2);
   SearchResult& result = found.result;
@@ -78,24 +84,28 @@ TEST(VerdictTest, OneSignalCannotTellALateSensorFromALateCommand) {
   result.one_signal = true;
   const Judgement judgement = Judge(result);
   EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
-  EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}}}));
+  EXPECT_EQ(judgement.groups,
+            (std::vector<std::vector<EffectUse>>{{{"sensor_delay", "arm_rad"}, {"command_delay", "motor"}}}));
 }
 
-// On a joint that a spring holds, a constant torque moves the rest, as a zero offset does: Coulomb friction is then friction of any two levels with that mean.
+// On a joint that a spring holds, a constant torque moves the rest, as a zero offset does: Coulomb friction is then
+// friction of any two levels with that mean.
 TEST(VerdictTest, OnASpringAZeroOffsetHidesInWhichDirectionFrictionIsLarger) {
   Found found(10, 2);
   SearchResult& result = found.result;
   result.first.children.push_back(found.Make({{"coulomb_friction", "arm"}}, 1.1));
   result.single = result.chosen = result.first.children[1].get();
   result.first.screen.push_back({.use = {"direction_asymmetry", "arm"}, .trial = {}, .child = {}, .left_out = {}});
-  result.first.screen.push_back({.use = {"torque_bias", "arm"}, .trial = {.absorbed = 1, .valid = false}, .child = {}, .left_out = "not tested"});
+  result.first.screen.push_back(
+      {.use = {"torque_bias", "arm"}, .trial = {.absorbed = 1, .valid = false}, .child = {}, .left_out = "not tested"});
   EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
   result.first.screen.back().trial = {.absorbed = 0.98, .valid = true};  // a pendulum's rest, or a hub without a spring
   EXPECT_EQ(Judge(result).verdict, Verdict::kEffects);
   result.first.screen.back().trial.absorbed = 0.99999;
   const Judgement judgement = Judge(result);
   EXPECT_EQ(judgement.verdict, Verdict::kAmbiguous);
-  EXPECT_EQ(judgement.groups, (std::vector<std::vector<EffectUse>>{{{"coulomb_friction", "arm"}, {"direction_asymmetry", "arm"}}}));
+  EXPECT_EQ(judgement.groups,
+            (std::vector<std::vector<EffectUse>>{{{"coulomb_friction", "arm"}, {"direction_asymmetry", "arm"}}}));
 }
 
 // On a servo likewise, unless its torque is measured: that shows the load.

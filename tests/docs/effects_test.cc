@@ -1,5 +1,5 @@
-// docs/effects.md says what the catalogue says. Between its markers it is made from the catalogue: GAPSCOPE_WRITE_DOCS=1 build/tests/docs_effects_test
-// rewrites it, without that the test compares.
+// docs/effects.md says what the catalogue says. Between its markers it is made from the catalogue:
+// GAPSCOPE_WRITE_DOCS=1 build/tests/docs_effects_test rewrites it, without that the test compares.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -14,27 +14,42 @@ namespace {
 
 const char* PlaceText(EffectPlace place) {
   switch (place) {
-    case EffectPlace::kMotor: return "an actuator on a joint";
-    case EffectPlace::kServo: return "an actuator that feeds back the position";
-    case EffectPlace::kJoint: return "a hinge or slide joint";
-    case EffectPlace::kDrivenJoint: return "a joint with an actuator";
-    case EffectPlace::kSpringJoint: return "a joint with a spring in the base model";
-    case EffectPlace::kSignal: return "a measured signal";
+    case EffectPlace::kMotor:
+      return "an actuator on a joint";
+    case EffectPlace::kServo:
+      return "an actuator that feeds back the position";
+    case EffectPlace::kJoint:
+      return "a hinge or slide joint";
+    case EffectPlace::kDrivenJoint:
+      return "a joint with an actuator";
+    case EffectPlace::kSpringJoint:
+      return "a joint with a spring in the base model";
+    case EffectPlace::kSignal:
+      return "a measured signal";
   }
   return "";
 }
 
 const char* ScaleText(ScaleKind kind) {
   switch (kind) {
-    case ScaleKind::kOne: return "";
-    case ScaleKind::kTorque: return "T";
-    case ScaleKind::kAngle: return "A";
-    case ScaleKind::kSpeed: return "W";
-    case ScaleKind::kStiffness: return "T/A";
-    case ScaleKind::kDrag: return "T/W^2";
-    case ScaleKind::kPower: return "T W";
-    case ScaleKind::kCommand: return "U";
-    case ScaleKind::kCubic: return "T/A^3";
+    case ScaleKind::kOne:
+      return "";
+    case ScaleKind::kTorque:
+      return "T";
+    case ScaleKind::kAngle:
+      return "A";
+    case ScaleKind::kSpeed:
+      return "W";
+    case ScaleKind::kStiffness:
+      return "T/A";
+    case ScaleKind::kDrag:
+      return "T/W^2";
+    case ScaleKind::kPower:
+      return "T W";
+    case ScaleKind::kCommand:
+      return "U";
+    case ScaleKind::kCubic:
+      return "T/A^3";
   }
   return "";
 }
@@ -53,9 +68,12 @@ std::string EffectsText() {
     text += "## " + effect.name + "\n\n" + meaning + ". On " + PlaceText(effect.place) + ".\n\n";
     text += "| parameter | unit | base | bounds |\n|---|---|---|---|\n";
     for (const EffectParameter& p : effect.parameters) {
-      const std::string key = p.scale == ScaleKind::kCommand ? "`" + p.key + "_v`, `" + p.key + "_a` or `" + p.key + "_n_m`" : "`" + p.key + "`";
+      const std::string key = p.scale == ScaleKind::kCommand
+                                  ? "`" + p.key + "_v`, `" + p.key + "_a` or `" + p.key + "_n_m`"
+                                  : "`" + p.key + "`";
       const std::string unit = p.scale == ScaleKind::kCommand ? "V, A or N m" : p.unit;
-      text += "| " + key + " | " + unit + " | " + Number(p.neutral, p.scale) + " | " + Number(p.low, p.scale) + " .. " + Number(p.high, p.scale) + " |\n";
+      text += "| " + key + " | " + unit + " | " + Number(p.neutral, p.scale) + " | " + Number(p.low, p.scale) + " .. " +
+              Number(p.high, p.scale) + " |\n";
     }
     text += "\nShows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
     for (std::size_t i = 0; i < effect.partners.size(); ++i) text += (i ? ", " : "") + ("`" + effect.partners[i] + "`");
@@ -65,7 +83,8 @@ std::string EffectsText() {
 }
 
 TEST(EffectsDocTest, IsWhatTheCatalogueSays) {
-  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/effects.md", begin = "<!-- made from src/model/effects -->\n\n", end = "<!-- end -->";
+  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/effects.md",
+                    begin = "<!-- made from src/model/effects -->\n\n", end = "<!-- end -->";
   const auto file = ReadFile(path);
   ASSERT_TRUE(file.ok()) << file.error().Text();
   const std::string& text = file.value();

@@ -1,7 +1,8 @@
-// docs/experiment.md names every key and every field that the program knows, and its example loads. What the program knows is asked from its own error
-// messages, which list what is allowed.
-#include <gtest/gtest.h>
+// docs/experiment.md names every key and every field that the program knows, and its example loads. What the program
+// knows is asked from its own error messages, which list what is allowed.
+#include "src/experiment/experiment.h"
 
+#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -9,7 +10,6 @@
 
 #include "src/core/file.h"
 #include "src/core/mujoco_handles.h"
-#include "src/experiment/experiment.h"
 #include "src/model/fields.h"
 
 namespace gapscope {
@@ -31,7 +31,8 @@ void ExpectDocumented(const std::string& list, const std::string& what) {
 }
 
 std::string AllowedKeys(const std::string& yaml) {
-  const std::string path = std::filesystem::temp_directory_path() / ("gapscope_docs_" + std::to_string(::getpid()) + ".yaml");
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("gapscope_docs_" + std::to_string(::getpid()) + ".yaml");
   EXPECT_TRUE(WriteFile(path, yaml).ok());
   const auto experiment = LoadExperiment(path);
   std::filesystem::remove(path);
@@ -61,9 +62,11 @@ TEST(ExperimentDocTest, NamesEveryKey) {
 
 TEST(ExperimentDocTest, NamesEveryField) {
   char error[500] = "";
-  SpecPtr spec(mj_parseXMLString("<mujoco><worldbody><body name='b'><joint name='j'/><geom size='1'/></body></worldbody>"
-                                 "<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon><actuator><motor name='a' joint='j'/></actuator></mujoco>",
-                                 nullptr, error, sizeof error));
+  SpecPtr spec(
+      mj_parseXMLString("<mujoco><worldbody><body name='b'><joint name='j'/><geom size='1'/></body></worldbody>"
+                        "<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon><actuator><motor name='a' "
+                        "joint='j'/></actuator></mujoco>",
+                        nullptr, error, sizeof error));
   ASSERT_TRUE(spec) << error;
   ModelPtr model(mj_compile(spec.get(), nullptr));
   ASSERT_TRUE(model);
@@ -79,7 +82,8 @@ TEST(ExperimentDocTest, ExampleLoads) {
   const std::size_t from = doc.find(begin), to = doc.find("```", from + begin.size());
   ASSERT_NE(from, std::string::npos);
   ASSERT_NE(to, std::string::npos);
-  const std::string path = std::filesystem::temp_directory_path() / ("gapscope_docs_example_" + std::to_string(::getpid()) + ".yaml");
+  const std::string path =
+      std::filesystem::temp_directory_path() / ("gapscope_docs_example_" + std::to_string(::getpid()) + ".yaml");
   ASSERT_TRUE(WriteFile(path, doc.substr(from + begin.size(), to - from - begin.size())).ok());
   const auto experiment = LoadExperiment(path);
   std::filesystem::remove(path);

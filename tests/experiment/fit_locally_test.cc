@@ -61,7 +61,8 @@ TEST(FitLocallyTest, ALogThatBeginsAtRestStartsAtRest) {
 }
 
 TEST(FitLocallyTest, AStepThroughALagAtTheFirstStampStartsAtRest) {
-  // x''' = 400 / 0.05 / s^3 from rest, exact to the last bit: the parabola through +20 ms sees a slope of -0.3 rad/s there.
+  // x''' = 400 / 0.05 / s^3 from rest, exact to the last bit: the parabola through +20 ms sees a slope of -0.3 rad/s
+  // there.
   const auto cube = [](double t) { return 0.1 + 400 / 0.05 * t * t * t / 6; };
   const LocalFit fit = Fit(Sampled(200, 0.002, cube), 0);
   EXPECT_EQ(fit.value, 0.1);

@@ -19,7 +19,8 @@ struct Bench {
   IdentifyInput input() const { return {.model = *model, .values = values, .recordings = recordings}; }
 };
 
-inline Bench LoadBench(const std::string& rig, const std::vector<std::string>& logs, const std::string& file = "experiment.yaml") {
+inline Bench LoadBench(const std::string& rig, const std::vector<std::string>& logs,
+                       const std::string& file = "experiment.yaml") {
   Bench bench;
   const auto experiment = LoadExperiment(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/" + file);
   EXPECT_TRUE(experiment.ok()) << experiment.error().Text();
@@ -35,7 +36,8 @@ inline Bench LoadBench(const std::string& rig, const std::vector<std::string>& l
   return bench;
 }
 
-// The truth lies in the interval, and the interval is narrower than `share` of the truth: an interval that holds everything says nothing.
+// The truth lies in the interval, and the interval is narrower than `share` of the truth: an interval that holds
+// everything says nothing.
 inline void ExpectRecovered(const Identification& result, const std::string& name, double truth, double share) {
   const Estimate* e = result.Find(name);
   ASSERT_NE(e, nullptr) << name;

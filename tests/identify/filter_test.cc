@@ -15,13 +15,15 @@ Recording Timeline(std::size_t rows, double dt) {
   return r;
 }
 
-// A Gaussian leaves straight lines as they are, adds a constant to parabolas, and scales a sine by exp(-(w s)^2 / 2): 1 / sqrt 2 at the cut-off.
+// A Gaussian leaves straight lines as they are, adds a constant to parabolas, and scales a sine by exp(-(w s)^2 / 2): 1
+// / sqrt 2 at the cut-off.
 TEST(SmoothLogTest, DerivativesOfPolynomialsAreExact) {
   const Recording r = Timeline(1000, 0.002);
   const SmoothLog smooth(r, {.cutoff_hz = 10});
   std::vector<double> line, parabola, constant(1000, 0.7);
   for (const double t : r.time_s) line.push_back(3 * t + 1), parabola.push_back(2 * t * t - t);
-  const auto l0 = smooth.Sampled(line, 0), l1 = smooth.Sampled(line, 1), p1 = smooth.Sampled(parabola, 1), p2 = smooth.Sampled(parabola, 2), c2 = smooth.Sampled(constant, 2);
+  const auto l0 = smooth.Sampled(line, 0), l1 = smooth.Sampled(line, 1), p1 = smooth.Sampled(parabola, 1),
+             p2 = smooth.Sampled(parabola, 2), c2 = smooth.Sampled(constant, 2);
   for (std::size_t i = smooth.reach() + 1; i + smooth.reach() + 1 < 1000; ++i) {
     EXPECT_NEAR(l0[i], line[i], 1e-9);
     EXPECT_NEAR(l1[i], 3, 1e-6);

@@ -19,7 +19,8 @@ std::vector<std::string> Logs(const std::string& folder, const std::string& word
     if (entry.path().extension() != extension) continue;
     std::ifstream in(entry.path());
     std::string text((std::istreambuf_iterator<char>(in)), {});
-    if (word.empty() || text.find(word) != std::string::npos || entry.path().string().find(word) != std::string::npos) files.push_back(entry.path());
+    if (word.empty() || text.find(word) != std::string::npos || entry.path().string().find(word) != std::string::npos)
+      files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -28,7 +29,8 @@ std::vector<std::string> Logs(const std::string& folder, const std::string& word
 #define NEEDS(files) \
   if ((files).empty()) GTEST_SKIP() << "no real logs at " << kData
 
-// The servo is let go: gravity swings it down. Published fit (m1): dry friction 0.007 N m, viscous 0.0105 N m s/rad, for the motor driven as well as let go.
+// The servo is let go: gravity swings it down. Published fit (m1): dry friction 0.007 N m, viscous 0.0105 N m s/rad,
+// for the motor driven as well as let go.
 TEST(RealRingDownTest, Xl330LetGo) {
   const auto files = Logs(kData + "/xl330_pendulum/raw", "lift_and_drop", ".json");
   NEEDS(files);
@@ -70,7 +72,8 @@ TEST(RealRingDownTest, Sts3032LetGo) {
   EXPECT_GE(well, fitted / 2);
 }
 
-// Duty = kp 4096 / (2 pi) / (divisor 885) (goal - q); PROVENANCE.md found a divisor of 256 to 266 and a lag within a few ms.
+// Duty = kp 4096 / (2 pi) / (divisor 885) (goal - q); PROVENANCE.md found a divisor of 256 to 266 and a lag within a
+// few ms.
 TEST(RealPdTest, Xl330DutyLaw) {
   std::vector<std::string> files;
   for (const auto& file : Logs(kData + "/xl330_pendulum/raw", "sin_sin", ".json")) files.push_back(file);
@@ -79,7 +82,8 @@ TEST(RealPdTest, Xl330DutyLaw) {
     const Bench bench = LoadBench("xl330", {file}, "duty.yaml");
     const auto result = IdentifyPd(bench.input(), {});
     ASSERT_TRUE(result.ok()) << file << ": " << result.error().Text();
-    const double divisor = bench.recordings.front().values.at("log.kp") * 4096 / (2 * M_PI) / 885 / result.value().Find("kp")->value;
+    const double divisor =
+        bench.recordings.front().values.at("log.kp") * 4096 / (2 * M_PI) / 885 / result.value().Find("kp")->value;
     EXPECT_GT(divisor, 245) << file;
     EXPECT_LT(divisor, 275) << file;
     EXPECT_GT(result.value().Find("r2_without_delay")->value, 0.97) << file;
@@ -91,7 +95,9 @@ TEST(RealResonanceTest, FlexibleLinkRingsAt1_8Hz) {
   const auto files = Logs(kData + "/flexlink_2dsfl/lqr_steps", "lqr_step_", ".csv");
   NEEDS(files);
   for (const auto& file : files) {
-    if (file.find("0deg_run01") != std::string::npos && file.find("10deg") == std::string::npos && file.find("30deg") == std::string::npos && file.find("20deg") == std::string::npos) continue;  // at rest
+    if (file.find("0deg_run01") != std::string::npos && file.find("10deg") == std::string::npos &&
+        file.find("30deg") == std::string::npos && file.find("20deg") == std::string::npos)
+      continue;  // at rest
     const Bench bench = LoadBench("flexlink_2dsfl", {file});
     const auto result = IdentifyResonance(bench.input(), {.from_s = 2});
     ASSERT_TRUE(result.ok()) << file << ": " << result.error().Text();
@@ -111,13 +117,15 @@ TEST(RealCableTest, QubeChirpsShowTheCable) {
   const auto result = IdentifyCable(bench.input(), {.free_inertia = true});
   ASSERT_TRUE(result.ok()) << result.error().Text();
   EXPECT_GT(result.value().Find("stiffness")->low, 0);
-  // A chirp is no slow sweep: the spring's torque is a few percent of the inertial torques here, and half of it is the most that can be asked.
+  // A chirp is no slow sweep: the spring's torque is a few percent of the inertial torques here, and half of it is the
+  // most that can be asked.
   EXPECT_GT(result.value().Find("stiffness")->value, 0.6e-3);
   EXPECT_LT(result.value().Find("stiffness")->value, 2.5e-3);
   EXPECT_NEAR(result.value().Find("rest")->value, -0.5, 0.06);
 }
 
-// Upright and balancing: the arm's dry friction is what makes it walk to and fro. The same rig type's chirps gave 6e-4 N m.
+// Upright and balancing: the arm's dry friction is what makes it walk to and fro. The same rig type's chirps gave 6e-4
+// N m.
 TEST(RealFrictionTest, BalancingQubeHasDryFriction) {
   const auto files = Logs(kData + "/qube_koopman", "qube_2023", ".csv");
   NEEDS(files);

@@ -8,7 +8,8 @@
 namespace gapscope {
 namespace {
 
-// y = 2 x + 0.5 with an error of 0.3 s correlation time on a slow x: the plain formula's interval would hold the truth in less than half of the cases.
+// y = 2 x + 0.5 with an error of 0.3 s correlation time on a slow x: the plain formula's interval would hold the truth
+// in less than half of the cases.
 TEST(RegressionTest, IntervalsHoldTheTruthUnderCorrelatedErrors) {
   constexpr int kRuns = 300;
   constexpr double kDt = 0.01;
@@ -40,7 +41,8 @@ TEST(RegressionTest, IntervalsHoldTheTruthUnderCorrelatedErrors) {
 
 TEST(RegressionTest, SaysWhichColumnsCannotBeToldApart) {
   Rows rows({"angle", "speed", "twice the angle"});
-  for (int k = 0; k < 100; ++k) rows.Add(0, 0.01 * k, std::sin(0.3 * k), {std::cos(0.1 * k), std::sin(0.1 * k), 2 * std::cos(0.1 * k)});
+  for (int k = 0; k < 100; ++k)
+    rows.Add(0, 0.01 * k, std::sin(0.3 * k), {std::cos(0.1 * k), std::sin(0.1 * k), 2 * std::cos(0.1 * k)});
   const auto fit = Regress(rows, 0.01);
   ASSERT_FALSE(fit.ok());
   EXPECT_NE(fit.error().what.find("'angle', 'twice the angle'"), std::string::npos) << fit.error().what;
@@ -55,7 +57,8 @@ TEST(RegressionTest, SaysWhichColumnsCannotBeToldApart) {
 
 TEST(RegressionTest, StudentQuantilesAreThoseOfTheTables) {
   // Two-sided 95 %: 4.303, 2.776, 2.228, 2.042, 1.960.
-  for (const auto& [n, t] : {std::pair{2.0, 4.303}, {4.0, 2.776}, {10.0, 2.228}, {30.0, 2.042}, {1e6, 1.960}}) EXPECT_NEAR(StudentQuantile(n), t, 0.01 * t) << n;
+  for (const auto& [n, t] : {std::pair{2.0, 4.303}, {4.0, 2.776}, {10.0, 2.228}, {30.0, 2.042}, {1e6, 1.960}})
+    EXPECT_NEAR(StudentQuantile(n), t, 0.01 * t) << n;
 }
 
 }  // namespace

@@ -165,8 +165,10 @@ TEST(DirectionAsymmetryTest, OfTheVoltageIsTheBaseModelOnScaledVoltages) {
   Recording scaled = rig.recording;
   for (double& u : scaled.commands[0].values) u *= u > 0 ? 1.25 : 0.75;
   const auto expected = Predict(*rig.model, scaled);
-  const auto actual = Predict(*model, rig.recording, {{use.Text() + ".asymmetry", 0.25}, {use.Text() + ".command_share", 1}});
-  for (std::size_t s = 0; s < expected.size(); ++s) EXPECT_LT(LargestDifference(actual[s], expected[s]), 1e-9 * Largest(expected[s]));
+  const auto actual =
+      Predict(*model, rig.recording, {{use.Text() + ".asymmetry", 0.25}, {use.Text() + ".command_share", 1}});
+  for (std::size_t s = 0; s < expected.size(); ++s)
+    EXPECT_LT(LargestDifference(actual[s], expected[s]), 1e-9 * Largest(expected[s]));
   const auto of_torque = Predict(*model, rig.recording, {{use.Text() + ".asymmetry", 0.25}});
   EXPECT_GT(LargestDifference(of_torque[0], expected[0]), 1e-3 * Largest(expected[0]));
   const Rig servo("xl330");
@@ -178,7 +180,8 @@ TEST(DirectionAsymmetryTest, OfTheVoltageIsTheBaseModelOnScaledVoltages) {
 // One name, two effects: what is told of it depends on the place.
 TEST(CatalogueTest, AsymmetryOfAJointIsFrictionAndOfAMotorItsGain) {
   const auto model = MakeModel(ShippedExperiment("qube"));
-  const auto of_joint = model->EffectAt({"direction_asymmetry", "arm"}), of_motor = model->EffectAt({"direction_asymmetry", "motor"});
+  const auto of_joint = model->EffectAt({"direction_asymmetry", "arm"}),
+             of_motor = model->EffectAt({"direction_asymmetry", "motor"});
   ASSERT_TRUE(of_joint.ok() && of_motor.ok());
   EXPECT_NE(of_joint.value()->meaning.find("friction"), std::string::npos);
   EXPECT_NE(of_motor.value()->meaning.find("gain"), std::string::npos);

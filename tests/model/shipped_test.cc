@@ -75,7 +75,8 @@ TEST_P(ShippedTest, MovesAsItsMjcfWhenDrivenByMuJoCoAlone) {
   EXPECT_LT(difference, 1e-9) << rig;
 }
 
-// A motor that becomes a plugin keeps every field that the experiment sets: else the diagnosis would never try what acts in the motor.
+// A motor that becomes a plugin keeps every field that the experiment sets: else the diagnosis would never try what
+// acts in the motor.
 TEST_P(ShippedTest, EveryPossibleEffectCanBeAdded) {
   const Experiment experiment = ShippedExperiment(GetParam());
   const auto model = MakeModel(experiment);

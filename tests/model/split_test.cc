@@ -113,23 +113,29 @@ INSTANTIATE_TEST_SUITE_P(Effects, SplitTest, ::testing::Values("backlash", "join
 // One disc on an axle, split in two equal halves with a gap of 0.1 rad between them.
 struct Disc {
   Disc() {
-    experiment = MakeExperiment(scratch, R"(<mujoco><compiler angle="radian"/><option timestep="0.0002" gravity="0 0 0" integrator="RK4"><flag contact="disable"/></option>
+    experiment = MakeExperiment(
+        scratch,
+        R"(<mujoco><compiler angle="radian"/><option timestep="0.0002" gravity="0 0 0" integrator="RK4"><flag contact="disable"/></option>
 <worldbody><body><joint name="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody>
 <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>)",
-                                "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, unit: rad}\n");
+        "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, "
+        "unit: rad}\n");
     const Scales scales{.torque_n_m = 1, .angle_rad = 1, .speed_rad_per_s = 1, .inertia_kg_m2 = 0.02};
     model = MakeModel(experiment, {{"backlash", "hinge"}}, {{"hinge", scales}, {"motor", scales}});
   }
   std::vector<double> Values(double flank_damping_ratio) const {
-    return ValuesWith(*model, {{"backlash@hinge.gap_rad", 0.1}, {"backlash@hinge.motor_share", 0.5}, {"backlash@hinge.flank_damping_ratio", flank_damping_ratio}});
+    return ValuesWith(*model, {{"backlash@hinge.gap_rad", 0.1},
+                               {"backlash@hinge.motor_share", 0.5},
+                               {"backlash@hinge.flank_damping_ratio", flank_damping_ratio}});
   }
   Scratch scratch;
   Experiment experiment;
   std::shared_ptr<const Model> model;
 };
 
-// A blow through a linear spring and damper that only push: they part where the force is zero, w t = pi - atan2(2 z w, w^2 - z^2) with w = sqrt(1 - z^2), and exp(-z t) of the speed
-// between them comes back (Schwager and Poeschel, Granular Matter 9 (2007), 465).
+// A blow through a linear spring and damper that only push: they part where the force is zero, w t = pi - atan2(2 z w,
+// w^2 - z^2) with w = sqrt(1 - z^2), and exp(-z t) of the speed between them comes back (Schwager and Poeschel,
+// Granular Matter 9 (2007), 465).
 TEST(BacklashTest, FlanksGiveBackWhatTheirDampingLeaves) {
   const Disc disc;
   ASSERT_NE(disc.model, nullptr);
@@ -144,25 +150,32 @@ TEST(BacklashTest, FlanksGiveBackWhatTheirDampingLeaves) {
     // 0.05 rad to the flank, and 0.1 s later, far from the next one.
     ASSERT_EQ(simulator.Run(recording, {0, 111}, start, predicted).outcome, Outcome::kCompleted);
     const double load = (predicted[110] - predicted[90]) / 0.02, back = 2 * load - 1;
-    const double w = std::sqrt(1 - ratio * ratio), expected = std::exp(-ratio / w * (std::numbers::pi - std::atan2(2 * ratio * w, w * w - ratio * ratio)));
+    const double w = std::sqrt(1 - ratio * ratio),
+                 expected =
+                     std::exp(-ratio / w * (std::numbers::pi - std::atan2(2 * ratio * w, w * w - ratio * ratio)));
     EXPECT_NEAR(back, expected, 0.03) << ratio;
   }
 }
 
-// Pushed all the time, the motor side stands on a flank: a window that begins in the middle of the log begins there, not in the middle of the gap.
+// Pushed all the time, the motor side stands on a flank: a window that begins in the middle of the log begins there,
+// not in the middle of the gap.
 TEST(BacklashTest, AWindowBeginsOnTheFlank) {
   const Disc disc;
   ASSERT_NE(disc.model, nullptr);
   constexpr double kAcceleration = 0.1 / 0.02;
   Recording recording = MakeRecording(disc.experiment, 401, 0.002, [](int, double) { return 0.1; });
-  for (std::size_t row = 0; row < recording.rows(); ++row) recording.measured[0].values[row] = 0.5 * kAcceleration * recording.time_s[row] * recording.time_s[row];
+  for (std::size_t row = 0; row < recording.rows(); ++row)
+    recording.measured[0].values[row] = 0.5 * kAcceleration * recording.time_s[row] * recording.time_s[row];
   Simulator simulator(*disc.model, 0);
   const std::vector<double> values = disc.Values(0.5);
   ASSERT_TRUE(simulator.SetParameters(values, recording));
   std::vector<double> predicted(recording.rows());
   const Window window{250, 350};
-  ASSERT_EQ(simulator.Run(recording, window, InitialStateAt(*disc.model, recording, window.begin, values), predicted).outcome, Outcome::kCompleted);
-  for (std::size_t row = window.begin; row < window.end; ++row) EXPECT_NEAR(predicted[row - window.begin], recording.measured[0].values[row], 5e-4) << row;
+  ASSERT_EQ(
+      simulator.Run(recording, window, InitialStateAt(*disc.model, recording, window.begin, values), predicted).outcome,
+      Outcome::kCompleted);
+  for (std::size_t row = window.begin; row < window.end; ++row)
+    EXPECT_NEAR(predicted[row - window.begin], recording.measured[0].values[row], 5e-4) << row;
 }
 
 }  // namespace

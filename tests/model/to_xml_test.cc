@@ -51,7 +51,10 @@ TEST_P(ToXmlTest, ReplaysLikeTheModelItWasMadeFrom) {
       experiment, 301, base->compiled().opt.timestep,
       [&](int c, double t) {
         const std::string& actuator = experiment.commands[static_cast<std::size_t>(c)].actuator;
-        return actuator == "motor.supply" ? 7.4 : actuator == "motor.enable" ? 1.0 : c == 0 ? Exciting(t, 0.5) - Exciting(0, 0.5) : 0.0;
+        return actuator == "motor.supply"   ? 7.4
+               : actuator == "motor.enable" ? 1.0
+               : c == 0                     ? Exciting(t, 0.5) - Exciting(0, 0.5)
+                                            : 0.0;
       },
       ShippedLogValues(rig));
   const ScaleTable scales = EstimateScales(*base, {recording});

@@ -78,9 +78,11 @@ std::optional<std::vector<double>> ModelField(const mjModel& m, const std::strin
   if (parts[0] == "actuator") {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, parts[1].c_str());
     if (id < 0) return std::nullopt;
-    if (m.actuator_plugin[id] >= 0) {  // a motor plugin's live parameter is the numeric INSTANCE.KEY; the instances bear their motors' names
+    if (m.actuator_plugin[id] >=
+        0) {  // a motor plugin's live parameter is the numeric INSTANCE.KEY; the instances bear their motors' names
       const int numeric = mj_name2id(&m, mjOBJ_NUMERIC, (parts[1] + "." + parts[2]).c_str());
-      return numeric < 0 ? std::nullopt : std::optional(some(m.numeric_data + m.numeric_adr[numeric], m.numeric_size[numeric]));
+      return numeric < 0 ? std::nullopt
+                         : std::optional(some(m.numeric_data + m.numeric_adr[numeric], m.numeric_size[numeric]));
     }
     if (parts[2] == "kp" || parts[2] == "gain") return some(m.actuator_gainprm + id * mjNGAIN, 1);
     if (parts[2] == "kv") return std::vector<double>{-m.actuator_biasprm[id * mjNBIAS + 2]};

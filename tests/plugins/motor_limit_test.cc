@@ -33,23 +33,18 @@ TEST(MotorLimitTest, RatedPeakNoLoad) {
                            {"rated_speed_rad_per_s", "4"},
                            {"no_load_speed_rad_per_s", "10"},
                            {"generating_factor", "1.2"}}};
-  Trace(
-      rig, 15, [](double w) { return w <= 4    ? 3
-                                     : w >= 10 ? 0
-                                               : 3 * (10 - w) / 6; }, [](double) { return 3.6; });
+  Trace(rig, 15, [](double w) { return w <= 4 ? 3 : w >= 10 ? 0 : 3 * (10 - w) / 6; }, [](double) { return 3.6; });
 }
 
 TEST(MotorLimitTest, ConstantPowerOnBothSides) {
   const Rig rig{
       .config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"power_w", "8"}, {"generating_power_w", "12"}}};
-  Trace(
-      rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double w) { return std::min(2.0, 12 / w); });
+  Trace(rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double w) { return std::min(2.0, 12 / w); });
 }
 
 TEST(MotorLimitTest, PowerLeavesGeneratingAloneByDefault) {
   const Rig rig{.config = {{"law", "torque"}, {"torque_limit_n_m", "2"}, {"power_w", "8"}}};
-  Trace(
-      rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double) { return 2.0; });
+  Trace(rig, 15, [](double w) { return std::min(2.0, 8 / w); }, [](double) { return 2.0; });
 }
 
 const std::vector<double> kSpeed = {0, 2, 5, 9, 12}, kTorque = {3, 2.9, 2.2, 0.7, 0}, kBrake = {3.5, 3.5, 3.1, 2, 1};
@@ -99,8 +94,7 @@ TEST(MotorLimitTest, CubicReproducesAStraightLine) {
                            {"torque_table", "10 9 5 0"},
                            {"table_interpolation", "cubic"},
                            {"generating_factor", "0.5"}}};
-  Trace(
-      rig, 12, [](double w) { return std::max(0.0, 10 - w); }, [](double) { return 5.0; });
+  Trace(rig, 12, [](double w) { return std::max(0.0, 10 - w); }, [](double) { return 5.0; });
 }
 
 // MuJoCo's own parallelogram: the line of a voltage drive at its ceiling is the trapeze with rated speed zero.

@@ -1,4 +1,5 @@
-// The loop closed in simulation: the law's arithmetic, balance, swing-up and catch, a cascade; and the real Qube's own law on its own log.
+// The loop closed in simulation: the law's arithmetic, balance, swing-up and catch, a cascade; and the real Qube's own
+// law on its own log.
 #include "replay/closed_loop.h"
 
 #include <fmt/core.h>
@@ -20,12 +21,14 @@ const std::string kModels = std::string(GAPSCOPE_SOURCE_DIR) + "/models/";
 class ClosedLoopTest : public ::testing::Test {
  protected:
   // models/qube with a controller section, and a log that stands still at this pendulum angle.
-  void Load(const std::string& controller, double pendulum_rad, double seconds, const std::string& columns = "", const std::string& cells = "") {
+  void Load(const std::string& controller, double pendulum_rad, double seconds, const std::string& columns = "",
+            const std::string& cells = "") {
     std::string text = testing::ReadAll(kModels + "qube/experiment.yaml");
     text.replace(text.find("model: qube.xml"), 15, "model: " + kModels + "qube/qube.xml");
     const std::string path = scratch_.Write("experiment.yaml", text + controller);
     std::string log = "time_s,voltage_v,arm_rad,pendulum_rad" + columns + "\n";
-    for (int k = 0; k <= seconds * 500; ++k) log += std::to_string(0.002 * k) + ",0,0," + std::to_string(pendulum_rad) + cells + "\n";
+    for (int k = 0; k <= seconds * 500; ++k)
+      log += std::to_string(0.002 * k) + ",0,0," + std::to_string(pendulum_rad) + cells + "\n";
     auto experiment = LoadExperiment(path);
     ASSERT_TRUE(experiment.ok()) << experiment.error().Text();
     experiment_ = std::move(experiment).value();
@@ -61,11 +64,14 @@ controller:
   limit: 10
   inputs: [{name: theta, signal: arm_rad}, {name: alpha, signal: pendulum_rad, scale: -1, add: 3.141592653589793}]
   terms:
-    - {input: theta, )" + theta + R"(, filter_rad_per_s: 50}
-    - {input: alpha, )" + alpha + R"(, filter_rad_per_s: 50}
+    - {input: theta, )" +
+         theta + R"(, filter_rad_per_s: 50}
+    - {input: alpha, )" +
+         alpha + R"(, filter_rad_per_s: 50}
 )";
 }
-// The law of the real balancing Qube: pi - pendulum is zero upright. Round the data sheet's arm (0.095 kg) it is unstable (poles 1.4 +- 14.9i); the rig's own arm is lighter.
+// The law of the real balancing Qube: pi - pendulum is zero upright. Round the data sheet's arm (0.095 kg) it is
+// unstable (poles 1.4 +- 14.9i); the rig's own arm is lighter.
 const std::string kBalance = Upright("proportional: -6, derivative: -1.8", "proportional: -30, derivative: -2.5");
 
 std::string Rows(const Eigen::MatrixXd& m) {
@@ -79,9 +85,13 @@ std::string Rows(const Eigen::MatrixXd& m) {
 }
 
 // LQR on the state of an observer, about upright: x is arm, pendulum - pi and their speeds.
-std::string ObserverSection(const LinearSystem& system, const Eigen::MatrixXd& c, const Eigen::MatrixXd& gain, const Eigen::MatrixXd& feedback, const std::string& inputs) {
-  return "\ncontroller:\n  actuator: motor\n  limit: 10\n  inputs: [" + inputs + "]\n  observer:\n    a: " + Rows(system.a) + "\n    b: " + Rows(system.b.transpose()).substr(1, Rows(system.b.transpose()).size() - 2) +
-         "\n    c: " + Rows(c) + "\n    gain: " + Rows(gain) + "\n    feedback: " + Rows(feedback).substr(1, Rows(feedback).size() - 2) + "\n";
+std::string ObserverSection(const LinearSystem& system, const Eigen::MatrixXd& c, const Eigen::MatrixXd& gain,
+                            const Eigen::MatrixXd& feedback, const std::string& inputs) {
+  return "\ncontroller:\n  actuator: motor\n  limit: 10\n  inputs: [" + inputs +
+         "]\n  observer:\n    a: " + Rows(system.a) +
+         "\n    b: " + Rows(system.b.transpose()).substr(1, Rows(system.b.transpose()).size() - 2) +
+         "\n    c: " + Rows(c) + "\n    gain: " + Rows(gain) +
+         "\n    feedback: " + Rows(feedback).substr(1, Rows(feedback).size() - 2) + "\n";
 }
 
 TEST_F(ClosedLoopTest, KalmanFilterAndLuenbergerObserverBalanceTheQubeFromItsAngles) {
@@ -91,14 +101,17 @@ TEST_F(ClosedLoopTest, KalmanFilterAndLuenbergerObserverBalanceTheQubeFromItsAng
   const auto& [a, b, names] = system.value();
   const auto lqr = Lqr(a, b, Eigen::Vector4d(5, 30, 1, 1).asDiagonal(), Eigen::MatrixXd::Identity(1, 1));
   ASSERT_TRUE(lqr.ok());
-  const std::string arm = "{name: theta, signal: arm_rad}", pendulum = ", {name: alpha, signal: pendulum_rad, add: -3.141592653589793}";
+  const std::string arm = "{name: theta, signal: arm_rad}",
+                    pendulum = ", {name: alpha, signal: pendulum_rad, add: -3.141592653589793}";
   const Eigen::MatrixXd both = Eigen::MatrixXd::Identity(2, 4), one = Eigen::MatrixXd::Identity(1, 4);
   const Eigen::MatrixXd readings = 1e-6 * Eigen::MatrixXd::Identity(2, 2);  // 1 mrad counts at 500 Hz are of this order
   const auto kalman = KalmanGain(a, both, Eigen::Vector4d(0, 0, 1, 1).asDiagonal(), readings);
   ASSERT_TRUE(kalman.ok());
   const auto placed = ObserverGain(a, one, {{-40, 0}, {-45, 0}, {-50, 0}, {-55, 0}});
   ASSERT_TRUE(placed.ok());
-  for (const auto& section : {ObserverSection(system.value(), both, kalman.value().gain, lqr.value().gain, arm + pendulum), ObserverSection(system.value(), one, placed.value().gain, lqr.value().gain, arm)}) {
+  for (const auto& section :
+       {ObserverSection(system.value(), both, kalman.value().gain, lqr.value().gain, arm + pendulum),
+        ObserverSection(system.value(), one, placed.value().gain, lqr.value().gain, arm)}) {
     SCOPED_TRACE(section);
     // The arm alone shows the pendulum only through its push: it starts nearer upright.
     const double tilt = section.find("alpha") == std::string::npos ? 0.01 : 0.1;
@@ -107,14 +120,18 @@ TEST_F(ClosedLoopTest, KalmanFilterAndLuenbergerObserverBalanceTheQubeFromItsAng
     ASSERT_TRUE(result.ok()) << result.error().Text();
     const auto& log = result.value().result.logs[0];
     ASSERT_EQ(log.outcome, Outcome::kCompleted);
-    for (std::size_t k = log.signals[1].predicted.size() / 2; k < log.signals[1].predicted.size(); ++k) ASSERT_NEAR(log.signals[1].predicted[k], kPi, 0.05) << k;
+    for (std::size_t k = log.signals[1].predicted.size() / 2; k < log.signals[1].predicted.size(); ++k)
+      ASSERT_NEAR(log.signals[1].predicted[k], kPi, 0.05) << k;
   }
 }
 
 TEST_F(ClosedLoopTest, ObserverFollowsTheLinearSystemExactly) {
   // x'' = 4 u - x, angle read: with readings of the true motion from the same start the estimate is that motion.
-  ObserverSpec spec{.a = (Eigen::MatrixXd(2, 2) << 0, 1, -1, 0).finished(), .c = (Eigen::MatrixXd(1, 2) << 1, 0).finished(), .gain = (Eigen::MatrixXd(2, 1) << 1e-12, 1e-12).finished(),
-                    .b = Eigen::Vector2d(0, 4), .feedback = Eigen::Vector2d(3, 0.5)};
+  ObserverSpec spec{.a = (Eigen::MatrixXd(2, 2) << 0, 1, -1, 0).finished(),
+                    .c = (Eigen::MatrixXd(1, 2) << 1, 0).finished(),
+                    .gain = (Eigen::MatrixXd(2, 1) << 1e-12, 1e-12).finished(),
+                    .b = Eigen::Vector2d(0, 4),
+                    .feedback = Eigen::Vector2d(3, 0.5)};
   Observer observer(spec);
   const double start[] = {0.2}, reference[] = {0.5};
   // At rest at the first reading; K (x - x_r) with x_r the least-norm state that reads the reference.
@@ -139,7 +156,8 @@ TEST_F(ClosedLoopTest, ALateSensorIsRefused) {
 
 TEST_F(ClosedLoopTest, AnObserverOfTheWrongSizeIsRefused) {
   for (const auto& [section, says] : std::vector<std::pair<std::string, std::string>>{
-           {"observer: {a: [[0, 1], [0, 0]], b: [0, 1], c: [[1, 0]], gain: [[1, 2]], feedback: [1, 1]}", "'gain' is not a matrix"},
+           {"observer: {a: [[0, 1], [0, 0]], b: [0, 1], c: [[1, 0]], gain: [[1, 2]], feedback: [1, 1]}",
+            "'gain' is not a matrix"},
            {"observer: {a: [[0, 1]], b: [1], c: [[1]], gain: [[1]], feedback: [1]}", "'a' is not a matrix"},
            {"observer: {a: [[0]], c: [[1]], gain: [[1]], feedback: [1]}", "an observer needs"},
            {"observer: {a: [[0]], b: [1, 2], c: [[1]], gain: [[1]], feedback: [1]}", "'b' of 'observer'"}}) {
@@ -160,7 +178,8 @@ controller:
   references: {theta: wanted}
   feedforward: extra
   terms: [{input: theta, proportional: 3, integral: 5, derivative: 0.4, filter_rad_per_s: 50}]
-)", 0, 0.02, ",wanted,extra", ",0.25,0.5");
+)",
+       0, 0.02, ",wanted,extra", ",0.25,0.5");
   const auto spec = LoadController(experiment_);
   ASSERT_TRUE(spec.ok()) << spec.error().Text();
   auto controller = Controller::Make(spec.value(), experiment_, recordings_[0]);
@@ -205,8 +224,10 @@ TEST_F(ClosedLoopTest, ThePendulumIsKeptUpright) {
   EXPECT_NEAR(s.mean, kPi, 0.02);
 }
 
-// From rest to upright and held there; J = m (2 l)^2 / 3, m g l and the back-EMF of the rig's data sheet, LQR gains of `design lqr --at pendulum=3.14159 --q 10,10,1,10`.
-const std::string kLqr = Upright("proportional: -3.1623, derivative: -2.008", "proportional: -59.4409, derivative: -6.0971");
+// From rest to upright and held there; J = m (2 l)^2 / 3, m g l and the back-EMF of the rig's data sheet, LQR gains of
+// `design lqr --at pendulum=3.14159 --q 10,10,1,10`.
+const std::string kLqr =
+    Upright("proportional: -3.1623, derivative: -2.008", "proportional: -59.4409, derivative: -6.0971");
 
 class SwingUpTest : public ClosedLoopTest {
  protected:
@@ -227,7 +248,8 @@ class SwingUpTest : public ClosedLoopTest {
 };
 
 TEST_F(SwingUpTest, EnergyLawIsCaughtAndHeld) {
-  ExpectHeldUpright(R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8, gain: -2000, inertia_kg_m2: 1.33e-4, torque_n_m: 0.01519, filter_rad_per_s: 200, limit: 6,
+  ExpectHeldUpright(
+      R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8, gain: -2000, inertia_kg_m2: 1.33e-4, torque_n_m: 0.01519, filter_rad_per_s: 200, limit: 6,
     arm: theta, arm_speed: 0.042, terms: [{input: theta, proportional: 8, derivative: 0.2, filter_rad_per_s: 50}]}
 )");
 }
@@ -240,12 +262,16 @@ TEST_F(SwingUpTest, StateFeedbackIsCaughtAndHeld) {
 
 // Pumping while far from upright, the terms inside `catch_rad`, and on until `drop_rad` is passed.
 TEST_F(ClosedLoopTest, CatchHasHysteresis) {
-  Load(kBalance + "  swing_up: {input: alpha, catch_rad: 0.3, drop_rad: 0.6, gain: 100, inertia_kg_m2: 1.33e-4, torque_n_m: 0.01519, limit: 1}\n", 0.0, 0.1);
+  Load(kBalance +
+           "  swing_up: {input: alpha, catch_rad: 0.3, drop_rad: 0.6, gain: 100, inertia_kg_m2: 1.33e-4, torque_n_m: "
+           "0.01519, limit: 1}\n",
+       0.0, 0.1);
   const auto spec = LoadController(experiment_);
   ASSERT_TRUE(spec.ok()) << spec.error().Text();
   auto controller = Controller::Make(spec.value(), experiment_, recordings_[0]);
   ASSERT_TRUE(controller.ok());
-  const std::pair<double, bool> walk[] = {{2.0, false}, {0.5, false}, {0.29, true}, {0.5, true}, {0.61, false}, {0.5, false}, {-0.2, true}};
+  const std::pair<double, bool> walk[] = {{2.0, false},  {0.5, false}, {0.29, true}, {0.5, true},
+                                          {0.61, false}, {0.5, false}, {-0.2, true}};
   std::size_t row = 0;
   for (const auto& [alpha, caught] : walk) {
     const double readings[] = {0, kPi - alpha}, sent = controller.value().Step(row++, readings);
@@ -265,7 +291,8 @@ controller:
   terms:
     - {input: phi, proportional: 0.2, to: theta}
     - {input: theta, proportional: 8, derivative: 0.4}
-)", 0.3, 6);
+)",
+       0.3, 6);
   const auto closed = Run();
   ASSERT_TRUE(closed.ok()) << closed.error().Text();
   const auto& signals = closed.value().result.logs[0].signals;
@@ -297,10 +324,14 @@ TEST_F(ClosedLoopTest, BrokenSectionsAreRefused) {
       {"", "no controller is described"},
       {"controller: {actuator: brake, terms: []}\n", "without a command"},
       {"controller: {actuator: motor, inputs: [{name: a, signal: arm}], terms: []}\n", "not measured"},
-      {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}], terms: [{input: b}]}\n", "input that is not there"},
+      {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}], terms: [{input: b}]}\n",
+       "input that is not there"},
       {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}]}\n", "neither 'terms'"},
-      {"controller: {actuator: motor, limt: 3, inputs: [{name: a, signal: arm_rad}], terms: [{input: a}]}\n", "unknown key in 'controller'"},
-      {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}], references: {a: nowhere}, terms: [{input: a}]}\n", "neither a column"},
+      {"controller: {actuator: motor, limt: 3, inputs: [{name: a, signal: arm_rad}], terms: [{input: a}]}\n",
+       "unknown key in 'controller'"},
+      {"controller: {actuator: motor, inputs: [{name: a, signal: arm_rad}], references: {a: nowhere}, terms: [{input: "
+       "a}]}\n",
+       "neither a column"},
   };
   for (const auto& [section, says] : broken) {
     Load(section, 0, 0.1);
@@ -320,7 +351,8 @@ TEST(StatisticsTest, SineHasItsFrequencyAndSpread) {
   EXPECT_NEAR(s.high, 5, 0.05);
 }
 
-// qube_koopman: the logged angles through the law give the logged voltage to 1e-12 V, and the loop closed round the simulated Qube keeps balancing.
+// qube_koopman: the logged angles through the law give the logged voltage to 1e-12 V, and the loop closed round the
+// simulated Qube keeps balancing.
 TEST(RealClosedLoopTest, KoopmansLawIsReproduced) {
   const std::string folder = std::string(GAPSCOPE_SHARED_DATA) + "/qube_koopman/controller_20230828";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no real logs at " << folder;
@@ -362,10 +394,13 @@ TEST(RealClosedLoopTest, KoopmansLawIsReproduced) {
     for (const double q : signals[1].predicted) ASSERT_NEAR(q, kPi, 0.5);  // it stays up for the whole log
     // It moves as much as the rig does: spreads within a quarter.
     for (const auto& signal : signals) {
-      const double measured = StatisticsOf(cut.value().time_s, signal.measured).deviation, predicted = StatisticsOf(cut.value().time_s, signal.predicted).deviation;
+      const double measured = StatisticsOf(cut.value().time_s, signal.measured).deviation,
+                   predicted = StatisticsOf(cut.value().time_s, signal.predicted).deviation;
       EXPECT_NEAR(predicted / measured, 1, 0.25) << signal.signal << " " << entry.path();
     }
-    EXPECT_NEAR(StatisticsOf(cut.value().time_s, closed.value().sent[0]).deviation / StatisticsOf(cut.value().time_s, cut.value().commands[0].values).deviation, 1, 0.25);
+    EXPECT_NEAR(StatisticsOf(cut.value().time_s, closed.value().sent[0]).deviation /
+                    StatisticsOf(cut.value().time_s, cut.value().commands[0].values).deviation,
+                1, 0.25);
   }
   EXPECT_GT(logs, 0u);
 }

@@ -27,7 +27,8 @@ std::string Csv(const std::vector<std::string>& actuators) {
   for (int k = 0; k < 800; ++k) {
     text += Number(t);
     for (std::size_t c = 0; c < actuators.size(); ++c)
-      text.append(",").append(Number(c == 0 ? Exciting(t - 12.5, 0.5) - Exciting(0, 0.5) : 0.3 * Exciting(t - 12.4, 0.5, 2, 9)));
+      text.append(",").append(
+          Number(c == 0 ? Exciting(t - 12.5, 0.5) - Exciting(0, 0.5) : 0.3 * Exciting(t - 12.4, 0.5, 2, 9)));
     text += ",0\n";
     t += k % 7 == 3 ? 0.0031 : 0.002;
   }

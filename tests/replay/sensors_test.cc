@@ -29,7 +29,8 @@ TEST(LowPass, StepResponseIsTheClosedForm) {
     for (std::size_t k = 0; k < time.size(); ++k) {
       // y = 1 + (b e^(a t) - a e^(b t)) / (a - b), poles a and b; (1 + w t) e^(-w t) where they meet.
       const double t = time[k];
-      const double expected = z == 1 ? 1 - (1 + 12.6 * t) * std::exp(-12.6 * t) : 1 + ((b * std::exp(a * t) - a * std::exp(b * t)) / (a - b)).real();
+      const double expected = z == 1 ? 1 - (1 + 12.6 * t) * std::exp(-12.6 * t)
+                                     : 1 + ((b * std::exp(a * t) - a * std::exp(b * t)) / (a - b)).real();
       ASSERT_NEAR(out[k], expected, 1e-12) << "damping ratio " << z << ", t " << t;
     }
   }
@@ -61,7 +62,8 @@ TEST(LowPass, SteadyRampStaysSteady) {
 
 TEST(Delay, ParabolaIsShiftedExactlyOnEvenStamps) {
   std::vector<double> time, in;
-  for (int k = 0; k < 200; ++k) time.push_back(0.002 * k), in.push_back(1 + 2 * time.back() + 3 * time.back() * time.back());
+  for (int k = 0; k < 200; ++k)
+    time.push_back(0.002 * k), in.push_back(1 + 2 * time.back() + 3 * time.back() * time.back());
   std::vector<double> out(time.size());
   Delay(time, in, 0.0071, out);
   for (std::size_t k = 10; k < time.size(); ++k) {

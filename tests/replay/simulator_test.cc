@@ -246,7 +246,8 @@ TEST_F(DelayTest, ALogThatBeginsAtRestBeganWithoutACommand) {
   Recording recording = MakeRecording(experiment_, 300, 0.002, [&](int, double) { return step; });
   EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, 0)), 3e-5);
   // It moves off at once, on a sensor whose resolution nobody states.
-  for (std::size_t k = 0; k < recording.rows(); ++k) recording.measured[0].values[k] = 50 * std::pow(recording.time_s[k], 2) + (k % 2 == 0 ? 0 : 1e-4);
+  for (std::size_t k = 0; k < recording.rows(); ++k)
+    recording.measured[0].values[k] = 50 * std::pow(recording.time_s[k], 2) + (k % 2 == 0 ? 0 : 1e-4);
   EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, 0)), 3e-5);
   // One that begins in motion was driven by nobody knows what: by the first command.
   for (std::size_t k = 0; k < recording.rows(); ++k) recording.measured[0].values[k] = 2 * recording.time_s[k];
@@ -263,7 +264,8 @@ TEST_F(SimulatorTest, ALaggingDriveStartsFromRestWithTheLog) {
   const auto predicted = Predict(*model, recording, {{"actuator_lag@motor.time_constant_s", time_constant_s}});
   for (std::size_t k = 0; k < recording.rows(); ++k) {
     const double t = recording.time_s[k];
-    const double w = u / kDamping * (1 - std::exp(-rate * t)) - u / kInertia * (std::exp(-lag * t) - std::exp(-rate * t)) / (rate - lag);
+    const double w = u / kDamping * (1 - std::exp(-rate * t)) -
+                     u / kInertia * (std::exp(-lag * t) - std::exp(-rate * t)) / (rate - lag);
     ASSERT_NEAR(predicted[1][k], w, 1e-6) << t;
   }
 }
@@ -271,7 +273,8 @@ TEST_F(SimulatorTest, ALaggingDriveStartsFromRestWithTheLog) {
 TEST(EarlierCommandsTest, WhatHoldsAWeightHeldItBeforeTheLog) {
   // A spring-loaded disc that its first command holds still: the lag has nothing to do.
   const Scratch scratch;
-  const Experiment experiment = MakeExperiment(scratch, Mjcf("damping=\"0.05\" stiffness=\"2\" springref=\"0.4\""), kYaml);
+  const Experiment experiment =
+      MakeExperiment(scratch, Mjcf("damping=\"0.05\" stiffness=\"2\" springref=\"0.4\""), kYaml);
   const auto uses = MakeModel(experiment)->ParseEffects({"actuator_lag@motor"});
   ASSERT_TRUE(uses.ok());
   const auto model = MakeModel(experiment, uses.value());

@@ -30,7 +30,8 @@ TEST(HtmlReportTest, IsOneFileWithoutTheNetwork) {
     EXPECT_LE(count, text == "XMLHttpRequest(" ? 1u : 0u) << text;
   }
   EXPECT_NE(page.find("default-src 'none'"), std::string::npos);
-  for (const char* slot : {"/*style*/", "/*dygraphs*/", "/*script*/", "/*data*/"}) EXPECT_EQ(page.find(slot), std::string::npos) << slot;
+  for (const char* slot : {"/*style*/", "/*dygraphs*/", "/*script*/", "/*data*/"})
+    EXPECT_EQ(page.find(slot), std::string::npos) << slot;
 }
 
 TEST(HtmlReportTest, TextFromOutsideCannotEndTheScript) {
@@ -48,7 +49,8 @@ TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
   EXPECT_EQ(log["sha256"], Sha256OfFile(page->recordings[0].log_path).value());
   EXPECT_EQ(log["traces"]["time"].size(), page->recordings[0].rows());
   EXPECT_EQ(log["traces"]["signals"][0]["predicted"].size(), 2u);
-  EXPECT_NEAR(log["traces"]["signals"][0]["measured"][4000].get<double>(), page->recordings[0].measured[0].values[4000], 1e-5);
+  EXPECT_NEAR(log["traces"]["signals"][0]["measured"][4000].get<double>(), page->recordings[0].measured[0].values[4000],
+              1e-5);
   EXPECT_EQ(log["maps"].size(), 2u);
   EXPECT_GE(log["responses"].size(), 1u);
   EXPECT_EQ(data["parameters"][0]["name"], "motor.resistance");

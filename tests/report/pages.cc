@@ -36,15 +36,24 @@ std::unique_ptr<Page> DemoPage(const std::string& kind) {
   page->recordings = {LoadRecording(experiment.value(), root + "/demo/qube.csv").value()};
   ThreadPool pool(1);
   std::vector<double> values = page->model->Nominal();
-  page->source = {.result_json = kDiagnosis, .command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv", .experiment = &page->model->experiment(),
-                  .recordings = {&page->recordings.front()}, .held_out = {true}, .predictions = {}, .model = page->model.get(), .values = values, .parameters = page->model->parameters()};
+  page->source = {.result_json = kDiagnosis,
+                  .command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv",
+                  .experiment = &page->model->experiment(),
+                  .recordings = {&page->recordings.front()},
+                  .held_out = {true},
+                  .predictions = {},
+                  .model = page->model.get(),
+                  .values = values,
+                  .parameters = page->model->parameters()};
   const ReplayResult nominal = Replay(*page->model, page->recordings, {.time_step_s = 0.002, .values = values}, pool);
   page->source.predictions.push_back({"nominal", nominal.logs});
   values[page->model->IndexOf("cable_spring@arm.stiffness_n_m_per_rad")] = 0.0012;
-  page->source.predictions.push_back({"diagnosed", Replay(*page->model, page->recordings, {.time_step_s = 0.002, .values = values}, pool).logs});
+  page->source.predictions.push_back(
+      {"diagnosed", Replay(*page->model, page->recordings, {.time_step_s = 0.002, .values = values}, pool).logs});
   if (kind == "replay") {
     const Comparison comparison = Compare(nominal, page->recordings, pool);
-    page->source.result_json = ReplayJson({.result = nominal, .comparison = comparison, .model = *page->model, .values = page->source.values});
+    page->source.result_json =
+        ReplayJson({.result = nominal, .comparison = comparison, .model = *page->model, .values = page->source.values});
     page->source.predictions.pop_back();
   }
   return page;
@@ -58,7 +67,8 @@ std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike) {
   for (std::size_t r = 0; r < rows; ++r) recording.time_s[r] = 1e-3 * static_cast<double>(r);
   const auto wave = [&](double phase) {
     std::vector<double> values(rows);
-    for (std::size_t r = 0; r < rows; ++r) values[r] = std::sin(1e-4 * static_cast<double>(r) + phase) + 0.05 * std::sin(0.7 * static_cast<double>(r));
+    for (std::size_t r = 0; r < rows; ++r)
+      values[r] = std::sin(1e-4 * static_cast<double>(r) + phase) + 0.05 * std::sin(0.7 * static_cast<double>(r));
     return values;
   };
   for (auto& command : recording.commands) command.values = wave(1);

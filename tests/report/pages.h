@@ -1,4 +1,5 @@
-// Reports to look at: a replay of the demo log, a long log, and a diagnosis made up to have everything a diagnosis can have.
+// Reports to look at: a replay of the demo log, a long log, and a diagnosis made up to have everything a diagnosis can
+// have.
 #ifndef GAPSCOPE_TESTS_REPORT_PAGES_H_
 #define GAPSCOPE_TESTS_REPORT_PAGES_H_
 
@@ -18,7 +19,8 @@ struct Page {
   ReportSource source;
 };
 
-// The log demo/qube.csv replayed by the nominal model and by one with a cable spring, under a result of each kind ("replay", "diagnosis").
+// The log demo/qube.csv replayed by the nominal model and by one with a cable spring, under a result of each kind
+// ("replay", "diagnosis").
 std::unique_ptr<Page> DemoPage(const std::string& kind);
 // One signal of `rows` rows with a spike of one row at `spike`.
 std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike);

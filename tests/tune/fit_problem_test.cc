@@ -16,7 +16,8 @@ constexpr double kRounding = 1e-9;
 // A log of the cart: gain 1.2, starting off the spring's rest, its zero 0.05 m off, a little noise.
 Recording CartLog(const Rig& rig, std::size_t rows, double noise, unsigned long seed = 3) {
   std::vector<double> command(rows);
-  for (std::size_t k = 0; k < rows; ++k) command[k] = std::sin(0.02 * static_cast<double>(k)) + (k / 100 % 2 == 0 ? 0.5 : -0.5);
+  for (std::size_t k = 0; k < rows; ++k)
+    command[k] = std::sin(0.02 * static_cast<double>(k)) + (k / 100 % 2 == 0 ? 0.5 : -0.5);
   std::vector<double> q = CartMotion(1.2, 0.1, -0.3, command);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, noise);
@@ -25,7 +26,12 @@ Recording CartLog(const Rig& rig, std::size_t rows, double noise, unsigned long 
 }
 
 FitOptions CartOptions(const Rig& rig, Objective objective) {
-  return {.free = {rig.Index("cart.gain")}, .objective = objective, .window_s = 0.5, .lead_in_s = 0.02, .time_step_s = kCartStep_s, .fit_shift = false};
+  return {.free = {rig.Index("cart.gain")},
+          .objective = objective,
+          .window_s = 0.5,
+          .lead_in_s = 0.02,
+          .time_step_s = kCartStep_s,
+          .fit_shift = false};
 }
 
 double Deviation(const std::vector<double>& y) {
@@ -35,7 +41,8 @@ double Deviation(const std::vector<double>& y) {
   return std::sqrt(square / static_cast<double>(y.size()));
 }
 
-// All residuals of the windows as one dense linear problem in (gain, offset, two states per window), by unit responses of the test's integrator.
+// All residuals of the windows as one dense linear problem in (gain, offset, two states per window), by unit responses
+// of the test's integrator.
 struct Dense {
   Eigen::MatrixXd jacobian;
   Eigen::VectorXd residual;  // at zero states and offset, the nominal gain
@@ -75,9 +82,11 @@ Dense DenseProblem(const Rig& rig, const Recording& recording, double lead_in_s)
       residual.push_back(0);
     }
   }
-  Dense dense{.jacobian = Eigen::MatrixXd(rows.size(), columns), .residual = Eigen::Map<Eigen::VectorXd>(residual.data(), static_cast<Eigen::Index>(residual.size()))};
+  Dense dense{.jacobian = Eigen::MatrixXd(rows.size(), columns),
+              .residual = Eigen::Map<Eigen::VectorXd>(residual.data(), static_cast<Eigen::Index>(residual.size()))};
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    for (std::size_t c = 0; c < columns; ++c) dense.jacobian(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c];
+    for (std::size_t c = 0; c < columns; ++c)
+      dense.jacobian(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c];
   }
   return dense;
 }
@@ -88,7 +97,8 @@ TEST(FitProblemTest, CostIsHalfTheSumOfSquares) {
   ThreadPool pool(1);
   FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
   const Dense dense = DenseProblem(rig, logs[0], 0.02);
-  EXPECT_NEAR(problem.Cost(problem.Start()), 0.5 * dense.residual.squaredNorm(), kRounding * dense.residual.squaredNorm());
+  EXPECT_NEAR(problem.Cost(problem.Start()), 0.5 * dense.residual.squaredNorm(),
+              kRounding * dense.residual.squaredNorm());
 }
 
 TEST(FitProblemTest, EliminatedStatesGiveTheFullProblemsNormalEquations) {
@@ -103,7 +113,8 @@ TEST(FitProblemTest, EliminatedStatesGiveTheFullProblemsNormalEquations) {
   const Eigen::VectorXd slope = dense.jacobian.transpose() * dense.residual;
   const Eigen::Index m = full.rows() - 2;
   const Eigen::MatrixXd inner = full.bottomRightCorner(m, m).inverse();
-  const Eigen::MatrixXd reduced = full.topLeftCorner(2, 2) - full.topRightCorner(2, m) * inner * full.bottomLeftCorner(m, 2);
+  const Eigen::MatrixXd reduced =
+      full.topLeftCorner(2, 2) - full.topRightCorner(2, m) * inner * full.bottomLeftCorner(m, 2);
   const Eigen::VectorXd gradient = slope.head(2) - full.topRightCorner(2, m) * inner * slope.tail(m);
   // The anchor adds 1e-8 of the residuals' count over the squared range.
   EXPECT_LT((at.hessian - reduced).norm(), 1e-6 * reduced.norm());
@@ -115,7 +126,8 @@ TEST(FitProblemTest, EliminatedStatesGiveTheFullProblemsNormalEquations) {
   for (std::size_t w = 0; w < problem.windows(); ++w) {
     EXPECT_LT((moved.states[w] - solution.segment<2>(2 + 2 * static_cast<Eigen::Index>(w))).norm(), 1e-4);
   }
-  EXPECT_NEAR(problem.Cost(moved), 0.5 * (dense.residual + dense.jacobian * solution).squaredNorm(), 1e-6 * problem.Cost(problem.Start()));
+  EXPECT_NEAR(problem.Cost(moved), 0.5 * (dense.residual + dense.jacobian * solution).squaredNorm(),
+              1e-6 * problem.Cost(problem.Start()));
 }
 
 TEST(FitProblemTest, GradientIsThatOfTheReducedCost) {
@@ -125,7 +137,10 @@ TEST(FitProblemTest, GradientIsThatOfTheReducedCost) {
   const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
   const std::vector<Recording> logs = {MakeLog(rig, truth, command, 2, 0.004, 2e-3, 1)};
   ThreadPool pool(2);
-  FitProblem problem(*rig.model, logs, {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004, .fit_offsets = false}, rig.model->Nominal(), pool);
+  FitProblem problem(
+      *rig.model, logs,
+      {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004, .fit_offsets = false},
+      rig.model->Nominal(), pool);
   FitPoint point = SolveStates(problem, problem.Start(), 6);
   const Linearization at = problem.Linearize(point, 1e-3);
   for (Eigen::Index i = 0; i < point.y.size(); ++i) {
@@ -156,7 +171,8 @@ TEST(FitProblemTest, HuberGrowsLinearlyBeyondTheThreshold) {
     return problem.Cost(problem.Start());
   };
   // Far out: quadratic without, linear with.
-  const double plain[] = {cost_with_outlier(10, false), cost_with_outlier(20, false)}, robust[] = {cost_with_outlier(10, true), cost_with_outlier(20, true), cost_with_outlier(30, true)};
+  const double plain[] = {cost_with_outlier(10, false), cost_with_outlier(20, false)},
+               robust[] = {cost_with_outlier(10, true), cost_with_outlier(20, true), cost_with_outlier(30, true)};
   EXPECT_GT(plain[1] - plain[0], 140);
   EXPECT_NEAR(robust[2] - robust[1], robust[1] - robust[0], 1e-6);
   EXPECT_LT(robust[1] - robust[0], 0.1 * (plain[1] - plain[0]));
@@ -174,13 +190,16 @@ TEST(FitProblemTest, MissingSamplesAreLeftOut) {
   EXPECT_NEAR(problem.Values(found.point)[0], 1.2, 1e-3);
 }
 
-// On a linear problem a secant step leaves a Jacobian that explains the step, and normal equations with the cost of the new point.
+// On a linear problem a secant step leaves a Jacobian that explains the step, and normal equations with the cost of the
+// new point.
 TEST(FitProblemTest, SecantUpdateExplainsItsStep) {
   const Rig rig = LoadRig("qube");
   const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
   const std::vector<Recording> logs = {MakeLog(rig, rig.Values({{"arm.damping", 3e-4}}), command, 2, 0.004, 2e-3, 1)};
   ThreadPool pool(1);
-  FitProblem problem(*rig.model, logs, {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004}, rig.model->Nominal(), pool);
+  FitProblem problem(*rig.model, logs,
+                     {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004},
+                     rig.model->Nominal(), pool);
   const FitPoint from = problem.Start();
   Snapshot snapshot = problem.Differentiate(from, 0.01, FitProblem::Columns::kAll);
   const std::vector<Eigen::VectorXd> before = snapshot.residuals;
@@ -204,16 +223,22 @@ TEST(FitProblemTest, SecantUpdateExplainsItsStep) {
 TEST(LinearTermsTest, ParametersComeBack) {
   ThreadPool pool(1);
   const auto command = [](double t) { return std::sin(6 * t); };
-  for (const auto& [effect, size, other] : {std::tuple{"cable_spring@arm", "stiffness_n_m_per_rad", "rest_rad"}, std::tuple{"gravity_offset@arm", "torque_n_m", "rest_rad"},
+  for (const auto& [effect, size, other] : {std::tuple{"cable_spring@arm", "stiffness_n_m_per_rad", "rest_rad"},
+                                            std::tuple{"gravity_offset@arm", "torque_n_m", "rest_rad"},
                                             std::tuple{"cogging@arm", "amplitude_n_m", "phase_rad"}}) {
     const Rig rig = LoadRig("qube", {effect});
     const std::string name = effect;
     const auto values = rig.Values({{name + "." + size, 2e-3}, {name + "." + other, -0.7}});
     const std::vector<Recording> logs = {MakeLog(rig, values, command, 1, 0.004, 0, 1)};
-    FitProblem problem(*rig.model, logs, {.free = {rig.Index(name + "." + size), rig.Index(name + "." + other)}, .time_step_s = 0.004, .linear_terms = true}, values, pool);
+    FitProblem problem(*rig.model, logs,
+                       {.free = {rig.Index(name + "." + size), rig.Index(name + "." + other)},
+                        .time_step_s = 0.004,
+                        .linear_terms = true},
+                       values, pool);
     const FitPoint start = problem.Start();
     const std::vector<double> back = problem.Values(start);
-    for (std::size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(back[i], values[i], 1e-12) << rig.model->parameters()[i].name;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      EXPECT_NEAR(back[i], values[i], 1e-12) << rig.model->parameters()[i].name;
     // The torque is linear in both: twice both is twice the size at the same angle or rest.
     FitPoint doubled = start;
     doubled.y.head(2) *= 2;
@@ -227,11 +252,18 @@ TEST(LinearTermsTest, GravityIsFoundFromTheWrongSideOfItsRest) {
   const Rig rig = LoadRig("qube", {"gravity_offset@arm"});
   const int torque = rig.Index("gravity_offset@arm.torque_n_m"), rest = rig.Index("gravity_offset@arm.rest_rad");
   const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
-  const std::vector<Recording> logs = {MakeLog(rig, rig.Values({{"gravity_offset@arm.torque_n_m", 3e-3}, {"gravity_offset@arm.rest_rad", 0.2}}), command, 3, 0.004, 1e-4, 1)};
+  const std::vector<Recording> logs = {
+      MakeLog(rig, rig.Values({{"gravity_offset@arm.torque_n_m", 3e-3}, {"gravity_offset@arm.rest_rad", 0.2}}), command,
+              3, 0.004, 1e-4, 1)};
   ThreadPool pool(2);
   // From what is nearly a constant torque of the same size about zero.
-  FitProblem problem(*rig.model, logs, {.free = {torque, rest}, .time_step_s = 0.004, .fit_offsets = false, .linear_terms = true},  // an offset is a rest angle
-                     rig.Values({{"gravity_offset@arm.torque_n_m", 1e-3}, {"gravity_offset@arm.rest_rad", 1.57}}), pool);
+  FitProblem problem(*rig.model, logs,
+                     {.free = {torque, rest},
+                      .time_step_s = 0.004,
+                      .fit_offsets = false,
+                      .linear_terms = true},  // an offset is a rest angle
+                     rig.Values({{"gravity_offset@arm.torque_n_m", 1e-3}, {"gravity_offset@arm.rest_rad", 1.57}}),
+                     pool);
   const SolveResult solved = Solve(problem, problem.Start(), {.max_iterations = 6, .tolerance = 1e-4});
   EXPECT_NEAR(problem.Values(solved.point)[torque], 3e-3, 3e-5);
   EXPECT_NEAR(problem.Values(solved.point)[rest], 0.2, 0.01);
@@ -252,7 +284,8 @@ TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
   std::vector<Eigen::VectorXd> residuals;
   (void)problem.CostAndResiduals(probe, &residuals);
   EXPECT_LT(problem.Bend(at, snapshot, from, to, 0.1, residuals).gradient.norm(), 1e-6 * at.gradient.norm());
-  // Residuals that are off by share^2 times their Jacobian's first column are what a bend of the unit vector's size makes.
+  // Residuals that are off by share^2 times their Jacobian's first column are what a bend of the unit vector's size
+  // makes.
   for (std::size_t w = 0; w < residuals.size(); ++w) residuals[w] += 0.01 * snapshot.jacobians[w].col(0);
   const Linearization bent = problem.Bend(at, snapshot, from, to, 0.1, residuals);
   Eigen::MatrixXd hessian = at.hessian;
@@ -277,37 +310,51 @@ TEST(TakeBetterStatesTest, EveryWindowKeepsTheStateThatCostsLess) {
   EXPECT_NEAR(cost, problem.Cost(a), 1e-12 * cost);
 }
 
-// What went before a window is in the drive's states when it starts: with the true effect nothing is left but the start's own small error.
+// What went before a window is in the drive's states when it starts: with the true effect nothing is left but the
+// start's own small error.
 TEST(FitProblemTest, DrivesHoldTheirPastAtAWindowsStart) {
   const auto command = [](double t) { return 2 * std::sin(9 * t + 1.5 * t * t); };
-  for (const auto& [rig_name, changed] : {std::pair<std::string, std::map<std::string, double>>{"flexjoint", {{"actuator_lag@motor.time_constant_s", 0.04}, {"actuator_lag@motor.second_pole_share", 0.2}}},
-                                          {"qube", {{"supply_sag@motor.time_constant_s", 0.5}, {"supply_sag@motor.sag_fraction", 0.5}, {"supply_sag@motor.limit_n_m", 0.008}}},
-                                          {"joint", {{"torque_delay@motor.delay_s", 0.02}}}}) {
+  for (const auto& [rig_name, changed] :
+       {std::pair<std::string, std::map<std::string, double>>{
+            "flexjoint", {{"actuator_lag@motor.time_constant_s", 0.04}, {"actuator_lag@motor.second_pole_share", 0.2}}},
+        {"qube",
+         {{"supply_sag@motor.time_constant_s", 0.5},
+          {"supply_sag@motor.sag_fraction", 0.5},
+          {"supply_sag@motor.limit_n_m", 0.008}}},
+        {"joint", {{"torque_delay@motor.delay_s", 0.02}}}}) {
     const std::string effect = changed.begin()->first.substr(0, changed.begin()->first.find('.'));
     const Rig rig = LoadRig(rig_name, {effect});
     const auto values = rig.Values(changed);
     const std::vector<Recording> logs = {MakeLog(rig, values, command, 5, 0.002, 0, 1)};
     ThreadPool pool(1);
     const FitOptions options{.time_step_s = 0.002, .fit_offsets = false, .fit_shift = false};
-    FitProblem truth(*rig.model, logs, options, values, pool), nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
-    const double left = truth.Cost(SolveStates(truth, truth.Start(), 3)), without = nothing.Cost(SolveStates(nothing, nothing.Start(), 3));
+    FitProblem truth(*rig.model, logs, options, values, pool),
+        nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
+    const double left = truth.Cost(SolveStates(truth, truth.Start(), 3)),
+                 without = nothing.Cost(SolveStates(nothing, nothing.Start(), 3));
     EXPECT_LT(left, 0.003 * without) << effect;
   }
 }
 
-// A late sensor shows a window's start only later: the window starts where the mechanism was, and the true delay leaves nothing.
+// A late sensor shows a window's start only later: the window starts where the mechanism was, and the true delay leaves
+// nothing.
 TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   const Rig rig = LoadRig("joint", {"sensor_delay@position_rad"});
   const auto values = rig.Values({{"sensor_delay@position_rad.delay_s", 0.012}});
   const auto command = [](double t) { return 0.4 * std::sin(8 * t); };
   Recording log = MakeLog(rig, values, command, 3, 0.001, 0, 1);
   const std::vector<Recording> logs = {log};
-  const InitialState start = InitialStateAt(*rig.model, log, 1000, values), late = InitialStateAt(*rig.model, log, 1000, rig.model->Nominal());
+  const InitialState start = InitialStateAt(*rig.model, log, 1000, values),
+                     late = InitialStateAt(*rig.model, log, 1000, rig.model->Nominal());
   const double later = InitialStateAt(*rig.model, log, 1012, rig.model->Nominal()).qpos[0];
   EXPECT_NEAR(start.qpos[0], later, 1e-9);
   EXPECT_GT(std::abs(late.qpos[0] - later), 1e-3);
   ThreadPool pool(1);
-  const FitOptions options{.free = {rig.Index("sensor_delay@position_rad.delay_s")}, .time_step_s = 0.001, .fit_offsets = false, .fit_shift = false, .fit_states = false};
+  const FitOptions options{.free = {rig.Index("sensor_delay@position_rad.delay_s")},
+                           .time_step_s = 0.001,
+                           .fit_offsets = false,
+                           .fit_shift = false,
+                           .fit_states = false};
   FitProblem problem(*rig.model, logs, options, values, pool);
   FitProblem from_nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
   FitPoint point = from_nothing.Start();
@@ -316,23 +363,33 @@ TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   EXPECT_LT(from_nothing.Cost(point), 1e-4 * before);
 }
 
-// A command later than one sample drives the nuisance shift onto its bound: the score test must still see what a delay would explain.
+// A command later than one sample drives the nuisance shift onto its bound: the score test must still see what a delay
+// would explain.
 TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
   const Rig truth = LoadRig("flexlink", {"command_delay@motor"}), rig = LoadRig("flexlink");
   const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
-  const std::vector<Recording> logs = {MakeLog(truth, truth.Values({{"command_delay@motor.delay_s", 0.012}}), command, 4, 0.004, 2e-4, 1)};
+  const std::vector<Recording> logs = {
+      MakeLog(truth, truth.Values({{"command_delay@motor.delay_s", 0.012}}), command, 4, 0.004, 2e-4, 1)};
   ThreadPool pool(2);
-  const FitOptions options{.free = {rig.Index("motor.torque_per_ampere"), rig.Index("hub.inertia"), rig.Index("link.stiffness")}, .time_step_s = 0.004};
+  const FitOptions options{
+      .free = {rig.Index("motor.torque_per_ampere"), rig.Index("hub.inertia"), rig.Index("link.stiffness")},
+      .time_step_s = 0.004};
   FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
   const FitPoint point = Solve(parent, parent.Start(), {.tolerance = 1e-5}).point;
   EXPECT_NEAR(parent.Shift(point), 0.004, 1e-9);
   const Snapshot base = parent.Capture(point, 0.01);
   ASSERT_TRUE(base.valid);
   FitOptions of_child = options;
-  of_child.free = {truth.Index("motor.torque_per_ampere"), truth.Index("hub.inertia"), truth.Index("link.stiffness"), truth.Index("command_delay@motor.delay_s")};
+  of_child.free = {truth.Index("motor.torque_per_ampere"), truth.Index("hub.inertia"), truth.Index("link.stiffness"),
+                   truth.Index("command_delay@motor.delay_s")};
   FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
   const auto drop = [&](double delay_s) {
-    return child.TestColumn(child.FromParent(parent, point, truth.Values({{"command_delay@motor.delay_s", delay_s}}), {}), parent, point, base).drop / base.cost;
+    return child
+               .TestColumn(
+                   child.FromParent(parent, point, truth.Values({{"command_delay@motor.delay_s", delay_s}}), {}),
+                   parent, point, base)
+               .drop /
+           base.cost;
   };
   EXPECT_GT(drop(0.008), 0.3);
   EXPECT_LT(drop(0.001), 0.01);  // earlier than the shift already is
@@ -342,7 +399,8 @@ TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
 TEST(TestColumnTest, FewWindowsAreTheirShareOfTheCost) {
   const Rig truth = LoadRig("flexlink", {"coulomb_friction@hub"}), rig = LoadRig("flexlink");
   const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
-  const std::vector<Recording> logs = {MakeLog(truth, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), command, 4, 0.004, 2e-4, 1)};
+  const std::vector<Recording> logs = {
+      MakeLog(truth, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), command, 4, 0.004, 2e-4, 1)};
   ThreadPool pool(2);
   const FitOptions options{.free = {rig.Index("hub.inertia")}, .time_step_s = 0.004};
   FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
@@ -360,7 +418,8 @@ TEST(TestColumnTest, FewWindowsAreTheirShareOfTheCost) {
   of_child.free = {truth.Index("hub.inertia"), truth.Index("coulomb_friction@hub.friction_n_m")};
   FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
   const FitPoint at = child.FromParent(parent, point, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), {});
-  const ColumnTest of_all = child.TestColumn(at, parent, point, base), of_few = child.TestColumn(at, parent, point, thin);
+  const ColumnTest of_all = child.TestColumn(at, parent, point, base),
+                   of_few = child.TestColumn(at, parent, point, thin);
   ASSERT_TRUE(of_few.valid);
   EXPECT_GT(of_few.drop, 0.3 * thin.cost);
   EXPECT_LT(of_few.drop, of_all.drop);

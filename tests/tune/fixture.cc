@@ -56,11 +56,14 @@ Rig LoadCart(double low, double high) {
   static const Folder owner;
   const auto& folder = owner.path;
   const std::string bounds = "[" + std::to_string(low) + ", " + std::to_string(high) + "]";
-  const std::string yaml = "schema: gapscope.experiment/1\nmodel: cart.xml\nlog: {time: {column: t, unit: s}}\n"
+  const std::string yaml =
+      "schema: gapscope.experiment/1\nmodel: cart.xml\nlog: {time: {column: t, unit: s}}\n"
       "commands: [{actuator: motor, column: u, unit: N}]\n"
       "measured: [{signal: cart_m, column: x, joint: cart, unit: m}]\n"
       "parameters:\n"
-      "  cart.gain: {unit: \"1\", nominal: 1.5, bounds: " + bounds + "}\n"
+      "  cart.gain: {unit: \"1\", nominal: 1.5, bounds: " +
+      bounds +
+      "}\n"
       "  cart.damping: {unit: N s/m, nominal: 0, bounds: [0, 4], frozen: true}\n"
       "set:\n  actuator/motor/gain: cart.gain\n  joint/cart/damping: cart.damping\n";
   WriteFile((folder / "cart.xml").string(), kCartXml).value();
@@ -81,28 +84,35 @@ std::vector<double> CartMotion(double gain, double q0, double v0, const std::vec
 Recording MakeRecording(const Rig& rig, std::vector<double> command, std::vector<double> measured, double period_s) {
   Recording recording{.log_path = "made"};
   for (std::size_t k = 0; k < command.size(); ++k) recording.time_s.push_back(static_cast<double>(k) * period_s);
-  recording.commands.push_back({.actuator = rig.experiment.commands.front().actuator, .column = "u", .values = std::move(command)});
+  recording.commands.push_back(
+      {.actuator = rig.experiment.commands.front().actuator, .column = "u", .values = std::move(command)});
   for (std::size_t c = 1; c < rig.experiment.commands.size(); ++c) {
-    recording.commands.push_back({.actuator = rig.experiment.commands[c].actuator, .column = "constant", .values = std::vector<double>(recording.rows(), 0.0)});
+    recording.commands.push_back({.actuator = rig.experiment.commands[c].actuator,
+                                  .column = "constant",
+                                  .values = std::vector<double>(recording.rows(), 0.0)});
   }
   for (std::size_t s = 0; s < rig.experiment.measured.size(); ++s) {
     if (rig.experiment.measured[s].kind != SignalKind::kPosition) continue;
-    recording.measured.push_back({.spec = rig.experiment.measured[s], .index = s, .column = "x", .values = std::vector<double>(recording.rows(), 0.0)});
+    recording.measured.push_back({.spec = rig.experiment.measured[s],
+                                  .index = s,
+                                  .column = "x",
+                                  .values = std::vector<double>(recording.rows(), 0.0)});
   }
   if (!measured.empty()) recording.measured.front().values = std::move(measured);
   recording.timeline.median_step_s = period_s;
   return recording;
 }
 
-Recording MakeLog(const Rig& rig, const std::vector<double>& values, const std::function<double(double)>& command, double duration_s, double period_s,
-                  double noise_deviation, unsigned long seed, double time_step_s) {
+Recording MakeLog(const Rig& rig, const std::vector<double>& values, const std::function<double(double)>& command,
+                  double duration_s, double period_s, double noise_deviation, unsigned long seed, double time_step_s) {
   const auto rows = static_cast<std::size_t>(std::lround(duration_s / period_s)) + 1;
   std::vector<double> commands(rows);
   for (std::size_t k = 0; k < rows; ++k) commands[k] = command(static_cast<double>(k) * period_s);
   Recording recording = MakeRecording(rig, std::move(commands), {}, period_s);
   Simulator simulator(*rig.model, time_step_s);
   const mjModel& m = rig.model->compiled();
-  const InitialState rest{.qpos = {m.qpos0, m.qpos0 + m.nq}, .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
+  const InitialState rest{.qpos = {m.qpos0, m.qpos0 + m.nq},
+                          .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
   const std::size_t signals = recording.measured.size();
   std::vector<double> predicted(rows * signals);
   GS_CHECK(simulator.SetParameters(values, recording));
@@ -111,7 +121,8 @@ Recording MakeLog(const Rig& rig, const std::vector<double>& values, const std::
   std::normal_distribution<double> noise(0, 1);
   for (std::size_t k = 0; k < rows; ++k) {
     for (std::size_t s = 0; s < signals; ++s) {
-      const double count = recording.measured[s].spec.resolution, y = predicted[k * signals + s] + noise_deviation * noise(random);
+      const double count = recording.measured[s].spec.resolution,
+                   y = predicted[k * signals + s] + noise_deviation * noise(random);
       recording.measured[s].values[k] = count > 0 ? count * std::round(y / count) : y;
     }
   }

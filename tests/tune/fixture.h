@@ -1,4 +1,5 @@
-// What the tests of the tuner share: a cart on a spring whose motion has a closed form, and logs that a model made itself.
+// What the tests of the tuner share: a cart on a spring whose motion has a closed form, and logs that a model made
+// itself.
 #ifndef GAPSCOPE_TESTS_TUNE_FIXTURE_H_
 #define GAPSCOPE_TESTS_TUNE_FIXTURE_H_
 
@@ -23,17 +24,19 @@ struct Rig {
 // models/RIG with effects ("coulomb_friction@arm").
 Rig LoadRig(const std::string& rig, const std::vector<std::string>& effects = {});
 
-// A cart of 2 kg on a spring of 8 N/m, driven by gain * u: q'' = (gain u - 8 q - damping q') / 2, Euler at the sample time. Parameters: cart.gain (1.5, within
-// [low, high]; in units, not logarithmic), cart.damping (0, [0, 4], frozen).
+// A cart of 2 kg on a spring of 8 N/m, driven by gain * u: q'' = (gain u - 8 q - damping q') / 2, Euler at the sample
+// time. Parameters: cart.gain (1.5, within [low, high]; in units, not logarithmic), cart.damping (0, [0, 4], frozen).
 Rig LoadCart(double low = -10, double high = 10);
 inline constexpr double kCartMass_kg = 2, kCartStiffness_n_per_m = 8, kCartStep_s = 0.004;
-// The cart's positions at the stamps of `command`, by an integrator of the test's own (semi-implicit Euler, as MuJoCo's), without damping.
+// The cart's positions at the stamps of `command`, by an integrator of the test's own (semi-implicit Euler, as
+// MuJoCo's), without damping.
 std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command);
 
-// A log of `rig` made by its own simulator: `command(t)` on the first actuator at `period_s`, from rest at the initial pose; Gaussian noise and
-// quantisation to each signal's resolution added. Signals: all positions.
-Recording MakeLog(const Rig& rig, const std::vector<double>& values, const std::function<double(double)>& command, double duration_s, double period_s,
-                  double noise_deviation, unsigned long seed, double time_step_s = 0);
+// A log of `rig` made by its own simulator: `command(t)` on the first actuator at `period_s`, from rest at the initial
+// pose; Gaussian noise and quantisation to each signal's resolution added. Signals: all positions.
+Recording MakeLog(const Rig& rig, const std::vector<double>& values, const std::function<double(double)>& command,
+                  double duration_s, double period_s, double noise_deviation, unsigned long seed,
+                  double time_step_s = 0);
 
 // An empty recording of `rig` with these stamps, command and measured positions of the first signal.
 Recording MakeRecording(const Rig& rig, std::vector<double> command, std::vector<double> measured, double period_s);

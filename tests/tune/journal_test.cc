@@ -32,7 +32,10 @@ class JournalTest : public ::testing::Test {
 
   Result<TuneSummary> Run(const std::string& journal, bool resume, int jobs = 1, unsigned long seed = 0) {
     ThreadPool pool(jobs);
-    TuneOptions options{.free = {rig_.Index("cart.gain"), rig_.Index("cart.damping")}, .starts = 2, .journal = journal, .resume = resume};
+    TuneOptions options{.free = {rig_.Index("cart.gain"), rig_.Index("cart.damping")},
+                        .starts = 2,
+                        .journal = journal,
+                        .resume = resume};
     options.solve.seed = seed;
     options.solve.max_iterations = 8;
     return Tune(*rig_.model, SplitData(logs_, {}), rig_.model->Nominal(), options, pool);

@@ -10,7 +10,8 @@
 namespace gapscope::testing {
 namespace {
 
-// A free run of the cart, gain the only unknown: gain = sum(s (y - f)) / sum(s s), s the motion from rest at gain 1, f the free one from the log's start.
+// A free run of the cart, gain the only unknown: gain = sum(s (y - f)) / sum(s s), s the motion from rest at gain 1, f
+// the free one from the log's start.
 struct OneGain {
   std::vector<Recording> logs;
   double solution = 0;
@@ -32,7 +33,12 @@ OneGain MakeOneGain(const Rig& rig) {
 }
 
 FitOptions OnlyGain(const Rig& rig) {
-  return {.free = {rig.Index("cart.gain")}, .objective = Objective::kFreeRun, .time_step_s = kCartStep_s, .fit_offsets = false, .fit_shift = false, .fit_states = false};
+  return {.free = {rig.Index("cart.gain")},
+          .objective = Objective::kFreeRun,
+          .time_step_s = kCartStep_s,
+          .fit_offsets = false,
+          .fit_shift = false,
+          .fit_states = false};
 }
 
 TEST(SolveTest, LinearProblemHasItsClosedForm) {
@@ -89,7 +95,8 @@ TEST(SolveTest, SpentBudgetGivesTheBestSoFar) {
   for (const Optimizer optimizer : {Optimizer::kLevenbergMarquardt, Optimizer::kBobyqa, Optimizer::kCrs2}) {
     FitProblem problem(*rig.model, one.logs, OnlyGain(rig), rig.model->Nominal(), pool);
     const double start = problem.Cost(problem.Start());
-    const SolveResult found = Solve(problem, problem.Start(), {.optimizer = optimizer, .deadline = std::chrono::steady_clock::now()});
+    const SolveResult found =
+        Solve(problem, problem.Start(), {.optimizer = optimizer, .deadline = std::chrono::steady_clock::now()});
     EXPECT_EQ(found.termination, Termination::kBudget);
     EXPECT_LE(found.cost, start);
     EXPECT_EQ(problem.Cost(found.point), found.cost);

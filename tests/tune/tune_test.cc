@@ -1,4 +1,5 @@
-// What a fit promises: known parameters come back, what cannot be known is named, and the held-out data is never looked at.
+// What a fit promises: known parameters come back, what cannot be known is named, and the held-out data is never looked
+// at.
 #include "src/tune/tune.h"
 
 #include <gtest/gtest.h>
@@ -61,11 +62,15 @@ TEST(SplitDataTest, SingleLogKeepsItsEnd) {
 
 TEST(TuneTest, KnownParametersComeBackWithinTheirIntervals) {
   const Rig rig = LoadRig("qube");
-  const auto truth = rig.Values({{"arm.damping", 4e-4}, {"pendulum.damping", 6e-5}, {"pendulum.length", 0.124}, {"arm.mass", 0.105}});
+  const auto truth =
+      rig.Values({{"arm.damping", 4e-4}, {"pendulum.damping", 6e-5}, {"pendulum.length", 0.124}, {"arm.mass", 0.105}});
   ThreadPool pool(2);
   TuneOptions options{.starts = 1};
-  for (const char* name : {"arm.damping", "pendulum.damping", "pendulum.length", "arm.mass"}) options.free.push_back(rig.Index(name));
-  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, truth, 0), QubeLog(rig, truth, 1), QubeLog(rig, truth, 2)}, {}), rig.model->Nominal(), options, pool);
+  for (const char* name : {"arm.damping", "pendulum.damping", "pendulum.length", "arm.mass"})
+    options.free.push_back(rig.Index(name));
+  const auto found =
+      Tune(*rig.model, SplitData({QubeLog(rig, truth, 0), QubeLog(rig, truth, 1), QubeLog(rig, truth, 2)}, {}),
+           rig.model->Nominal(), options, pool);
   ASSERT_TRUE(found.ok()) << found.error().Text();
   const TuneSummary& summary = found.value();
   EXPECT_EQ(summary.termination, Termination::kConverged);
@@ -76,8 +81,10 @@ TEST(TuneTest, KnownParametersComeBackWithinTheirIntervals) {
     EXPECT_TRUE(t.identifiable);
     EXPECT_LE(t.low, t.value);
     EXPECT_GE(t.high, t.value);
-    // Five times the interval's half-width: one draw of noise in a test must not depend on luck; coverage is counted by scripts/recovery.
-    EXPECT_NEAR(t.value, true_value, 2.5 * (t.high - t.low)) << rig.model->parameters()[static_cast<std::size_t>(index)].name;
+    // Five times the interval's half-width: one draw of noise in a test must not depend on luck; coverage is counted by
+    // scripts/recovery.
+    EXPECT_NEAR(t.value, true_value, 2.5 * (t.high - t.low))
+        << rig.model->parameters()[static_cast<std::size_t>(index)].name;
     EXPECT_NEAR(t.value, true_value, 0.1 * true_value) << rig.model->parameters()[static_cast<std::size_t>(index)].name;
   }
   EXPECT_LT(summary.error_held_out, 0.05);
@@ -85,13 +92,15 @@ TEST(TuneTest, KnownParametersComeBackWithinTheirIntervals) {
 }
 
 TEST(TuneTest, TorqueConstantAndResistanceAreNamedAsFlat) {
-  // Angles know kt / R and kt km / R alone, and masses only relative to them: with both constants tied, scaling is open.
+  // Angles know kt / R and kt km / R alone, and masses only relative to them: with both constants tied, scaling is
+  // open.
   const Rig rig = LoadRig("qube");
   ThreadPool pool(2);
   TuneOptions options{.starts = 1};
   for (const char* name : {"motor.resistance", "motor.kt", "motor.km"}) options.free.push_back(rig.Index(name));
   const auto truth = rig.Values();
-  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, truth, 0), QubeLog(rig, truth, 1)}, {}), rig.model->Nominal(), options, pool);
+  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, truth, 0), QubeLog(rig, truth, 1)}, {}),
+                          rig.model->Nominal(), options, pool);
   ASSERT_TRUE(found.ok()) << found.error().Text();
   ASSERT_EQ(found.value().flat.size(), 1u);
   const auto& parts = found.value().flat[0].parts;
@@ -104,7 +113,9 @@ TEST(TuneTest, TorqueConstantAndResistanceAreNamedAsFlat) {
   // Along the flat direction both grow alike: kt / R stays.
   EXPECT_NEAR(weight_kt, weight_resistance, 0.05);
   const std::string text = FlatText(found.value().flat[0], *rig.model);
-  EXPECT_TRUE(text.starts_with("only motor.kt / motor.resistance is known") || text.starts_with("only motor.resistance / motor.kt is known")) << text;
+  EXPECT_TRUE(text.starts_with("only motor.kt / motor.resistance is known") ||
+              text.starts_with("only motor.resistance / motor.kt is known"))
+      << text;
   EXPECT_FALSE(Of(found.value(), kt).identifiable);
   EXPECT_FALSE(Of(found.value(), resistance).identifiable);
 }
@@ -134,7 +145,8 @@ TEST(TuneTest, SpentBudgetStillGivesAScoredResult) {
   ThreadPool pool(2);
   TuneOptions options{.starts = 3};
   options.solve.deadline = std::chrono::steady_clock::now();
-  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, rig.Values({{"arm.damping", 4e-4}}), 0, 2)}, {}), rig.model->Nominal(), options, pool);
+  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, rig.Values({{"arm.damping", 4e-4}}), 0, 2)}, {}),
+                          rig.model->Nominal(), options, pool);
   ASSERT_TRUE(found.ok());
   EXPECT_EQ(found.value().termination, Termination::kBudget);
   EXPECT_EQ(found.value().start_costs.size(), 1u);
@@ -147,7 +159,11 @@ TEST(TuneTest, NothingFreeIsAnError) {
   for (auto& p : experiment.parameters) p.frozen = true;
   const auto model = Model::Build(experiment).value();
   ThreadPool pool(1);
-  const auto found = Tune(*model, SplitData({MakeRecording(rig, std::vector<double>(100, 1.0), CartMotion(1, 0, 0, std::vector<double>(100, 1.0)), kCartStep_s)}, {}), model->Nominal(), {}, pool);
+  const auto found = Tune(*model,
+                          SplitData({MakeRecording(rig, std::vector<double>(100, 1.0),
+                                                   CartMotion(1, 0, 0, std::vector<double>(100, 1.0)), kCartStep_s)},
+                                    {}),
+                          model->Nominal(), {}, pool);
   ASSERT_FALSE(found.ok());
   EXPECT_NE(found.error().Text().find("--free"), std::string::npos);
 }

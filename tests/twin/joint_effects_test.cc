@@ -83,7 +83,8 @@ TEST_P(DryTest, LoadFrictionGrowsWithTorque) {
   }
 }
 
-// What has only to follow a limit that moves with the load does not stick, and loses nothing to the sticking elements' viscosity.
+// What has only to follow a limit that moves with the load does not stick, and loses nothing to the sticking elements'
+// viscosity.
 TEST_P(DryTest, SlidingUnderAChangingLoadMeetsTheLevelAlone) {
   Dry dry;
   dry.load_coefficient = 0.385;

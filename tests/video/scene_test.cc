@@ -20,7 +20,8 @@ constexpr std::array<float, 3> kBlue = {0, 0.5f, 0.9f};
 // Largest difference of a colour channel.
 int Difference(std::uint32_t a, std::uint32_t b) {
   int most = 0;
-  for (int shift = 0; shift < 24; shift += 8) most = std::max(most, std::abs(static_cast<int>(a >> shift & 255) - static_cast<int>(b >> shift & 255)));
+  for (int shift = 0; shift < 24; shift += 8)
+    most = std::max(most, std::abs(static_cast<int>(a >> shift & 255) - static_cast<int>(b >> shift & 255)));
   return most;
 }
 std::size_t PixelsThatDiffer(const Picture& a, const Picture& b, int more_than) {
@@ -45,7 +46,8 @@ class SceneTest : public ::testing::Test {
   }
   std::unique_ptr<Scene> Make(View view, Redraw redraw = Redraw::kWhatMoves) {
     const PoseTrack* tracks[] = {&track_};
-    auto made = Scene::Make(*drawn_, FrameMotion(*drawn_, tracks, view, static_cast<double>(kWidth) / kHeight), kWidth, kHeight, redraw);
+    auto made = Scene::Make(*drawn_, FrameMotion(*drawn_, tracks, view, static_cast<double>(kWidth) / kHeight), kWidth,
+                            kHeight, redraw);
     EXPECT_TRUE(made.ok());
     return std::move(made).value();
   }
@@ -75,7 +77,8 @@ TEST_F(SceneTest, AGhostIsSeenWhereItStands) {
   const auto scene = Make(View::kFixed);
   const std::vector<double> solid = {-0.6, 0}, near = {-0.6, 0.002}, far = {0.6, 0};
   const Picture alone = Draw(*scene, solid);
-  const std::size_t a_little = PixelsThatDiffer(alone, Draw(*scene, solid, &near), 40), a_lot = PixelsThatDiffer(alone, Draw(*scene, solid, &far), 40);
+  const std::size_t a_little = PixelsThatDiffer(alone, Draw(*scene, solid, &near), 40),
+                    a_lot = PixelsThatDiffer(alone, Draw(*scene, solid, &far), 40);
   EXPECT_GT(a_lot, 2000u);
   EXPECT_LT(a_little, a_lot / 10);
   // It is the colour asked for: blue grows against red.
@@ -129,7 +132,8 @@ TEST_F(SceneTest, PosesAreTheLogsOwnAtItsStampsAndBetween) {
   ThreadPool pool(1);
   const auto values = model_->Nominal();
   const LogReplay replay = Replay(*model_, {recording.value()}, {.keep_poses = true}, pool).logs.front();
-  const PoseTrack predicted = PredictedPoses(*model_, values, recording.value(), replay), measured = MeasuredPoses(*model_, values, recording.value(), predicted);
+  const PoseTrack predicted = PredictedPoses(*model_, values, recording.value(), replay),
+                  measured = MeasuredPoses(*model_, values, recording.value(), predicted);
   std::vector<double> pose(2);
   for (const std::size_t row : {std::size_t{0}, std::size_t{777}, std::size_t{5000}}) {
     const double t = recording.value().time_s[row];

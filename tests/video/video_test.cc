@@ -19,14 +19,17 @@ const std::string kQube = "'" + kSource + "/models/qube/experiment.yaml' '" + kS
 class VideoTest : public ::testing::Test {
  protected:
   Answer Shell(const std::string& line) const { return scratch_.Shell(line); }
-  std::string Render(const std::string& arguments) const { return std::string("'") + GAPSCOPE_PROGRAM + "' render " + kQube + " --size 480x360 " + arguments; }
+  std::string Render(const std::string& arguments) const {
+    return std::string("'") + GAPSCOPE_PROGRAM + "' render " + kQube + " --size 480x360 " + arguments;
+  }
   std::string Out(const std::string& name) const {
     std::filesystem::create_directories(scratch_.Path("out"));
     return scratch_.Path("out/" + name);
   }
   std::set<std::string> OutFiles() const {
     std::set<std::string> names;
-    for (const auto& entry : std::filesystem::directory_iterator(scratch_.Path("out"))) names.insert(entry.path().filename());
+    for (const auto& entry : std::filesystem::directory_iterator(scratch_.Path("out")))
+      names.insert(entry.path().filename());
     return names;
   }
   nlohmann::json Probe(const std::string& file) {
@@ -36,14 +39,19 @@ class VideoTest : public ::testing::Test {
   }
   // One frame as rgb24.
   std::string Pixels(const std::string& file, int frame) {
-    EXPECT_EQ(Shell("ffmpeg -v error -y -i '" + file + "' -vf 'select=eq(n\\," + std::to_string(frame) + ")' -frames:v 1 -f rawvideo -pix_fmt rgb24 '" + scratch_.Path("raw") + "'").status, 0);
+    EXPECT_EQ(Shell("ffmpeg -v error -y -i '" + file + "' -vf 'select=eq(n\\," + std::to_string(frame) +
+                    ")' -frames:v 1 -f rawvideo -pix_fmt rgb24 '" + scratch_.Path("raw") + "'")
+                  .status,
+              0);
     return ReadAll(scratch_.Path("raw"));
   }
   static double MeanDifference(const std::string& a, const std::string& b) {
     EXPECT_EQ(a.size(), b.size());
     EXPECT_FALSE(a.empty());
     double sum = 0;
-    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) sum += std::abs(static_cast<int>(static_cast<unsigned char>(a[i])) - static_cast<int>(static_cast<unsigned char>(b[i])));
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+      sum += std::abs(static_cast<int>(static_cast<unsigned char>(a[i])) -
+                      static_cast<int>(static_cast<unsigned char>(b[i])));
     return sum / static_cast<double>(a.size());
   }
   Scratch scratch_;
@@ -71,13 +79,15 @@ TEST_F(VideoTest, FramesRateDurationAndWhatIsInThem) {
   EXPECT_EQ(stream["height"], 360);
   EXPECT_EQ(stream["pix_fmt"], "yuv420p");
   EXPECT_NEAR(std::stod(probe["format"]["duration"].get<std::string>()), 51 / 25.0, 0.05);
-  // Frame k shows the log at from + k speed / rate: it is the still of that time, and not that of the time of frame k + 5.
+  // Frame k shows the log at from + k speed / rate: it is the still of that time, and not that of the time of frame k
+  // + 5.
   for (const int k : {7, 45}) {
     const double t = 8 + k * 0.5 / 25;
     const auto still = [&](double time) {
       const std::string png = Out("still.png");
       // The axis is the video's; only --at differs.
-      EXPECT_EQ(Shell(Render("--from 8 --to 9 --speed 0.5 --at " + std::to_string(time) + " --out '" + png + "'")).status, 0);
+      EXPECT_EQ(
+          Shell(Render("--from 8 --to 9 --speed 0.5 --at " + std::to_string(time) + " --out '" + png + "'")).status, 0);
       return Pixels(png, 0);
     };
     const std::string frame = Pixels(video, k);
@@ -91,9 +101,14 @@ TEST_F(VideoTest, LooksLikeThePictureInTheDocs) {
   // docs/render.png, made by scripts/pictures, which also says how: run it when the look is meant to change.
   const std::string result = scratch_.Path("repaired"), png = Out("now.png");
   ASSERT_EQ(Shell(std::string("'") + GAPSCOPE_PROGRAM + "' replay " + kQube +
-                  " --with cable_spring@arm --with coulomb_friction@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --set cable_spring@arm.rest_rad=-0.4"
-                  " --set coulomb_friction@arm.friction_n_m=0.0006 --out '" + result + "'").status, 0);
-  const Answer made = Shell(std::string("'") + GAPSCOPE_PROGRAM + "' render " + kQube + " --compare nominal --compare '" + result + "' --at 8.7 --json --out '" + png + "'");
+                  " --with cable_spring@arm --with coulomb_friction@arm --set "
+                  "cable_spring@arm.stiffness_n_m_per_rad=0.0012 --set cable_spring@arm.rest_rad=-0.4"
+                  " --set coulomb_friction@arm.friction_n_m=0.0006 --out '" +
+                  result + "'")
+                .status,
+            0);
+  const Answer made = Shell(std::string("'") + GAPSCOPE_PROGRAM + "' render " + kQube +
+                            " --compare nominal --compare '" + result + "' --at 8.7 --json --out '" + png + "'");
   ASSERT_EQ(made.status, 0) << made.err;
   const auto json = nlohmann::json::parse(made.out);
   EXPECT_EQ(json["models"][1]["label"], "repaired");
@@ -112,9 +127,13 @@ TEST_F(VideoTest, TheSameFramesForAnyNumberOfWorkers) {
 
 TEST_F(VideoTest, GifAndSeveralModelsAndViews) {
   const std::string result = scratch_.Path("r");
-  ASSERT_EQ(Shell(std::string("'") + GAPSCOPE_PROGRAM + "' replay " + kQube + " --with cable_spring@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out '" + result + "'").status, 0);
+  ASSERT_EQ(Shell(std::string("'") + GAPSCOPE_PROGRAM + "' replay " + kQube +
+                  " --with cable_spring@arm --set cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out '" + result + "'")
+                .status,
+            0);
   const std::string gif = Out("v.gif");
-  const Answer made = Shell(Render("--compare nominal --compare 'spring=" + result + "' --layout side --view top --from 9 --to 9.5 --fps 10 --out '" + gif + "'"));
+  const Answer made = Shell(Render("--compare nominal --compare 'spring=" + result +
+                                   "' --layout side --view top --from 9 --to 9.5 --fps 10 --out '" + gif + "'"));
   ASSERT_EQ(made.status, 0) << made.err;
   EXPECT_NE(made.out.find("spring"), std::string::npos) << made.out;
   EXPECT_EQ(Probe(gif)["streams"][0]["nb_read_frames"], "6");
@@ -127,7 +146,9 @@ TEST_F(VideoTest, GifAndSeveralModelsAndViews) {
 }
 
 // The library or a driver without a screen is not installed: what the program says then. Any other failure is ours.
-bool NoEglHere(const Answer& answer) { return answer.err.find("libEGL") != std::string::npos || answer.err.find("EGL has no display") != std::string::npos; }
+bool NoEglHere(const Answer& answer) {
+  return answer.err.find("libEGL") != std::string::npos || answer.err.find("EGL has no display") != std::string::npos;
+}
 
 TEST_F(VideoTest, EglDrawsWhatOsmesaDraws) {
   const std::string osmesa = Out("o.png"), egl = Out("e.png");
@@ -139,14 +160,14 @@ TEST_F(VideoTest, EglDrawsWhatOsmesaDraws) {
 }
 
 // Nothing is left under the name asked for, nor beside it.
-#define EXPECT_REFUSED(line, says)                                         \
-  do {                                                                     \
-    Out("");                                                               \
-    const Answer answer = Shell(line);                                     \
-    EXPECT_EQ(answer.status, 2) << answer.err;                             \
-    EXPECT_NE(answer.err.find(says), std::string::npos) << answer.err;     \
-    EXPECT_EQ(answer.err.find("internal error"), std::string::npos);       \
-    EXPECT_TRUE(OutFiles().empty()) << *OutFiles().begin();                \
+#define EXPECT_REFUSED(line, says)                                     \
+  do {                                                                 \
+    Out("");                                                           \
+    const Answer answer = Shell(line);                                 \
+    EXPECT_EQ(answer.status, 2) << answer.err;                         \
+    EXPECT_NE(answer.err.find(says), std::string::npos) << answer.err; \
+    EXPECT_EQ(answer.err.find("internal error"), std::string::npos);   \
+    EXPECT_TRUE(OutFiles().empty()) << *OutFiles().begin();            \
   } while (false)
 
 TEST_F(VideoTest, RefusesWhatItCannotDraw) {
@@ -166,30 +187,37 @@ TEST_F(VideoTest, WithoutFfmpegItSaysWhatToInstall) {
 
 TEST_F(VideoTest, WithoutOpenGlItSaysWhatToInstall) {
   // Libraries that do not load stand in front of the real ones.
-  for (const char* name : {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so", "libEGL.so.1", "libEGL.so"}) scratch_.Write(std::string("gl/") + name, "not a library");
-  EXPECT_REFUSED("LD_LIBRARY_PATH='" + scratch_.Path("gl") + "' " + Render("--out '" + Out("v.mp4") + "'"), "apt-get install libosmesa6");
+  for (const char* name : {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so", "libEGL.so.1", "libEGL.so"})
+    scratch_.Write(std::string("gl/") + name, "not a library");
+  EXPECT_REFUSED("LD_LIBRARY_PATH='" + scratch_.Path("gl") + "' " + Render("--out '" + Out("v.mp4") + "'"),
+                 "apt-get install libosmesa6");
 }
 
 TEST_F(VideoTest, FallsBackToEglAndSaysSo) {
-  for (const char* name : {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"}) scratch_.Write(std::string("gl/") + name, "not a library");
+  for (const char* name : {"libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"})
+    scratch_.Write(std::string("gl/") + name, "not a library");
   const Answer made = Shell(Render("--gl egl --out '" + Out("e.png") + "'"));
   if (made.status != 0 && NoEglHere(made)) GTEST_SKIP() << "no EGL without a screen here: " << made.err;
   ASSERT_EQ(made.status, 0) << made.err;
-  const Answer answer = Shell("LD_LIBRARY_PATH='" + scratch_.Path("gl") + "' " + Render("--out '" + Out("f.png") + "'"));
+  const Answer answer =
+      Shell("LD_LIBRARY_PATH='" + scratch_.Path("gl") + "' " + Render("--out '" + Out("f.png") + "'"));
   EXPECT_EQ(answer.status, 0) << answer.err;
   EXPECT_NE(answer.err.find("rendering with EGL"), std::string::npos) << answer.err;
 }
 
 TEST_F(VideoTest, AFullDiskLeavesNothing) {
   // No file may grow beyond 16 kB, as on a disk that fills up; ffmpeg's own words reach the user.
-  EXPECT_REFUSED("trap '' XFSZ; ulimit -f 16; " + Render("--from 8 --out '" + Out("v.mp4") + "'"), "ffmpeg could not write the video");
+  EXPECT_REFUSED("trap '' XFSZ; ulimit -f 16; " + Render("--from 8 --out '" + Out("v.mp4") + "'"),
+                 "ffmpeg could not write the video");
 }
 
 TEST_F(VideoTest, AnInterruptLeavesNothing) {
   // Interrupted once the temporary file is there, in the middle of the work.
   const std::string out = Out("v.mp4");
-  EXPECT_REFUSED(Render("--speed 0.001 --out '" + out + "'") + " & child=$!; n=0; until ls '" + out + "'.* >/dev/null 2>&1 || [ $n -gt 600 ]; do sleep 0.1; n=$((n+1)); done; kill -TERM $child; wait $child",
-                 "interrupted");
+  EXPECT_REFUSED(
+      Render("--speed 0.001 --out '" + out + "'") + " & child=$!; n=0; until ls '" + out +
+          "'.* >/dev/null 2>&1 || [ $n -gt 600 ]; do sleep 0.1; n=$((n+1)); done; kill -TERM $child; wait $child",
+      "interrupted");
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// What an effect's file includes. Every file NAME.cc in this folder defines `Effect Effect_NAME()`; CMake lists them in the catalogue.
+// What an effect's file includes. Every file NAME.cc in this folder defines `Effect Effect_NAME()`; CMake lists them in
+// the catalogue.
 #ifndef GAPSCOPE_MODEL_EFFECTS_CATALOGUE_H_
 #define GAPSCOPE_MODEL_EFFECTS_CATALOGUE_H_
 

@@ -6,9 +6,17 @@ Effect Effect_coulomb_friction() {
   return {
       .name = "coulomb_friction",
       .place = EffectPlace::kJoint,
-      .parameters = {
-          {.key = "friction_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = 0, .high = 1, .trials = {0.01, 0.04, 0.15}, .start = 0.03},
-      },
+      .parameters =
+          {
+              {.key = "friction_n_m",
+               .unit = "N m",
+               .scale = ScaleKind::kTorque,
+               .neutral = 0,
+               .low = 0,
+               .high = 1,
+               .trials = {0.01, 0.04, 0.15},
+               .start = 0.03},
+          },
       .meaning = "dry friction of constant level",
       .signature = "sign of speed, amplitude-dependent",
       .told_apart = "slow triangle, coasting",

@@ -6,9 +6,17 @@ Effect Effect_load_friction() {
   return {
       .name = "load_friction",
       .place = EffectPlace::kDrivenJoint,
-      .parameters = {
-          {.key = "coefficient", .unit = "1", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.9, .trials = {0.05, 0.15, 0.4}, .start = 0.1},
-      },
+      .parameters =
+          {
+              {.key = "coefficient",
+               .unit = "1",
+               .scale = ScaleKind::kOne,
+               .neutral = 0,
+               .low = 0,
+               .high = 0.9,
+               .trials = {0.05, 0.15, 0.4},
+               .start = 0.1},
+          },
       .meaning = "dry friction in proportion to the transmitted torque",
       .signature = "friction grows with torque",
       .told_apart = "two loads",

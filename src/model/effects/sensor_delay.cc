@@ -6,9 +6,17 @@ Effect Effect_sensor_delay() {
   return {
       .name = "sensor_delay",
       .place = EffectPlace::kSignal,
-      .parameters = {
-          {.key = "delay_s", .unit = "s", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.08, .trials = {0.002, 0.006, 0.02}, .start = 0.004},
-      },
+      .parameters =
+          {
+              {.key = "delay_s",
+               .unit = "s",
+               .scale = ScaleKind::kOne,
+               .neutral = 0,
+               .low = 0,
+               .high = 0.08,
+               .trials = {0.002, 0.006, 0.02},
+               .start = 0.004},
+          },
       .meaning = "one logged column is late",
       .signature = "measured late, motion right",
       .told_apart = "two sensors, torque log",

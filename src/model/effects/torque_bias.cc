@@ -6,9 +6,17 @@ Effect Effect_torque_bias() {
   return {
       .name = "torque_bias",
       .place = EffectPlace::kJoint,
-      .parameters = {
-          {.key = "torque_n_m", .unit = "N m", .scale = ScaleKind::kTorque, .neutral = 0, .low = -1, .high = 1, .trials = {-0.05, 0.05}, .start = 0},
-      },
+      .parameters =
+          {
+              {.key = "torque_n_m",
+               .unit = "N m",
+               .scale = ScaleKind::kTorque,
+               .neutral = 0,
+               .low = -1,
+               .high = 1,
+               .trials = {-0.05, 0.05},
+               .start = 0},
+          },
       .meaning = "a constant torque",
       .signature = "constant",
       .told_apart = "both directions",

@@ -6,9 +6,17 @@ Effect Effect_torque_delay() {
   return {
       .name = "torque_delay",
       .place = EffectPlace::kServo,
-      .parameters = {
-          {.key = "delay_s", .unit = "s", .scale = ScaleKind::kOne, .neutral = 0, .low = 0, .high = 0.04, .trials = {0.001, 0.003, 0.01}, .start = 0.002},
-      },
+      .parameters =
+          {
+              {.key = "delay_s",
+               .unit = "s",
+               .scale = ScaleKind::kOne,
+               .neutral = 0,
+               .low = 0,
+               .high = 0.04,
+               .trials = {0.001, 0.003, 0.01},
+               .start = 0.002},
+          },
       .meaning = "the servo's torque acts late, inside its own loop",
       .signature = "the same phase around the servo's own loop",
       .told_apart = "loop gain, ringing",

@@ -6,9 +6,17 @@ Effect Effect_torque_speed_curve() {
   return {
       .name = "torque_speed_curve",
       .place = EffectPlace::kMotor,
-      .parameters = {
-          {.key = "power_w", .unit = "W", .scale = ScaleKind::kPower, .neutral = 2, .low = 0.01, .high = 2, .trials = {0.6, 0.35, 0.2, 0.1, 0.05}, .start = 0.3},
-      },
+      .parameters =
+          {
+              {.key = "power_w",
+               .unit = "W",
+               .scale = ScaleKind::kPower,
+               .neutral = 2,
+               .low = 0.01,
+               .high = 2,
+               .trials = {0.6, 0.35, 0.2, 0.1, 0.05},
+               .start = 0.3},
+          },
       .meaning = "constant power: the torque limit falls with speed",
       .signature = "limit falls with speed",
       .told_apart = "high speed and torque together",

@@ -1,9 +1,9 @@
 // Live parameters of a plugin instance.
 //
-// A parameter `key` of the instance `name` is, in this order: the model's `<custom><numeric name="NAME.KEY">` when there
-// is one, read anew on every compute, so that it can be changed without recompiling and differentiated by finite
-// differences; the `<config key="KEY">` of the instance, parsed once; its neutral value. Structure (laws, tables, buffer
-// lengths) stands in `<config>` only.
+// A parameter `key` of the instance `name` is, in this order: the model's `<custom><numeric name="NAME.KEY">` when
+// there is one, read anew on every compute, so that it can be changed without recompiling and differentiated by finite
+// differences; the `<config key="KEY">` of the instance, parsed once; its neutral value. Structure (laws, tables,
+// buffer lengths) stands in `<config>` only.
 #ifndef GAPSCOPE_PLUGINS_COMMON_PARAMETERS_H_
 #define GAPSCOPE_PLUGINS_COMMON_PARAMETERS_H_
 
@@ -36,8 +36,9 @@ inline std::string InstanceName(const mjModel* m, int instance) {
   return name ? name : "";
 }
 
-// The trimmed text of a `<config>`, or of the model's `<custom><text name="NAME.KEY">` where there is no config: the way in for programs that build a
-// model through mjSpec, whose attribute map is a C++ object of MuJoCo's own standard library. Empty when absent.
+// The trimmed text of a `<config>`, or of the model's `<custom><text name="NAME.KEY">` where there is no config: the
+// way in for programs that build a model through mjSpec, whose attribute map is a C++ object of MuJoCo's own standard
+// library. Empty when absent.
 inline std::string_view ConfigText(const mjModel* m, int instance, const char* key) {
   const char* text = mj_getPluginConfig(m, instance, key);
   if (!text || !*text) {
@@ -86,8 +87,8 @@ class LiveParameters {
       }
       if (fault.empty() && !(value_[i] >= spec.min && value_[i] <= spec.max)) {
         fault = "plugin instance '" + name + "': attribute '" + spec.key + "' is " + std::to_string(value_[i]) +
-               ", allowed " + std::to_string(spec.min) + " to " + std::to_string(spec.max) + UnitText(spec) +
-               "; leave it out for " + std::to_string(spec.neutral);
+                ", allowed " + std::to_string(spec.min) + " to " + std::to_string(spec.max) + UnitText(spec) +
+                "; leave it out for " + std::to_string(spec.neutral);
       }
     }
     return fault;

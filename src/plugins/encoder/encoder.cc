@@ -149,9 +149,7 @@ void Encoder::Register() {
   plugin.needstage = mjSTAGE_VEL;
   plugin.nattribute = static_cast<int>(std::size(kAttributes));
   plugin.attributes = kAttributes;
-  plugin.nstate = +[](const mjModel* m, int instance) {
-    return StateSize(m, instance);
-  };
+  plugin.nstate = +[](const mjModel* m, int instance) { return StateSize(m, instance); };
   plugin.nsensordata = +[](const mjModel* m, int instance, int) {
     bool velocity = false;
     Flag(ConfigText(m, instance, "velocity"), &velocity);

@@ -192,10 +192,12 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   const bool prime = slots[MotorState::kPrimed] == 0 && !later;
   // On a voltage drive the second pole is the amplifier's, before the winding: the back-EMF does not pass it.
   double filtered[kRoles];
-  const bool amplifier = second_lag_ >= 0 && (config_.law == MotorLaw::kVoltage || (config_.law == MotorLaw::kAffine && Parameter(m, kBias1) == 0));
+  const bool amplifier = second_lag_ >= 0 && (config_.law == MotorLaw::kVoltage ||
+                                              (config_.law == MotorLaw::kAffine && Parameter(m, kBias1) == 0));
   if (amplifier) {
     std::copy_n(inputs, config_.inputs, filtered);
-    filtered[config_.command] = lagged(second_lag_, kSecondTimeConstant, inputs[config_.command], inputs[config_.command], prime);
+    filtered[config_.command] =
+        lagged(second_lag_, kSecondTimeConstant, inputs[config_.command], inputs[config_.command], prime);
     inputs = filtered;
   }
 
@@ -219,7 +221,9 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   if (dead_zone_ && !config_.dead_zone_on_command) torque = DeadZone(torque, Parameter(m, kDeadZone));
   if (limits_) {
     const Limits limits = LimitsAt(m, torque, speed);
-    torque = softness_ ? SoftLimit(torque, ceiling * (torque > 0 ? limits.high : -limits.low), Parameter(m, kLimitSoftness)) : mju_clip(torque, limits.low * ceiling, limits.high * ceiling);
+    torque = softness_
+                 ? SoftLimit(torque, ceiling * (torque > 0 ? limits.high : -limits.low), Parameter(m, kLimitSoftness))
+                 : mju_clip(torque, limits.low * ceiling, limits.high * ceiling);
     if (sag_ >= 0) {
       const Lag lag(std::max(Parameter(m, kSagTimeConstant), step), step, staged);
       d->act_dot[sag_] = lag.Derivative(d->act[sag_], Load(m, torque, limits, supply_now));
@@ -228,7 +232,8 @@ void Motor::Compute(const mjModel* m, mjData* d) const {
   if (!later) slots[MotorState::kEstimate] = torque;
 
   // What it does not know.
-  if (droop_) torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference), Parameter(m, kDroopExponent));
+  if (droop_)
+    torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference), Parameter(m, kDroopExponent));
   if (asymmetry_) torque *= 1 + (torque > 0 ? 1 : -1) * Parameter(m, kAsymmetry);
   if (efficiency_) torque *= Parameter(m, torque * speed < 0 ? kEfficiencyBackdrive : kEfficiencyDrive);
   d->actuator_force[output_] = torque;
@@ -250,9 +255,7 @@ void Motor::Register() {
   plugin.capabilityflags = mjPLUGIN_ACTUATOR;
   plugin.nattribute = kMotorAttributeCount;
   plugin.attributes = kMotorAttributes;
-  plugin.nstate = +[](const mjModel* m, int instance) {
-    return MotorStateSize(m, instance);
-  };
+  plugin.nstate = +[](const mjModel* m, int instance) { return MotorStateSize(m, instance); };
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     std::string problem;
     std::unique_ptr<Motor> motor = Motor::Create(m, instance, &problem);

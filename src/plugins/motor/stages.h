@@ -72,14 +72,16 @@ inline double PowerLimit(double speed, double power) {
   return speed > 0 ? power / speed : std::numeric_limits<double>::infinity();
 }
 
-// `torque` held within +-limit; the corner is a parabola from limit (1 - softness) to limit (1 + softness), of slope 1 and 0 at its ends.
+// `torque` held within +-limit; the corner is a parabola from limit (1 - softness) to limit (1 + softness), of slope 1
+// and 0 at its ends.
 inline double SoftLimit(double torque, double limit, double softness) {
   const double size = std::abs(torque), half = softness * limit, into = size - (limit - half);
   if (!(into > 0)) return torque;
   return std::copysign(into >= 2 * half ? limit : size - into * into / (4 * half), torque);
 }
 
-// The torque constant falls with a power of the torque's size, 1 for a straight line; at `reference` the loss is `droop`.
+// The torque constant falls with a power of the torque's size, 1 for a straight line; at `reference` the loss is
+// `droop`.
 inline double Droop(double torque, double droop, double reference, double exponent) {
   const double size = std::abs(torque) / reference;
   return torque * std::max(0.0, 1 - droop * (exponent == 1 ? size : std::pow(size, exponent)));

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "src/cli/commands.h"
@@ -32,11 +33,8 @@ Result<int> RunChirp(ChirpFlags flags) {
     GS_RETURN_IF_ERROR(WriteFile(flags.out, csv));
     if (!flags.common.quiet) fmt::print(stderr, "wrote {}\n", flags.out);
   }
-  if (flags.common.json) {
-    fmt::print("{}\n", ChirpJson(rows));
-  } else {
-    fmt::print("{}", ChirpTable(rows));
-  }
+  const ChirpRun run{.info = {}, .rows = rows};
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 
@@ -135,7 +133,7 @@ Result<int> RunInput(const InputFlags& flags) {
   std::vector<double> values = unit_wave;
   for (double& value : values) value *= amplitude;
   GS_ASSIGN(Recording input, MakeInput(rig.experiment, rig.rehearsal, values));
-  const Rehearsal rehearsal = Rehearse(*rig.model, simulator, std::move(input), rig.values);
+  Rehearsal rehearsal = Rehearse(*rig.model, simulator, std::move(input), rig.values);
   if (!(rehearsal.worst <= 1)) {
     std::string reached, allowed;
     for (const auto& e : rehearsal.extremes) {
@@ -154,10 +152,12 @@ Result<int> RunInput(const InputFlags& flags) {
     GS_RETURN_IF_ERROR(WriteFile(flags.rig.out, InputCsv(rig.experiment, rehearsal)));
     if (!flags.rig.common.quiet) fmt::print(stderr, "wrote {}\n", flags.rig.out);
   }
-  fmt::print("{}{}",
-             flags.rig.common.json ? RehearsalJson(wave, amplitude, rig.unit, rehearsal)
-                                   : RehearsalTable(wave, amplitude, rig.unit, rehearsal),
-             flags.rig.common.json ? "\n" : "");
+  const InputRun run{.info = {.seed = flags.rig.common.seed},
+                     .wave = wave,
+                     .amplitude = amplitude,
+                     .unit = rig.unit,
+                     .rehearsal = std::move(rehearsal)};
+  fmt::print("{}", flags.rig.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 
@@ -277,17 +277,17 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
     GS_ASSIGN(design, DesignForRivals(base, rivals, options, pool));
     design.values = std::move(assumed);
   }
-  const std::string command = ReproducingCommand(flags, design.inputs.front());
   if (!flags.rig.out.empty()) {
     GS_RETURN_IF_ERROR(WriteFile(flags.rig.out, InputCsv(rig.experiment, design.inputs.front().rehearsal)));
     if (!flags.rig.common.quiet) fmt::print(stderr, "wrote {}\n", flags.rig.out);
   }
-  const bool of_effects = flags.parameters.empty();
-  if (flags.rig.common.json) {
-    fmt::print("{}\n", OptimalJson(design, rig.unit, command, of_effects));
-  } else {
-    fmt::print("{}", OptimalTable(design, rig.unit, command, of_effects));
-  }
+  using Purpose = OptimalRun::Purpose;
+  const OptimalRun run{.info = {.seed = flags.rig.common.seed},
+                       .purpose = flags.parameters.empty() ? Purpose::kEffects : Purpose::kParameters,
+                       .design = design,
+                       .unit = rig.unit,
+                       .command = ReproducingCommand(flags, design.inputs.front())};
+  fmt::print("{}", flags.rig.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 

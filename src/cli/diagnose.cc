@@ -1,14 +1,14 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
-#include "src/core/file.h"
 #include "src/report/diagnose_report.h"
+#include "src/report/write_run.h"
 
 namespace gapscope::cli {
 namespace {
@@ -19,6 +19,27 @@ struct DiagnoseFlags {
   std::vector<std::string> hold_out;
   double budget_s = 60, window_s = 0;
 };
+
+// `log_values`: of the first log, for the MJCF.
+Status WriteDiagnosis(const std::string& out, const Experiment& experiment, const DataSplit& data,
+                      const std::map<std::string, double>& log_values, const DiagnoseRun& run, ThreadPool& pool) {
+  const Diagnosis& diagnosis = run.diagnosis;
+  GS_ASSIGN(const auto base, Model::Build(experiment));
+  RunFiles files;
+  GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
+  const ReportLogs logs{data.train, data.held_out};
+  ReportSource source = SourceOf(experiment, logs);
+  source.predictions = Predict(experiment, logs,
+                               {{"nominal", base, base->Nominal()},
+                                {"refitted", diagnosis.refit_model, diagnosis.refit_values},
+                                {"diagnosed", diagnosis.model, diagnosis.values}},
+                               pool);
+  source.model = base.get();
+  source.values = base->Nominal();
+  source.parameters = diagnosis.model->parameters();
+  files.report = &source;
+  return WriteRun(out, ToJson(run), files);
+}
 
 Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
@@ -37,22 +58,10 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   auto diagnosed = Diagnose(experiment, data, options, pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!diagnosed.ok()) return diagnosed.error();
-  const Diagnosis& diagnosis = diagnosed.value();
-  const std::string json = DiagnosisJson(diagnosis, flags.common.seed);
-  if (!flags.common.out.empty()) {
-    const std::filesystem::path out = flags.common.out;
-    GS_ASSIGN(const auto base, Model::Build(experiment));
-    GS_ASSIGN(const std::string xml,
-              diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
-    GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
-    GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
-    GS_RETURN_IF_ERROR(WriteReport(out, json, experiment, {data.train, data.held_out},
-                                   {{"nominal", base, base->Nominal()},
-                                    {"refitted", diagnosis.refit_model, diagnosis.refit_values},
-                                    {"diagnosed", diagnosis.model, diagnosis.values}},
-                                   pool));
-  }
-  fmt::print("{}", flags.common.json ? json + "\n" : DiagnosisTable(diagnosis));
+  const DiagnoseRun run{.info = {.seed = flags.common.seed}, .diagnosis = std::move(diagnosed).value()};
+  if (!flags.common.out.empty())
+    GS_RETURN_IF_ERROR(WriteDiagnosis(flags.common.out, experiment, data, log_values, run, pool));
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 

@@ -4,10 +4,11 @@
 
 #include <charconv>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "src/cli/session.h"
 #include "src/design/linear.h"
-#include "src/report/json.h"
+#include "src/report/feedback_report.h"
 
 namespace gapscope::cli {
 namespace {
@@ -34,16 +35,6 @@ Result<std::complex<double>> ParsePole(const std::string& text) {
   if (!good || !std::isfinite(real) || !std::isfinite(imaginary))
     return Error{.what = "not a pole", .where = "--poles", .actual = "'" + text + "'", .allowed = "-3.5 or -3.5+8.4i"};
   return std::complex<double>(real, imaginary);
-}
-
-std::string PoleText(const std::complex<double>& p) {
-  return p.imag() == 0 ? fmt::format("{:.5g}", p.real()) : fmt::format("{:.5g}{:+.5g}i", p.real(), p.imag());
-}
-
-nlohmann::ordered_json PolesJson(const std::vector<std::complex<double>>& poles) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const auto& p : poles) list.push_back({p.real(), p.imag()});
-  return list;
 }
 
 Result<int> RunFeedback(const FeedbackFlags& flags) {
@@ -86,26 +77,12 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
     }
     GS_ASSIGN(feedback, PlacePoles(system.a, system.b, poles));
   }
-  const auto open = SortedPoles(system.a);
-  if (flags.json) {
-    nlohmann::ordered_json json = {{"schema", "gapscope.design.feedback/1"},
-                                   {"states", system.states},
-                                   {"gain", nlohmann::ordered_json::array()},
-                                   {"open_loop_poles", PolesJson(open)},
-                                   {"closed_loop_poles", PolesJson(feedback.poles)}};
-    for (Eigen::Index i = 0; i < n; ++i) json["gain"].push_back(feedback.gain(0, i));
-    json["versions"] = JsonVersions();
-    fmt::print("{}\n", json.dump(2));
-    return kDone;
-  }
-  fmt::print("command = -(sum of gain x state), state from the equilibrium\n\n{:<24} {:>12}\n", "state", "gain");
-  for (Eigen::Index i = 0; i < n; ++i)
-    fmt::print("{:<24} {:>12.5g}\n", system.states[static_cast<std::size_t>(i)], feedback.gain(0, i));
-  fmt::print("\npoles open  ");
-  for (const auto& p : open) fmt::print(" {}", PoleText(p));
-  fmt::print("\npoles closed");
-  for (const auto& p : feedback.poles) fmt::print(" {}", PoleText(p));
-  fmt::print("\n");
+  const FeedbackRun run{.info = {},
+                        .states = system.states,
+                        .gain = {feedback.gain.data(), feedback.gain.data() + n},  // one row
+                        .open_poles = SortedPoles(system.a),
+                        .closed_poles = feedback.poles};
+  fmt::print("{}", flags.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 

@@ -29,26 +29,15 @@ void SetCommandLine(int argc, char** argv) {
 }
 const std::string& CommandLine() { return Line(); }
 
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
-                   const ReportLogs& logs, std::vector<ReportPrediction> predictions, const Model& model,
-                   const std::vector<double>& values, const std::vector<Parameter>& parameters) {
-  ReportSource source{.result_json = json,
-                      .command_line = CommandLine(),
-                      .experiment = &experiment,
-                      .recordings = {},
-                      .held_out = {},
-                      .predictions = std::move(predictions),
-                      .model = &model,
-                      .values = values,
-                      .parameters = parameters};
+ReportSource SourceOf(const Experiment& experiment, const ReportLogs& logs) {
+  ReportSource source{.command_line = CommandLine(), .experiment = &experiment};
   for (const auto& recording : logs.train) source.recordings.push_back(&recording), source.held_out.push_back(false);
   for (const auto& recording : logs.held_out) source.recordings.push_back(&recording), source.held_out.push_back(true);
-  return WriteReportHtml(folder, source);
+  return source;
 }
 
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
-                   const ReportLogs& logs, const std::vector<ReportModel>& models, ThreadPool& pool) {
-  GS_CHECK(!models.empty());
+std::vector<ReportPrediction> Predict(const Experiment& experiment, const ReportLogs& logs,
+                                      const std::vector<ReportModel>& models, ThreadPool& pool) {
   std::vector<ReportPrediction> predictions;
   for (const auto& model : models) {
     ReportPrediction prediction{.label = model.label, .logs = {}};
@@ -61,8 +50,7 @@ Status WriteReport(const std::string& folder, const std::string& json, const Exp
     }
     predictions.push_back(std::move(prediction));
   }
-  return WriteReport(folder, json, experiment, logs, std::move(predictions), *models.front().model,
-                     models.front().values, models.back().model->parameters());
+  return predictions;
 }
 
 }  // namespace gapscope::cli

@@ -1,4 +1,4 @@
-// report.html of a command, by one call.
+// What the commands' report.html have in common.
 #ifndef GAPSCOPE_CLI_HTML_H_
 #define GAPSCOPE_CLI_HTML_H_
 
@@ -28,16 +28,12 @@ struct ReportLogs {
   const std::vector<Recording>& held_out;
 };
 
-// Replays all logs with each model as the experiment says (mode, window) and writes `folder`/report.html. The missing
-// torque is that of the first model, the parameters those of the last.
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
-                   const ReportLogs& logs, const std::vector<ReportModel>& models, ThreadPool& pool);
+// What a page needs of all commands: command line, experiment, logs. They must outlive it.
+ReportSource SourceOf(const Experiment& experiment, const ReportLogs& logs);
 
-// The same with traces that are there already: one list a label, in the order of the logs. `model`, `values` and
-// `parameters` as in ReportSource.
-Status WriteReport(const std::string& folder, const std::string& json, const Experiment& experiment,
-                   const ReportLogs& logs, std::vector<ReportPrediction> predictions, const Model& model,
-                   const std::vector<double>& values, const std::vector<Parameter>& parameters);
+// All logs replayed with each model as the experiment says (mode, window).
+std::vector<ReportPrediction> Predict(const Experiment& experiment, const ReportLogs& logs,
+                                      const std::vector<ReportModel>& models, ThreadPool& pool);
 
 }  // namespace gapscope::cli
 

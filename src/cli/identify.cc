@@ -1,12 +1,12 @@
 #include <fmt/core.h>
 
-#include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "src/cli/commands.h"
 #include "src/cli/session.h"
-#include "src/core/file.h"
 #include "src/report/identify_report.h"
+#include "src/report/write_run.h"
 
 namespace gapscope::cli {
 namespace {
@@ -22,6 +22,21 @@ struct IdentifyFlags {
   Method method = nullptr;
 };
 
+// One CSV per table of points beside the result.
+Status WriteIdentification(const std::string& out, const Identification& result, const nlohmann::ordered_json& json) {
+  constexpr int kDigits = 10;
+  std::vector<std::vector<std::vector<double>>> columns;  // that the tables point to
+  for (const auto& points : result.tables) columns.push_back(ColumnsOf(points));
+  RunFiles files;
+  for (std::size_t t = 0; t < columns.size(); ++t) {
+    RunTable table{.path = result.tables[t].name + ".csv", .columns = {}, .digits = kDigits};
+    for (std::size_t c = 0; c < columns[t].size(); ++c)
+      table.columns.push_back({result.tables[t].columns[c], columns[t][c]});
+    files.tables.push_back(std::move(table));
+  }
+  return WriteRun(out, json, files);
+}
+
 Result<int> RunIdentify(IdentifyFlags flags) {
   flags.options.rated_speed_rad_per_s = flags.rated_speed_rpm * 2 * std::numbers::pi / 60;
   if (!flags.hold_out.empty()) {
@@ -33,19 +48,14 @@ Result<int> RunIdentify(IdentifyFlags flags) {
   if (session.experiment.commands.empty())
     return Error{.what = "the experiment has no command", .where = flags.model.experiment, .cure = "add 'commands:'"};
   PrintFindings(session.recordings, flags.common.quiet);
-  GS_ASSIGN(const Identification result,
+  GS_ASSIGN(Identification result,
             flags.method({.model = *session.model, .values = session.values, .recordings = session.recordings},
                          flags.options));
-  if (!flags.common.out.empty()) {
-    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json",
-                                 IdentifyJson(result, session.recordings) + "\n"));
-    GS_RETURN_IF_ERROR(WritePoints(flags.common.out, result));
-  }
-  if (flags.common.json) {
-    fmt::print("{}\n", IdentifyJson(result, session.recordings));
-  } else {
-    fmt::print("{}", IdentifyTable(result));
-  }
+  IdentifyRun run{.info = {.seed = flags.common.seed}, .result = std::move(result), .logs = {}};
+  for (const auto& recording : session.recordings) run.logs.push_back(recording.log_path);
+  const nlohmann::ordered_json json = ToJson(run);
+  if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteIdentification(flags.common.out, run.result, json));
+  fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 

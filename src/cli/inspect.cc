@@ -1,14 +1,11 @@
 #include <fmt/core.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
 #include "src/cli/session.h"
-#include "src/core/file.h"
-#include "src/log/inspect_json.h"
 #include "src/report/inspect_report.h"
-#include "src/report/json.h"
+#include "src/report/write_run.h"
 
 namespace gapscope::cli {
 namespace {
@@ -42,20 +39,13 @@ Result<int> RunInspect(const InspectFlags& flags) {
   GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
   GS_ASSIGN(const auto recordings, LoadRecordings(experiment, flags.model.logs, pool));
-  std::vector<InspectReport> reports(recordings.size());
-  pool.ForEach(recordings.size(),
-               [&](std::size_t i, int) { reports[i] = InspectRecording(recordings[i], experiment); });
-  nlohmann::ordered_json json = {{"schema", "gapscope.inspect/1"}, {"logs", nlohmann::ordered_json::array()}};
-  for (std::size_t i = 0; i < reports.size(); ++i) json["logs"].push_back(ToJson(reports[i], recordings[i].log_path));
-  json["versions"] = JsonVersions();
-  if (!flags.common.out.empty())
-    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json", json.dump(2) + "\n"));
-  if (flags.common.json) {
-    fmt::print("{}\n", json.dump(2));
-  } else {
-    for (std::size_t i = 0; i < reports.size(); ++i)
-      fmt::print("{}{}", i > 0 ? "\n" : "", InspectTable(reports[i], recordings[i].log_path));
-  }
+  InspectRun run{.info = {}, .logs = std::vector<InspectRun::Log>(recordings.size())};
+  pool.ForEach(recordings.size(), [&](std::size_t i, int) {
+    run.logs[i] = {.log = recordings[i].log_path, .report = InspectRecording(recordings[i], experiment)};
+  });
+  const nlohmann::ordered_json json = ToJson(run);
+  if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteRun(flags.common.out, json));
+  fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 

@@ -4,15 +4,16 @@
 // shards need no order, no lock and no common state but the folder; a task that is there is not done again, and running
 // a shard twice, or on another number of machines, changes nothing.
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
+#include "src/report/read_run.h"
 #include "src/report/tune_report.h"
 #include "src/report/version.h"
 #include "src/tune/journal.h"
@@ -56,25 +57,8 @@ Result<std::uint64_t> TaskHash(const Session& session, const Recording& recordin
   return hash;
 }
 
-Status WriteAtOnce(const std::filesystem::path& path, const std::string& text) {
-  const std::filesystem::path part = path.string() + fmt::format(".{}.part", getpid());
-  GS_RETURN_IF_ERROR(WriteFile(part, text));
-  std::error_code failure;
-  std::filesystem::rename(part, path, failure);
-  if (failure) return Error{.what = "cannot write", .where = path.string(), .actual = failure.message()};
-  return Ok();
-}
-
-Result<ordered_json> ReadJson(const std::filesystem::path& path) {
-  GS_ASSIGN(const std::string text, ReadFile(path.string()));
-  ordered_json json = ordered_json::parse(text, nullptr, false);
-  if (json.is_discarded())
-    return Error{.what = "not JSON", .where = path.string(), .cure = "remove it and run its shard again"};
-  return json;
-}
-
 Result<ordered_json> ReadPlan(const std::filesystem::path& folder) {
-  GS_ASSIGN(ordered_json plan, ReadJson(folder / "plan.json"));
+  GS_ASSIGN(ordered_json plan, ReadJson((folder / "plan.json").string()));
   if (plan.value("schema", "") != kPlanSchema)
     return Error{.what = "not a plan",
                  .where = (folder / "plan.json").string(),
@@ -129,7 +113,7 @@ Result<int> RunPlan(const PlanFlags& flags) {
   std::filesystem::create_directories(out / "results", failure);
   if (failure)
     return Error{.what = "cannot make the folder", .where = (out / "results").string(), .actual = failure.message()};
-  GS_RETURN_IF_ERROR(WriteAtOnce(out / "plan.json", plan.dump(2) + "\n"));
+  GS_RETURN_IF_ERROR(WriteFile(out / "plan.json", plan.dump(2) + "\n"));
   if (flags.common.json) {
     fmt::print("{}\n", plan.dump(2));
   } else {
@@ -139,31 +123,21 @@ Result<int> RunPlan(const PlanFlags& flags) {
   return kDone;
 }
 
-// One log's fit as the text of its result file; nothing in it depends on when, where or how fast.
-std::string DoTask(const ordered_json& plan, const std::string& log, const std::string& task,
-                   const CommonFlags& common) {
-  const auto failed = [&](const Error& error) {
-    return ordered_json{{"log", log}, {"task", task}, {"error", error.Text()}}.dump(2);
-  };
-  auto loaded = LoadSession(ModelOf(plan, log), common);
-  if (!loaded.ok()) return failed(loaded.error());
-  Session& session = loaded.value();
-  const auto hash = TaskHash(session, session.recordings.front(), plan.at("options").dump());
-  if (!hash.ok()) return failed(hash.error());
-  if (Hex(hash.value()) != task)
-    return failed({.what = "the log, the experiment or the program has changed since the plan",
-                   .where = log,
-                   .cure = "write the plan again"});
+// One log's fit.
+Result<TuneRun> DoTask(const ordered_json& plan, const std::string& log, const std::string& task,
+                       const CommonFlags& common) {
+  GS_ASSIGN(Session session, LoadSession(ModelOf(plan, log), common));
+  GS_ASSIGN(const std::uint64_t hash, TaskHash(session, session.recordings.front(), plan.at("options").dump()));
+  if (Hex(hash) != task)
+    return Error{.what = "the log, the experiment or the program has changed since the plan",
+                 .where = log,
+                 .cure = "write the plan again"};
   TuneOptions options{.window_s = session.experiment.replay.window_s, .starts = plan.at("options").at("starts")};
   options.solve.seed = plan.at("options").at("seed");
   if (session.experiment.replay.mode == ReplayMode::kWindows) options.objective = Objective::kWindows;
-  auto tuned =
-      Tune(*session.model, SplitData(std::move(session.recordings), {}), session.values, options, *session.pool);
-  if (!tuned.ok()) return failed(tuned.error());
-  ordered_json result = ordered_json::parse(TuneJson(tuned.value(), *session.model, options.solve.seed));
-  result.erase("wall_s");
-  result.erase("solve_s");
-  return ordered_json{{"log", log}, {"task", task}, {"result", result}}.dump(2);
+  GS_ASSIGN(const TuneSummary tuned,
+            Tune(*session.model, SplitData(std::move(session.recordings), {}), session.values, options, *session.pool));
+  return TuneRunOf(tuned, *session.model, options.solve.seed);
 }
 
 Result<int> RunShard(const ShardFlags& flags) {
@@ -188,82 +162,131 @@ Result<int> RunShard(const ShardFlags& flags) {
       ++there;
       continue;
     }
-    const std::string text = DoTask(plan, log, task, flags.common);
-    GS_RETURN_IF_ERROR(WriteAtOnce(path, text + "\n"));
-    const bool failed = ordered_json::parse(text).contains("error");
-    failures += failed;
+    const auto fit = DoTask(plan, log, task, flags.common);
+    // Nothing in it depends on when, where or how fast it was made.
+    ordered_json file = {{"log", log}, {"task", task}};
+    if (fit.ok()) {
+      file["result"] = ToJson(fit.value(), Timing::kLeaveOut);
+    } else {
+      file["error"] = fit.error().Text();
+    }
+    GS_RETURN_IF_ERROR(WriteFile(path, file.dump(2) + "\n"));
+    failures += !fit.ok();
     ++done;
-    if (!flags.common.quiet) fmt::print(stderr, "{}: {}\n", log, failed ? "failed" : "done");
+    if (!flags.common.quiet) fmt::print(stderr, "{}: {}\n", log, fit.ok() ? "done" : "failed");
   }
   fmt::print(stderr, "shard {}: {} done ({} failed), {} were there\n", flags.shard, done, failures, there);
   return failures > 0 ? kBelowThreshold : kDone;
 }
 
-Result<int> RunMerge(const ShardFlags& flags) {
-  GS_ASSIGN(const ordered_json plan, ReadPlan(flags.folder));
-  ordered_json merged = {{"schema", "gapscope.merge/1"},    {"experiment", plan.at("experiment")},
-                         {"options", plan.at("options")},   {"parameters", ordered_json::array()},
-                         {"logs", ordered_json::array()},   {"failed", ordered_json::array()},
-                         {"missing", ordered_json::array()}};
-  std::vector<std::string> names;
-  std::map<std::string, std::vector<double>> values;  // of logs that know the parameter
-  std::map<std::string, std::string> units;
-  std::vector<double> held_out;
-  for (const auto& task : plan.at("tasks")) {
-    const std::filesystem::path path =
-        std::filesystem::path(flags.folder) / "results" / (task.at("task").get<std::string>() + ".json");
+// A plan's results together.
+struct MergeRun {
+  struct Log {
+    std::string log, task;
+    TuneRun fit;
+  };
+  struct Parameter {
+    std::string name, unit;
+    std::vector<double> values;  // of logs that know it, ascending
+  };
+  ordered_json plan;
+  std::vector<Log> logs;
+  std::vector<ordered_json> failed;  // as their tasks wrote them
+  std::vector<std::string> missing;  // logs
+  std::vector<Parameter> parameters;
+  std::vector<double> held_out;  // errors, ascending
+};
+
+double Quantile(const std::vector<double>& sorted, double q) {
+  return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1) + 0.5)];
+}
+
+// Fills in what the logs say together.
+void Gather(MergeRun* run) {
+  for (const auto& log : run->logs) {
+    if (std::isfinite(log.fit.error_held_out)) run->held_out.push_back(log.fit.error_held_out);
+    for (const auto& p : log.fit.parameters) {
+      auto known = std::find_if(run->parameters.begin(), run->parameters.end(),
+                                [&](const auto& other) { return other.name == p.name; });
+      if (known == run->parameters.end()) known = run->parameters.insert(known, {p.name, p.unit, {}});
+      if (p.identifiable) known->values.push_back(p.value);
+    }
+  }
+  std::sort(run->held_out.begin(), run->held_out.end());
+  for (auto& p : run->parameters) std::sort(p.values.begin(), p.values.end());
+}
+
+Result<MergeRun> ReadTasks(const std::filesystem::path& folder) {
+  MergeRun run;
+  GS_ASSIGN(run.plan, ReadPlan(folder));
+  for (const auto& task : run.plan.at("tasks")) {
+    const std::string path = folder / "results" / (task.at("task").get<std::string>() + ".json");
     const auto file = std::filesystem::exists(path) ? ReadJson(path) : Result<ordered_json>(Error{.what = "none"});
     if (!file.ok()) {
-      merged["missing"].push_back(task.at("log"));
+      run.missing.push_back(task.at("log"));
       continue;
     }
     const ordered_json& json = file.value();
     if (json.contains("error")) {
-      merged["failed"].push_back(json);
+      run.failed.push_back(json);
       continue;
     }
-    const auto& result = json.at("result");
-    merged["logs"].push_back({{"log", json.at("log")},
-                              {"task", json.at("task")},
-                              {"termination", result.at("termination")},
-                              {"error", result.at("error")},
-                              {"parameters", result.at("parameters")}});
-    if (result.at("error").at("held_out").is_number()) held_out.push_back(result.at("error").at("held_out"));
-    for (const auto& p : result.at("parameters")) {
-      const std::string name = p.at("name");
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-      units[name] = p.at("unit");
-      if (p.at("identifiable").get<bool>()) values[name].push_back(p.at("value"));
-    }
+    GS_ASSIGN(TuneRun fit, ReadTuneRun(json.value("result", ordered_json::object()), path));
+    run.logs.push_back({task.at("log"), task.at("task"), std::move(fit)});
   }
-  const auto quantile = [](std::vector<double>& sorted, double q) {
-    return sorted[static_cast<std::size_t>(q * static_cast<double>(sorted.size() - 1) + 0.5)];
-  };
+  Gather(&run);
+  return run;
+}
+
+ordered_json ToJson(const MergeRun& run) {
+  ordered_json merged = {{"schema", "gapscope.merge/1"},
+                         {"experiment", run.plan.at("experiment")},
+                         {"options", run.plan.at("options")},
+                         {"parameters", ordered_json::array()},
+                         {"logs", ordered_json::array()},
+                         {"failed", run.failed},
+                         {"missing", run.missing}};
+  for (const auto& [name, unit, values] : run.parameters) {
+    ordered_json entry = {{"name", name}, {"unit", unit}, {"logs", values.size()}};
+    if (!values.empty()) {
+      entry["p10"] = Quantile(values, 0.1);
+      entry["median"] = Quantile(values, 0.5);
+      entry["p90"] = Quantile(values, 0.9);
+    }
+    merged["parameters"].push_back(std::move(entry));
+  }
+  for (const auto& [log, task, fit] : run.logs) {
+    merged["logs"].push_back({{"log", log},
+                              {"task", task},
+                              {"termination", fit.termination},
+                              {"error", JsonErrors(fit)},
+                              {"parameters", JsonParameters(fit)}});
+  }
+  return merged;
+}
+
+std::string ToTable(const MergeRun& run) {
   std::string table =
       fmt::format("{:<44} {:>6} {:>12} {:>12} {:>12}  {}\n", "parameter", "logs", "10 %", "median", "90 %", "unit");
-  for (const auto& name : names) {
-    auto& known = values[name];
-    std::sort(known.begin(), known.end());
-    ordered_json entry = {{"name", name}, {"unit", units[name]}, {"logs", known.size()}};
-    if (!known.empty()) {
-      entry["p10"] = quantile(known, 0.1), entry["median"] = quantile(known, 0.5), entry["p90"] = quantile(known, 0.9);
-      table += fmt::format("{:<44} {:>6} {:>12.4g} {:>12.4g} {:>12.4g}  {}\n", name, known.size(), quantile(known, 0.1),
-                           quantile(known, 0.5), quantile(known, 0.9), units[name]);
-    } else {
-      table += fmt::format("{:<44} {:>6} {:>12}\n", name, 0, "not known");
-    }
-    merged["parameters"].push_back(entry);
+  for (const auto& [name, unit, values] : run.parameters) {
+    table += values.empty() ? fmt::format("{:<44} {:>6} {:>12}\n", name, 0, "not known")
+                            : fmt::format("{:<44} {:>6} {:>12.4g} {:>12.4g} {:>12.4g}  {}\n", name, values.size(),
+                                          Quantile(values, 0.1), Quantile(values, 0.5), Quantile(values, 0.9), unit);
   }
-  std::sort(held_out.begin(), held_out.end());
-  if (!held_out.empty())
-    table +=
-        fmt::format("held-out error: median {:.4g}, 90 % {:.4g}\n", quantile(held_out, 0.5), quantile(held_out, 0.9));
-  table += fmt::format("{} logs merged, {} failed, {} missing\n", merged["logs"].size(), merged["failed"].size(),
-                       merged["missing"].size());
-  const bool whole = merged["failed"].empty() && merged["missing"].empty();
-  GS_RETURN_IF_ERROR(WriteAtOnce(std::filesystem::path(flags.folder) / "merged.json", merged.dump(2) + "\n"));
-  fmt::print("{}", flags.common.json ? merged.dump(2) + "\n" : table);
-  return whole ? kDone : kBelowThreshold;
+  if (!run.held_out.empty())
+    table += fmt::format("held-out error: median {:.4g}, 90 % {:.4g}\n", Quantile(run.held_out, 0.5),
+                         Quantile(run.held_out, 0.9));
+  return table +
+         fmt::format("{} logs merged, {} failed, {} missing\n", run.logs.size(), run.failed.size(), run.missing.size());
+}
+
+Result<int> RunMerge(const ShardFlags& flags) {
+  const std::filesystem::path folder = flags.folder;
+  GS_ASSIGN(const MergeRun run, ReadTasks(folder));
+  const std::string json = ToJson(run).dump(2) + "\n";
+  GS_RETURN_IF_ERROR(WriteFile(folder / "merged.json", json));
+  fmt::print("{}", flags.common.json ? json : ToTable(run));
+  return run.failed.empty() && run.missing.empty() ? kDone : kBelowThreshold;
 }
 
 }  // namespace

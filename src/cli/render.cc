@@ -7,12 +7,13 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/report/html_report.h"
-#include "src/report/json.h"
+#include "src/report/render_report.h"
 #include "src/video/video.h"
 
 namespace gapscope::cli {
@@ -89,25 +90,22 @@ Result<std::vector<VideoModel>> ModelsOf(const RenderFlags& flags, const Session
   return models;
 }
 
-std::string SummaryJson(const RenderFlags& flags, const std::vector<VideoModel>& models, const VideoOptions& options,
-                        const VideoSummary& summary) {
-  nlohmann::ordered_json json = {{"schema", "gapscope.render/1"},
-                                 {"out", flags.out},
-                                 {"log", flags.log},
-                                 {"frames", summary.frames},
-                                 {"width", options.width},
-                                 {"height", options.height},
-                                 {"frames_per_s", options.frames_per_s},
-                                 {"first_s", summary.first_s},
-                                 {"last_s", summary.last_s},
-                                 {"video_s", summary.length_s},
-                                 {"models", nlohmann::ordered_json::array()},
-                                 {"gl", GlBackendName(summary.gl)},
-                                 {"wall_s", summary.wall_s},
-                                 {"versions", JsonVersions()}};
-  for (std::size_t m = 0; m < models.size(); ++m)
-    json["models"].push_back({{"label", models[m].label}, {"error", JsonNumber(summary.errors[m])}});
-  return json.dump(2);
+RenderRun RunOf(const RenderFlags& flags, const std::vector<VideoModel>& models, const VideoOptions& options,
+                const VideoSummary& summary) {
+  RenderRun run{.info = {.seed = flags.common.seed},
+                .out = flags.out,
+                .log = flags.log,
+                .frames = summary.frames,
+                .width = options.width,
+                .height = options.height,
+                .frames_per_s = options.frames_per_s,
+                .first_s = summary.first_s,
+                .last_s = summary.last_s,
+                .video_s = summary.length_s,
+                .gl = GlBackendName(summary.gl),
+                .wall_s = summary.wall_s};
+  for (std::size_t m = 0; m < models.size(); ++m) run.models.push_back({models[m].label, summary.errors[m]});
+  return run;
 }
 
 Result<int> RunRender(RenderFlags flags) {
@@ -143,27 +141,15 @@ Result<int> RunRender(RenderFlags flags) {
   if (live) fmt::print(stderr, "\r\033[K");
   if (!rendered.ok()) return rendered.error();
   const VideoSummary& summary = rendered.value();
+  RenderRun run = RunOf(flags, models, options, summary);
   const std::filesystem::path out = flags.out;
-  bool shown = false;
   if (out.extension() == ".mp4") {
-    GS_ASSIGN(shown, AttachVideo((out.parent_path() / "report.html").string(), out.filename().string()));
+    const std::string report = (out.parent_path() / "report.html").string();
+    GS_ASSIGN(const bool shown, AttachVideo(report, out.filename().string()));
+    if (shown) run.shown_in = report;
   }
   if (!flags.common.quiet && !summary.note.empty()) fmt::print(stderr, "gapscope: {}\n", summary.note);
-  if (flags.common.json) {
-    fmt::print("{}\n", SummaryJson(flags, models, options, summary));
-    return kDone;
-  }
-  fmt::print("{}\n", flags.out);
-  if (shown) fmt::print("  shown in {}\n", (out.parent_path() / "report.html").string());
-  for (std::size_t m = 0; m < models.size(); ++m)
-    fmt::print("  {:<32} error {:.4g}\n", models[m].label, summary.errors[m]);
-  if (summary.length_s > 0) {
-    fmt::print("  {} frames of {}x{}, {:.2f} s of video for {:.2f} s of the log; {:.1f} s to make ({})\n",
-               summary.frames, options.width, options.height, summary.length_s, summary.last_s - summary.first_s,
-               summary.wall_s, GlBackendName(summary.gl));
-  } else {
-    fmt::print("  {}x{} at {:.3f} s of the log\n", options.width, options.height, summary.first_s);
-  }
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 

@@ -1,15 +1,13 @@
 #include <fmt/core.h>
 
-#include <filesystem>
-#include <limits>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
-#include "src/core/file.h"
-#include "src/report/closed_loop_report.h"
 #include "src/report/replay_report.h"
+#include "src/report/write_run.h"
 #include "src/tune/tune.h"
 
 namespace gapscope::cli {
@@ -23,9 +21,7 @@ struct ReplayFlags {
   bool nuisances = false;
 };
 
-Result<int> RunReplay(const ReplayFlags& flags) {
-  GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
-  PrintFindings(session.recordings, flags.common.quiet);
+ReplayOptions OptionsOf(const ReplayFlags& flags, const Session& session) {
   ReplayOptions options{.mode = session.experiment.replay.mode,
                         .window_s = session.experiment.replay.window_s,
                         .time_step_s = flags.time_step_s,
@@ -34,80 +30,88 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   if (flags.mode == "windows") options.mode = ReplayMode::kWindows;
   if (flags.mode == "closed_loop") options.mode = ReplayMode::kClosedLoop;
   if (flags.window_s > 0) options.window_s = flags.window_s;
+  return options;
+}
+
+// Without a controller nothing is sent.
+Result<ClosedLoopResult> ReplayLogs(const Model& model, const Session& session, const ReplayOptions& options,
+                                    const std::optional<ControllerSpec>& controller) {
+  if (controller) return ReplayClosedLoop(model, session.recordings, *controller, options, *session.pool);
+  return ClosedLoopResult{.result = Replay(model, session.recordings, options, *session.pool), .sent = {}};
+}
+
+// The other way of looking at the same logs: local error in windows against accumulated error in a free run.
+double OtherError(const Session& session, ReplayOptions options, double time_step_s) {
+  options.mode = options.mode == ReplayMode::kWindows ? ReplayMode::kFreeRun : ReplayMode::kWindows;
+  options.time_step_s = time_step_s;
+  return ReplayError(Replay(*session.model, session.recordings, options, *session.pool).logs);
+}
+
+// What the effects and values given here are worth: the nominal model's replay beside theirs. Empty: none are given.
+Result<std::vector<LogReplay>> ReplayNominal(const Session& session, ReplayOptions options,
+                                             const std::optional<ControllerSpec>& controller) {
+  GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
+  options.values = nominal->Nominal();
+  if (session.model->effects().empty() && session.values == options.values) return std::vector<LogReplay>{};
+  GS_ASSIGN(ClosedLoopResult replayed, ReplayLogs(*nominal, session, options, controller));
+  return std::move(replayed.result.logs);
+}
+
+Status WriteReplay(const std::string& out, const Session& session, const ReplayRun& run, std::vector<RunTable> sent,
+                   std::vector<LogReplay> nominal) {
+  RunFiles files{.tables = TraceTables(run.result.logs, session.recordings)};
+  std::move(sent.begin(), sent.end(), std::back_inserter(files.tables));
+  GS_ASSIGN(files.model_xml, session.model->ToXml(session.values, session.recordings.front().values, session.scales));
+  const std::vector<Recording> none;
+  ReportSource source = SourceOf(session.experiment, {session.recordings, none});
+  const bool changed = !nominal.empty();
+  if (changed) source.predictions.push_back({"nominal", std::move(nominal)});
+  source.predictions.push_back({changed ? "with what was added" : "nominal", run.result.logs});
+  source.model = session.model.get();
+  source.values = session.values;
+  source.parameters = session.model->parameters();
+  files.report = &source;
+  return WriteRun(out, ToJson(run), files);
+}
+
+Result<int> RunReplay(const ReplayFlags& flags) {
+  GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
+  PrintFindings(session.recordings, flags.common.quiet);
+  const ReplayOptions options = OptionsOf(flags, session);
   std::optional<ControllerSpec> controller;
-  ClosedLoopResult closed;
   if (options.mode == ReplayMode::kClosedLoop) {
     if (flags.nuisances)
       return Error{.what = "in a closed loop nothing is fitted",
                    .where = "--nuisances",
                    .cure = "leave it out, or replay in windows"};
     GS_ASSIGN(controller, LoadController(session.experiment));
-    GS_ASSIGN(closed, ReplayClosedLoop(*session.model, session.recordings, *controller, options, *session.pool));
   }
-  ReplayResult result = controller ? closed.result : Replay(*session.model, session.recordings, options, *session.pool);
+  GS_ASSIGN(ClosedLoopResult replayed, ReplayLogs(*session.model, session, options, controller));
+  ReplayResult& result = replayed.result;
   if (flags.nuisances) {
     const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
     result.logs =
         Evaluate(*session.model, session.recordings, session.values, std::nullopt, options.mode, fit, *session.pool);
   }
-  const Comparison comparison = Compare(result, session.recordings, *session.pool);
-  // The other way of looking at the same logs: local error in windows against accumulated error in a free run.
-  ReplayOptions other = options;
-  other.mode = options.mode == ReplayMode::kWindows ? ReplayMode::kFreeRun : ReplayMode::kWindows;
-  other.time_step_s = result.time_step_s;
-  const double other_error = ReplayError(Replay(*session.model, session.recordings, other, *session.pool).logs);
-  // What the effects and values given here are worth: the nominal model beside them.
-  GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
-  const bool changed = !session.model->effects().empty() || session.values != nominal->Nominal();
-  std::vector<LogReplay> before;
-  if (changed) {
-    ReplayOptions nominal_options = options;
-    nominal_options.values = nominal->Nominal();
-    if (controller) {
-      GS_ASSIGN(auto nominal_loop,
-                ReplayClosedLoop(*nominal, session.recordings, *controller, nominal_options, *session.pool));
-      before = std::move(nominal_loop.result.logs);
-    } else {
-      before = Replay(*nominal, session.recordings, nominal_options, *session.pool).logs;
-    }
-  }
-  const ReplayReport report{.result = result,
-                            .comparison = comparison,
-                            .model = *session.model,
-                            .values = session.values,
-                            .seed = flags.common.seed,
-                            .other_error = other_error,
-                            .nominal_error = changed ? ReplayError(before) : std::numeric_limits<double>::quiet_NaN()};
+  std::optional<LoopStatistics> loop;
+  if (controller) loop = LoopStatisticsOf(replayed, session.recordings, *controller);
+  Comparison comparison = Compare(result, session.recordings, *session.pool);
+  ReplayRun run = ReplayRunOf(*session.model, session.values, std::move(result), std::move(comparison));
+  run.info.seed = flags.common.seed;
+  run.other_error = OtherError(session, options, run.result.time_step_s);
+  run.loop = std::move(loop);
+  GS_ASSIGN(std::vector<LogReplay> nominal, ReplayNominal(session, options, controller));
+  if (!nominal.empty()) run.nominal_error = ReplayError(nominal);
   if (!flags.common.out.empty()) {
-    const std::filesystem::path out = flags.common.out;
-    GS_RETURN_IF_ERROR(WriteFile(out / "result.json", ReplayJson(report) + "\n"));
-    GS_RETURN_IF_ERROR(WriteTraces(out / "traces", result, session.recordings));
-    GS_ASSIGN(const std::string xml,
-              session.model->ToXml(session.values, session.recordings.front().values, session.scales));
-    GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
-    std::vector<ReportPrediction> predictions;
-    if (changed) predictions.push_back({"nominal", std::move(before)});
-    predictions.push_back({changed ? "with what was added" : "nominal", result.logs});
-    GS_RETURN_IF_ERROR(WriteReport(out, ReplayJson(report), session.experiment, {session.recordings, {}},
-                                   std::move(predictions), *session.model, session.values,
-                                   session.model->parameters()));
+    std::vector<RunTable> sent;
+    if (controller) sent = SentTables(run.result.logs, replayed.sent, session.recordings, *controller);
+    GS_RETURN_IF_ERROR(WriteReplay(flags.common.out, session, run, std::move(sent), std::move(nominal)));
   }
-  const std::string json =
-      controller ? WithStatistics(ReplayJson(report), closed, session.recordings, *controller) : ReplayJson(report);
-  if (controller && !flags.common.out.empty()) {
-    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(flags.common.out) / "result.json", json + "\n"));
-    GS_RETURN_IF_ERROR(
-        WriteSent(std::filesystem::path(flags.common.out) / "closed_loop", closed, session.recordings, *controller));
-  }
-  if (flags.common.json) {
-    fmt::print("{}\n", json);
-  } else {
-    fmt::print("{}", ReplayTable(report, ConsoleOf(1)));
-    if (controller) fmt::print("{}", StatisticsTable(closed, session.recordings, *controller));
-  }
-  if (flags.fail_above > 0 && !(comparison.error <= flags.fail_above)) {
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run, ConsoleOf(1)));
+  const double error = run.comparison.error;
+  if (flags.fail_above > 0 && !(error <= flags.fail_above)) {
     if (!flags.common.quiet)
-      fmt::print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", comparison.error, flags.fail_above);
+      fmt::print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", error, flags.fail_above);
     return kBelowThreshold;
   }
   return kDone;

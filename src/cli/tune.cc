@@ -3,14 +3,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
-#include "src/core/file.h"
-#include "src/report/replay_report.h"
 #include "src/report/tune_report.h"
+#include "src/report/write_run.h"
 
 namespace gapscope::cli {
 namespace {
@@ -29,24 +29,44 @@ struct TuneFlags {
 const std::vector<std::string> kActuatorEffects = {"command_delay", "actuator_lag", "torque_speed_curve",
                                                    "load_friction"};
 
-Result<int> RunTune(TuneFlags flags) {
-  GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
-  ModelFlags model = flags.model;
-  model.logs = logs.all;
-  if (flags.actuator) {
-    GS_ASSIGN(const Session base, LoadSession(model, flags.common));
-    GS_ASSIGN(const auto possible, base.model->PossibleEffects());
-    for (const auto& name : kActuatorEffects) {
-      const auto found =
-          std::find_if(possible.begin(), possible.end(), [&](const EffectUse& use) { return use.effect == name; });
-      if (found != possible.end()) model.with.push_back(found->Text());
-    }
-    const auto coulomb = std::find_if(possible.begin(), possible.end(),
-                                      [&](const EffectUse& use) { return use.effect == "coulomb_friction"; });
-    if (coulomb != possible.end()) model.with.push_back(coulomb->Text());
+// The model that --actuator asks for: with those stages, and with dry friction, where they make sense.
+Status AddActuatorEffects(const TuneFlags& flags, ModelFlags* model) {
+  GS_ASSIGN(const Session base, LoadSession(*model, flags.common));
+  GS_ASSIGN(const auto possible, base.model->PossibleEffects());
+  std::vector<std::string> names = kActuatorEffects;
+  names.push_back("coulomb_friction");
+  for (const auto& name : names) {
+    const auto found =
+        std::find_if(possible.begin(), possible.end(), [&](const EffectUse& use) { return use.effect == name; });
+    if (found != possible.end()) model->with.push_back(found->Text());
   }
-  GS_ASSIGN(Session session, LoadSession(model, flags.common));
-  PrintFindings(session.recordings, flags.common.quiet);
+  return Ok();
+}
+
+// Indices of the parameters that are tuned.
+Result<std::vector<int>> FreeParameters(const TuneFlags& flags, const Session& session) {
+  std::set<int> free;
+  for (std::size_t i = 0; i < session.model->parameters().size(); ++i) {
+    const Parameter& p = session.model->parameters()[i];
+    if (!p.frozen && p.low < p.high) free.insert(static_cast<int>(i));
+  }
+  for (const auto& name : flags.free) {
+    GS_ASSIGN(const int index, session.model->Find(name, "--free"));
+    const Parameter& p = session.model->parameters()[index];
+    if (!(p.low < p.high))
+      return Error{.what = "the parameter '" + name + "' has no bounds to tune in",
+                   .where = "--free",
+                   .cure = "give it 'bounds' in " + session.experiment.path};
+    free.insert(index);
+  }
+  for (const auto& name : flags.freeze) {
+    GS_ASSIGN(const int index, session.model->Find(name, "--freeze"));
+    free.erase(index);
+  }
+  return std::vector<int>(free.begin(), free.end());
+}
+
+Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
   TuneOptions options{.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s,
                       .huber = flags.huber,
                       .time_step_s = flags.time_step_s,
@@ -68,65 +88,64 @@ Result<int> RunTune(TuneFlags flags) {
     if (nuisance == "shift") options.fit_shift = false;
     if (nuisance == "state") options.fit_states = false;
   }
-  std::set<int> free;
-  for (std::size_t i = 0; i < session.model->parameters().size(); ++i) {
-    const Parameter& p = session.model->parameters()[i];
-    if (!p.frozen && p.low < p.high) free.insert(static_cast<int>(i));
-  }
-  for (const auto& name : flags.free) {
-    GS_ASSIGN(const int index, session.model->Find(name, "--free"));
-    const Parameter& p = session.model->parameters()[index];
-    if (!(p.low < p.high))
-      return Error{.what = "the parameter '" + name + "' has no bounds to tune in",
-                   .where = "--free",
-                   .cure = "give it 'bounds' in " + session.experiment.path};
-    free.insert(index);
-  }
-  for (const auto& name : flags.freeze) {
-    GS_ASSIGN(const int index, session.model->Find(name, "--freeze"));
-    free.erase(index);
-  }
-  options.free.assign(free.begin(), free.end());
+  GS_ASSIGN(options.free, FreeParameters(flags, session));
   if (flags.budget_s > 0)
     options.solve.deadline =
         std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<long long>(1e6 * flags.budget_s));
-  const std::filesystem::path out = flags.common.out;
-  if (!flags.common.out.empty()) options.journal = out / "journal.bin";
+  if (!flags.common.out.empty()) options.journal = std::filesystem::path(flags.common.out) / "journal.bin";
   if (flags.resume && flags.common.out.empty())
     return Error{
         .what = "nothing to resume from", .where = "--resume", .cure = "name the interrupted run's folder with --out"};
+  return options;
+}
+
+// A line on stderr that is written over.
+void ShowProgress(double budget_s, TuneOptions* options) {
+  options->solve.progress = [begin = std::chrono::steady_clock::now(), budget_s](const Progress& p) {
+    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    fmt::print(stderr, "\r\033[Kcost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, elapsed,
+               budget_s > 0 ? fmt::format(" of {:.0f} s", budget_s) : "");
+  };
+}
+
+Status WriteTune(const std::string& out, const Session& session, const DataSplit& data, const TuneOptions& options,
+                 const TuneSummary& summary, const TuneRun& run) {
+  RunFiles files{.tables = TraceTables(summary.held_out, data.held_out)};
+  GS_ASSIGN(files.model_xml, session.model->ToXml(summary.values, data.train.front().values, session.scales));
+  ReportSource source = SourceOf(session.experiment, {data.train, data.held_out});
+  const auto nominal = [&](const std::vector<Recording>& recordings) {
+    return Evaluate(*session.model, recordings, session.values, 0, session.experiment.replay.mode, options,
+                    *session.pool);
+  };
+  source.predictions = {{"nominal", nominal(data.train)}, {"tuned", summary.train}};
+  std::vector<LogReplay>&before = source.predictions[0].logs, &after = source.predictions[1].logs;
+  std::ranges::move(nominal(data.held_out), std::back_inserter(before));
+  after.insert(after.end(), summary.held_out.begin(), summary.held_out.end());
+  source.model = session.model.get();
+  source.values = session.values;
+  source.parameters = session.model->parameters();
+  files.report = &source;
+  return WriteRun(out, ToJson(run), files);
+}
+
+Result<int> RunTune(const TuneFlags& flags) {
+  GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
+  ModelFlags model = flags.model;
+  model.logs = logs.all;
+  if (flags.actuator) GS_RETURN_IF_ERROR(AddActuatorEffects(flags, &model));
+  GS_ASSIGN(Session session, LoadSession(model, flags.common));
+  PrintFindings(session.recordings, flags.common.quiet);
+  GS_ASSIGN(TuneOptions options, OptionsOf(flags, session));
   const bool live = !flags.common.quiet && isatty(2);
-  if (live) {
-    options.solve.progress = [begin = std::chrono::steady_clock::now(), budget = flags.budget_s](const Progress& p) {
-      const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      fmt::print(stderr, "\r\033[Kcost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, elapsed,
-                 budget > 0 ? fmt::format(" of {:.0f} s", budget) : "");
-    };
-  }
+  if (live) ShowProgress(flags.budget_s, &options);
   const DataSplit data = SplitData(std::move(session.recordings), logs.held_out);
-  auto tuned = Tune(*session.model, data, session.values, options, *session.pool);
+  const auto tuned = Tune(*session.model, data, session.values, options, *session.pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!tuned.ok()) return tuned.error();
-  const TuneSummary& summary = tuned.value();
-  const std::string json = TuneJson(summary, *session.model, flags.common.seed);
-  if (!flags.common.out.empty()) {
-    GS_ASSIGN(const std::string xml, session.model->ToXml(summary.values, data.train.front().values, session.scales));
-    GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", xml));
-    GS_RETURN_IF_ERROR(WriteTraces(out / "traces", {.logs = summary.held_out}, data.held_out));
-    GS_RETURN_IF_ERROR(WriteFile(out / "result.json", json + "\n"));
-    std::vector<ReportPrediction> predictions = {
-        {"nominal", Evaluate(*session.model, data.train, session.values, 0, session.experiment.replay.mode, options,
-                             *session.pool)},
-        {"tuned", summary.train}};
-    for (auto& log : Evaluate(*session.model, data.held_out, session.values, 0, session.experiment.replay.mode, options,
-                              *session.pool))
-      predictions[0].logs.push_back(std::move(log));
-    predictions[1].logs.insert(predictions[1].logs.end(), summary.held_out.begin(), summary.held_out.end());
-    GS_RETURN_IF_ERROR(WriteReport(out, json, session.experiment, {data.train, data.held_out}, std::move(predictions),
-                                   *session.model, session.values, session.model->parameters()));
-  }
-  fmt::print("{}{}", flags.common.json ? json : TuneTable(summary, *session.model, ConsoleOf(1)),
-             flags.common.json ? "\n" : "");
+  const TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
+  if (!flags.common.out.empty())
+    GS_RETURN_IF_ERROR(WriteTune(flags.common.out, session, data, options, tuned.value(), run));
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run, ConsoleOf(1)));
   return kDone;
 }
 

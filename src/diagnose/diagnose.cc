@@ -135,13 +135,17 @@ Result<std::vector<FoundEffect>> DescribeEffects(const SearchResult& found, cons
   return effects;
 }
 
+Explanation ExplanationOf(const Candidate& c) {
+  return c.effects.empty() ? Explanation{} : Explanation(c.effects.front());
+}
+
 // Every effect that was tried, and why it was or was not accepted.
 std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const Judgement& judgement) {
   std::vector<CandidateReport> reports;
-  std::set<std::string> named;
+  std::set<EffectUse> named;
   for (std::size_t i = 0; i < judgement.explanations.size(); ++i) {
     const Candidate& c = *judgement.explanations[i];
-    CandidateReport report{.name = c.Name(),
+    CandidateReport report{.effect = ExplanationOf(c),
                            .probability = judgement.probabilities[i],
                            .held_out_error = c.held_out_error,
                            .refitted = true,
@@ -152,13 +156,13 @@ std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const
       if (!c.effects.empty() && s.use == c.effects.front())
         report.screen_drop = s.trial.drop, report.absorbed = s.trial.absorbed;
     }
-    named.insert(report.name);
+    if (report.effect) named.insert(*report.effect);
     reports.push_back(std::move(report));
   }
   for (const auto& s : found.first.screen) {
-    if (named.contains(s.use.Text())) continue;
+    if (named.contains(s.use)) continue;
     reports.push_back(
-        {.name = s.use.Text(),
+        {.effect = s.use,
          .held_out_error = kNan,
          .screen_drop = s.trial.drop,
          .absorbed = s.trial.absorbed,
@@ -177,7 +181,7 @@ std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const
 std::vector<CandidateReport> DescribeSeconds(const SearchResult& found) {
   std::vector<CandidateReport> reports;
   for (const auto& s : found.second.screen) {
-    CandidateReport report{.name = s.use.Text(),
+    CandidateReport report{.effect = s.use,
                            .held_out_error = kNan,
                            .screen_drop = s.trial.drop,
                            .absorbed = s.trial.absorbed,
@@ -200,17 +204,17 @@ std::vector<CandidateReport> DescribeSeconds(const SearchResult& found) {
 
 // The experiment that tells the leader from its nearest rival.
 void SuggestNext(const SearchResult& found, const std::string& experiment, Diagnosis* result) {
-  std::vector<std::string> rivals;
-  if (found.single != found.base.get()) rivals.push_back(found.single->Name());
+  std::vector<Explanation> rivals;
+  if (found.single != found.base.get()) rivals.push_back(ExplanationOf(*found.single));
   for (const auto& child : found.first.children) {
     if (rivals.size() < 2 && child.get() != found.single && !Contains(*child, *found.single) &&
         !Contains(*found.single, *child))
-      rivals.push_back(child->Name());
+      rivals.push_back(ExplanationOf(*child));
   }
   if (rivals.empty()) return;
   result->next_command = "gapscope design optimal " + experiment;
-  for (const auto& name : rivals) result->next_command += " --separate " + name;
-  if (rivals.size() < 2) rivals.push_back("none");
+  for (const auto& rival : rivals) result->next_command += " --separate " + NameOf(rival);
+  if (rivals.size() < 2) rivals.push_back({});
   result->next_separates = rivals;
 }
 
@@ -232,11 +236,7 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   GS_ASSIGN(result.effects, DescribeEffects(found, judgement, bench.scales));
   // Of what an `unknown` accepted too.
   if (result.verdict == Verdict::kAmbiguous || result.verdict == Verdict::kUnknown) {
-    for (const auto& group : judgement.groups) {
-      std::vector<std::string> names;
-      for (const EffectUse& use : group) names.push_back(use.Text());
-      result.ambiguous.push_back(std::move(names));
-    }
+    result.ambiguous = judgement.groups;
   }
   result.candidates = DescribeCandidates(found, judgement);
   result.seconds = DescribeSeconds(found);
@@ -253,6 +253,8 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
 }
 
 }  // namespace
+
+std::string NameOf(const Explanation& explanation) { return explanation ? explanation->Text() : "none"; }
 
 std::string VerdictName(Verdict verdict) {
   switch (verdict) {

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 #define GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,9 +30,13 @@ struct FoundEffect {
   double share_of_gap = 0;                   // averaged over the order of adding
 };
 
-// An effect that was tried, or "none".
+// What may explain the logs alone: an effect, or nothing but the base model.
+using Explanation = std::optional<EffectUse>;
+std::string NameOf(const Explanation& explanation);  // "cable_spring@arm", "none"
+
+// An explanation that was tried.
 struct CandidateReport {
-  std::string name;           // "cable_spring@arm"
+  Explanation effect;
   double probability = 0;     // over single explanations; adds up to one
   double held_out_error = 0;  // normalised; NaN: not refitted
   double screen_drop = 0;     // share of the baseline's cost that the score test promises
@@ -60,7 +65,7 @@ struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   double probability = 0;
   std::vector<FoundEffect> effects;
-  std::vector<std::vector<std::string>> ambiguous;
+  std::vector<std::vector<EffectUse>> ambiguous;  // groups that these logs cannot tell apart
   // Held-out errors, normalised: see ReplayError; in windows.
   double nominal = 0, refit = 0, final = 0, floor = 0, closed = 0;
   VerdictEvidence evidence;
@@ -70,7 +75,7 @@ struct Diagnosis {
   std::vector<CandidateReport>
       seconds;  // tried beside the first effect, the most promising by the score test first; without probabilities
   std::string next_command;
-  std::vector<std::string> next_separates;
+  std::vector<Explanation> next_separates;
   std::vector<std::string> train_logs, held_out_logs;
   std::string split, explanation;
   double wall_s = 0;

@@ -76,8 +76,8 @@ std::string Explain(const Diagnosis& d) {
         text += " But these logs cannot tell";
         for (std::size_t g = 0; g < d.ambiguous.size(); ++g) {
           const auto& group = d.ambiguous[g];
-          text += (g ? ", nor " : " ") + group.front() + " from";
-          for (std::size_t i = 1; i < group.size(); ++i) text += (i > 1 ? " or " : " ") + group[i];
+          text += (g ? ", nor " : " ") + group.front().Text() + " from";
+          for (std::size_t i = 1; i < group.size(); ++i) text += (i > 1 ? " or " : " ") + group[i].Text();
         }
         text += ": what each leaves unexplained is the same.";
       }

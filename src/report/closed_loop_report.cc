@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <set>
+#include <nlohmann/json.hpp>
 
-#include "src/core/file.h"
 #include "src/report/json.h"
 
 namespace gapscope {
@@ -30,15 +29,40 @@ ordered_json Json(const MotionStatistics& s) {
 
 }  // namespace
 
-std::string StatisticsTable(const ClosedLoopResult& closed, const std::vector<Recording>& recordings,
-                            const ControllerSpec& spec) {
+LoopStatistics LoopStatisticsOf(const ClosedLoopResult& closed, const std::vector<Recording>& recordings,
+                                const ControllerSpec& spec) {
+  LoopStatistics loop{.actuator = spec.actuator, .logs = {}};
+  for (std::size_t l = 0; l < closed.result.logs.size(); ++l) {
+    const LogReplay& replay = closed.result.logs[l];
+    LoopStatistics::Log log{.signals = {}, .logged = {}, .sent = StatisticsOf(replay.time_s, closed.sent[l])};
+    for (const auto& trace : replay.signals) {
+      log.signals.push_back({.signal = trace.signal,
+                             .measured = StatisticsOf(replay.time_s, trace.measured),
+                             .predicted = StatisticsOf(replay.time_s, trace.predicted)});
+    }
+    if (const auto* logged = Logged(recordings[l], spec)) log.logged = StatisticsOf(replay.time_s, *logged);
+    loop.logs.push_back(std::move(log));
+  }
+  return loop;
+}
+
+ordered_json ToJson(const LoopStatistics::Log& log, const std::string& actuator) {
+  ordered_json statistics = ordered_json::object();
+  for (const auto& signal : log.signals)
+    statistics[signal.signal] = {{"measured", Json(signal.measured)}, {"predicted", Json(signal.predicted)}};
+  ordered_json command = {{"predicted", Json(log.sent)}};
+  if (log.logged) command["measured"] = Json(*log.logged);
+  statistics["command " + actuator] = std::move(command);
+  return statistics;
+}
+
+std::string ToTable(const LoopStatistics& loop, const std::vector<std::string>& log_paths) {
   std::string text = fmt::format("\n{:<37} {:<18} {:>10} {:>10} {:>19} {:>8}\n", "statistics", "", "mean", "deviation",
                                  "95 % between", "turns/s");
-  for (std::size_t l = 0; l < closed.result.logs.size(); ++l) {
-    const LogReplay& log = closed.result.logs[l];
-    std::string name = std::filesystem::path(log.log_path).filename().string();
-    const auto line = [&](const std::string& what, const std::vector<double>& values) {
-      const MotionStatistics s = StatisticsOf(log.time_s, values);
+  for (std::size_t l = 0; l < loop.logs.size(); ++l) {
+    const LoopStatistics::Log& log = loop.logs[l];
+    std::string name = std::filesystem::path(log_paths[l]).filename().string();
+    const auto line = [&](const std::string& what, const MotionStatistics& s) {
       text += fmt::format("{:<37} {:<18} {:>10.4g} {:>10.4g} {:>9.4g} {:>9.4g} {:>8.3g}\n", name, what, s.mean,
                           s.deviation, s.low, s.high, s.crossings_hz);
       name.clear();
@@ -47,46 +71,27 @@ std::string StatisticsTable(const ClosedLoopResult& closed, const std::vector<Re
       line(signal.signal, signal.measured);
       line("  in the loop", signal.predicted);
     }
-    if (const auto* logged = Logged(recordings[l], spec)) line(spec.actuator + " command", *logged);
-    line("  in the loop", closed.sent[l]);
+    if (log.logged) line(loop.actuator + " command", *log.logged);
+    line("  in the loop", log.sent);
   }
   return text;
 }
 
-std::string WithStatistics(const std::string& replay_json, const ClosedLoopResult& closed,
-                           const std::vector<Recording>& recordings, const ControllerSpec& spec) {
-  ordered_json json = ordered_json::parse(replay_json);
-  for (std::size_t l = 0; l < closed.result.logs.size(); ++l) {
-    const LogReplay& log = closed.result.logs[l];
-    ordered_json statistics = ordered_json::object();
-    for (const auto& signal : log.signals)
-      statistics[signal.signal] = {{"measured", Json(StatisticsOf(log.time_s, signal.measured))},
-                                   {"predicted", Json(StatisticsOf(log.time_s, signal.predicted))}};
-    ordered_json command = {{"predicted", Json(StatisticsOf(log.time_s, closed.sent[l]))}};
-    if (const auto* logged = Logged(recordings[l], spec)) command["measured"] = Json(StatisticsOf(log.time_s, *logged));
-    statistics["command " + spec.actuator] = command;
-    json["logs"][l]["statistics"] = statistics;
-  }
-  return json.dump(2);
-}
-
-Status WriteSent(const std::string& folder, const ClosedLoopResult& closed, const std::vector<Recording>& recordings,
-                 const ControllerSpec& spec) {
-  std::set<std::string> used;
-  for (std::size_t l = 0; l < closed.result.logs.size(); ++l) {
-    const LogReplay& log = closed.result.logs[l];
-    std::string name = std::filesystem::path(log.log_path).stem().string();
-    if (!used.insert(name).second) name = std::to_string(l) + "_" + name;
+std::vector<RunTable> SentTables(const std::vector<LogReplay>& logs, const std::vector<std::vector<double>>& sent,
+                                 const std::vector<Recording>& recordings, const ControllerSpec& spec) {
+  std::vector<std::string> paths;
+  for (const auto& log : logs) paths.push_back(log.log_path);
+  const std::vector<std::string> names = CsvNames(paths);
+  std::vector<RunTable> tables;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto* logged = Logged(recordings[l], spec);
-    std::string text = "__time,logged/" + spec.actuator + ",closed_loop/" + spec.actuator + "\n";
-    for (std::size_t k = 0; k < log.time_s.size(); ++k) {
-      fmt::format_to(std::back_inserter(text), "{},{},{}\n", log.time_s[k],
-                     logged && std::isfinite((*logged)[k]) ? fmt::format("{}", (*logged)[k]) : "",
-                     std::isfinite(closed.sent[l][k]) ? fmt::format("{}", closed.sent[l][k]) : "");
-    }
-    GS_RETURN_IF_ERROR(WriteFile((std::filesystem::path(folder) / (name + ".csv")).string(), text));
+    tables.push_back(
+        {.path = "closed_loop/" + names[l],
+         .columns = {{"__time", logs[l].time_s},
+                     {"logged/" + spec.actuator, logged ? std::span<const double>(*logged) : std::span<const double>()},
+                     {"closed_loop/" + spec.actuator, sent[l]}}});
   }
-  return Ok();
+  return tables;
 }
 
 }  // namespace gapscope

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "src/report/json.h"
@@ -42,6 +43,16 @@ ordered_json ExtremesJson(const Rehearsal& rehearsal) {
   return list;
 }
 
+std::string RehearsalTable(const Waveform& wave, double amplitude, const std::string& unit,
+                           const Rehearsal& rehearsal) {
+  std::string text = fmt::format("{}, {:.4g} s, amplitude {:.4g} {}\n\n{:<28} {:>11} {:>11}\n", BandText(wave),
+                                 wave.duration_s, amplitude, unit, "on the nominal model", "reached", "limit");
+  for (const auto& e : rehearsal.extremes)
+    text += fmt::format("{:<28} {:>11.4g} {:>11.4g} {}\n", e.name, e.reached, e.limit, e.unit);
+  if (rehearsal.extremes.empty()) text += "no limits are stated in the experiment file\n";
+  return text;
+}
+
 }  // namespace
 
 std::string TrimmedNumber(double value, int decimals) {
@@ -52,7 +63,8 @@ std::string TrimmedNumber(double value, int decimals) {
   return text;
 }
 
-std::string ChirpTable(const std::vector<ChirpRow>& rows) {
+std::string ToTable(const ChirpRun& run) {
+  const std::vector<ChirpRow>& rows = run.rows;
   std::string text = fmt::format("{:<34}", "damping ratio");
   const auto line = [&](const std::string& name, const auto& cell) {
     text += fmt::format("\n{:<34}", name);
@@ -77,9 +89,9 @@ std::string ChirpTable(const std::vector<ChirpRow>& rows) {
   return text + "\n";
 }
 
-std::string ChirpJson(const std::vector<ChirpRow>& rows) {
+ordered_json ToJson(const ChirpRun& run) {
   ordered_json json = {{"schema", "gapscope.design.chirp/1"}, {"rows", ordered_json::array()}};
-  for (const auto& row : rows) {
+  for (const auto& row : run.rows) {
     ordered_json chirps = ordered_json::array();
     for (const auto& c : row.chirps)
       chirps.push_back({{"end_over_bandwidth", c.end_over_bandwidth},
@@ -92,8 +104,8 @@ std::string ChirpJson(const std::vector<ChirpRow>& rows) {
                             {"bandwidth_hz", row.bandwidth_hz},
                             {"chirps", chirps}});
   }
-  json["versions"] = JsonVersions();
-  return json.dump(2);
+  json["versions"] = JsonVersions(run.info);
+  return json;
 }
 
 Result<std::string> ChirpCsv(const std::vector<ChirpRow>& rows, const ChirpRequest& request, double start_hz,
@@ -130,26 +142,19 @@ Result<std::string> ChirpCsv(const std::vector<ChirpRow>& rows, const ChirpReque
   return text;
 }
 
-std::string RehearsalTable(const Waveform& wave, double amplitude, const std::string& unit,
-                           const Rehearsal& rehearsal) {
-  std::string text = fmt::format("{}, {:.4g} s, amplitude {:.4g} {}\n\n{:<28} {:>11} {:>11}\n", BandText(wave),
-                                 wave.duration_s, amplitude, unit, "on the nominal model", "reached", "limit");
-  for (const auto& e : rehearsal.extremes)
-    text += fmt::format("{:<28} {:>11.4g} {:>11.4g} {}\n", e.name, e.reached, e.limit, e.unit);
-  if (rehearsal.extremes.empty()) text += "no limits are stated in the experiment file\n";
-  return text;
-}
+std::string ToTable(const InputRun& run) { return RehearsalTable(run.wave, run.amplitude, run.unit, run.rehearsal); }
 
-std::string RehearsalJson(const Waveform& wave, double amplitude, const std::string& unit, const Rehearsal& rehearsal) {
+ordered_json ToJson(const InputRun& run) {
   ordered_json json = {{"schema", "gapscope.design.input/1"}};
-  json.update(WaveJson(wave, amplitude, unit));
-  json["limits"] = ExtremesJson(rehearsal);
-  json["versions"] = JsonVersions();
-  return json.dump(2);
+  json.update(WaveJson(run.wave, run.amplitude, run.unit));
+  json["limits"] = ExtremesJson(run.rehearsal);
+  json["versions"] = JsonVersions(run.info);
+  return json;
 }
 
-std::string OptimalTable(const OptimalDesign& design, const std::string& unit, const std::string& command,
-                         bool of_effects) {
+std::string ToTable(const OptimalRun& run) {
+  const OptimalDesign& design = run.design;
+  const bool of_effects = run.purpose == OptimalRun::Purpose::kEffects;
   std::string text;
   for (std::size_t i = 0; i < design.targets.size(); ++i) text += fmt::format("[{}] {}\n", i + 1, design.targets[i]);
   text += of_effects ? "what is left when the second is fitted to the first, in sensor floors (root mean square)\n\n"
@@ -158,32 +163,33 @@ std::string OptimalTable(const OptimalDesign& design, const std::string& unit, c
   for (std::size_t i = 0; i < design.targets.size(); ++i) text += fmt::format(" {:>10}", fmt::format("[{}]", i + 1));
   text += "\n";
   for (const auto& input : design.inputs) {
-    text += fmt::format("{:<40} {:>10}", BandText(input.wave), fmt::format("{:.3g} {}", input.amplitude, unit));
+    text += fmt::format("{:<40} {:>10}", BandText(input.wave), fmt::format("{:.3g} {}", input.amplitude, run.unit));
     for (const double value : input.per_target)
       text += fmt::format(" {:>10}", of_effects ? fmt::format("{:.3g}", value) : fmt::format("{:.3g} %", 100 * value));
     text += input.refined ? "\n" : "   (fitted roughly)\n";
   }
   for (const auto& value : design.values) text += "assumed " + value + "\n";
   if (!design.inputs.empty()) {
-    text += "\n" + RehearsalTable(design.inputs.front().wave, design.inputs.front().amplitude, unit,
+    text += "\n" + RehearsalTable(design.inputs.front().wave, design.inputs.front().amplitude, run.unit,
                                   design.inputs.front().rehearsal);
     if (of_effects && design.inputs.front().score < 1)
       text +=
           "even the best input leaves a pair below one sensor floor: these effects are hard to tell apart on this "
           "rig\n";
   }
-  text += fmt::format("\n{}\n", command);
+  text += fmt::format("\n{}\n", run.command);
   return text;
 }
 
-std::string OptimalJson(const OptimalDesign& design, const std::string& unit, const std::string& command,
-                        bool of_effects) {
+ordered_json ToJson(const OptimalRun& run) {
+  const OptimalDesign& design = run.design;
+  const bool of_effects = run.purpose == OptimalRun::Purpose::kEffects;
   ordered_json json = {{"schema", "gapscope.design.optimal/1"},
                        {"measure", of_effects ? "floors_left_after_imitation" : "standard_deviation_over_value"},
                        {"targets", design.targets},
                        {"inputs", ordered_json::array()}};
   for (const auto& input : design.inputs) {
-    ordered_json entry = WaveJson(input.wave, input.amplitude, unit);
+    ordered_json entry = WaveJson(input.wave, input.amplitude, run.unit);
     ordered_json values = ordered_json::array();
     for (const double value : input.per_target) values.push_back(JsonNumber(value));
     entry["per_target"] = values;
@@ -193,9 +199,9 @@ std::string OptimalJson(const OptimalDesign& design, const std::string& unit, co
     json["inputs"].push_back(std::move(entry));
   }
   json["assumed"] = design.values;
-  json["command"] = command;
-  json["versions"] = JsonVersions();
-  return json.dump(2);
+  json["command"] = run.command;
+  json["versions"] = JsonVersions(run.info);
+  return json;
 }
 
 }  // namespace gapscope

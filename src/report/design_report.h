@@ -1,19 +1,25 @@
-// Designed inputs for people and programs.
+// Designed inputs and feedback for people and programs.
 #ifndef GAPSCOPE_REPORT_DESIGN_REPORT_H_
 #define GAPSCOPE_REPORT_DESIGN_REPORT_H_
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "src/design/chirp.h"
 #include "src/design/optimal.h"
+#include "src/report/run.h"
 
 namespace gapscope {
 
 // The console table has the digits of the document "Motor System Identification", section 3.3; JSON
 // (gapscope.design.chirp/1) is unrounded.
-std::string ChirpTable(const std::vector<ChirpRow>& rows);
-std::string ChirpJson(const std::vector<ChirpRow>& rows);
+struct ChirpRun {
+  RunInfo info;
+  std::vector<ChirpRow> rows;
+};
+nlohmann::ordered_json ToJson(const ChirpRun& run);
+std::string ToTable(const ChirpRun& run);
 // All chirps after each other with a second of rest between, `rate_hz` rows a second: time, target and its speed, their
 // limits, and the gains to be set. Errors: those of SampleWaveform.
 Result<std::string> ChirpCsv(const std::vector<ChirpRow>& rows, const ChirpRequest& request, double start_hz,
@@ -23,14 +29,28 @@ Result<std::string> ChirpCsv(const std::vector<ChirpRow>& rows, const ChirpReque
 // "5.0".
 std::string TrimmedNumber(double value, int decimals);
 
-std::string RehearsalTable(const Waveform& wave, double amplitude, const std::string& unit, const Rehearsal& rehearsal);
-std::string RehearsalJson(const Waveform& wave, double amplitude, const std::string& unit, const Rehearsal& rehearsal);
+// An input and what it does to the nominal model (gapscope.design.input/1).
+struct InputRun {
+  RunInfo info;
+  Waveform wave;
+  double amplitude = 0;  // of the command, in `unit`
+  std::string unit;
+  Rehearsal rehearsal;
+};
+nlohmann::ordered_json ToJson(const InputRun& run);
+std::string ToTable(const InputRun& run);
 
-// `command`: the line that makes the best input again.
-std::string OptimalTable(const OptimalDesign& design, const std::string& unit, const std::string& command,
-                         bool of_effects);
-std::string OptimalJson(const OptimalDesign& design, const std::string& unit, const std::string& command,
-                        bool of_effects);
+// The inputs that were compared, best first (gapscope.design.optimal/1).
+struct OptimalRun {
+  enum class Purpose { kParameters, kEffects };  // to know parameters well, or to tell effects apart
+  RunInfo info;
+  Purpose purpose = Purpose::kParameters;
+  OptimalDesign design;
+  std::string unit;     // of the command
+  std::string command;  // the line that makes the best input again
+};
+nlohmann::ordered_json ToJson(const OptimalRun& run);
+std::string ToTable(const OptimalRun& run);
 
 }  // namespace gapscope
 

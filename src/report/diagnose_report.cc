@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include "src/report/json.h"
+#include <nlohmann/json.hpp>
 
 namespace gapscope {
 
@@ -35,9 +35,90 @@ std::string ConditionTable(const char* title, const std::vector<ConditionShare>&
   return text;
 }
 
+ordered_json Json(const FoundEffect& found) {
+  ordered_json parameters = ordered_json::object();
+  for (const auto& p : found.parameters)
+    parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
+  return {{"name", found.use.effect},
+          {"on", found.use.on},
+          {"probability", found.probability},
+          {"parameters", parameters},
+          {"error_before", JsonNumber(found.error_before)},
+          {"error_after", JsonNumber(found.error_after)},
+          {"share_of_gap", JsonNumber(found.share_of_gap)}};
+}
+
+ordered_json Json(const VerdictEvidence& e) {
+  return {{"floors_before", JsonNumber(e.floors_before)},
+          {"floors_left", JsonNumber(e.floors_left)},
+          {"removed", JsonNumber(e.removed)},
+          {"free_run_before", JsonNumber(e.free_run_before)},
+          {"free_run_left", JsonNumber(e.free_run_left)},
+          {"free_run_removed", JsonNumber(e.free_run_removed)},
+          {"gain_train", JsonNumber(e.gain_train)},
+          {"gain_held_out", JsonNumber(e.gain_held_out)},
+          {"standard_errors", JsonNumber(e.z)},
+          {"rival_lead", JsonNumber(e.rival_lead)},
+          {"rival_standard_errors", JsonNumber(e.rival_z)}};
+}
+
+// A first effect, or one that was tried beside it and has no probability of its own.
+enum class Rank { kFirst, kSecond };
+
+ordered_json Json(const CandidateReport& c, Rank rank) {
+  ordered_json entry = {{"name", c.effect ? c.effect->effect : "none"}};
+  if (c.effect) entry["on"] = c.effect->on;
+  if (rank == Rank::kFirst) entry["probability"] = c.probability;
+  entry["held_out_error"] = JsonNumber(c.held_out_error);
+  entry["screen_drop"] = c.screen_drop;
+  entry["absorbed"] = c.absorbed;
+  entry["refitted"] = c.refitted;
+  entry["converged"] = c.converged;
+  if (rank == Rank::kFirst) entry["bic"] = JsonNumber(c.bic);
+  entry["reason"] = c.reason;
+  return entry;
+}
+
 }  // namespace
 
-std::string DiagnosisTable(const Diagnosis& d) {
+ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
+  const Diagnosis& d = run.diagnosis;
+  ordered_json json = {{"schema", "gapscope.diagnosis/1"},
+                       {"verdict", VerdictName(d.verdict)},
+                       {"probability", d.probability},
+                       {"effects", ordered_json::array()}};
+  for (const auto& found : d.effects) json["effects"].push_back(Json(found));
+  json["ambiguous"] = ordered_json::array();
+  for (const auto& group : d.ambiguous) {
+    ordered_json names = ordered_json::array();
+    for (const auto& use : group) names.push_back(use.effect);
+    json["ambiguous"].push_back(names);
+  }
+  json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},   {"final", JsonNumber(d.final)},
+                 {"floor", JsonNumber(d.floor)},     {"closed", JsonNumber(d.closed)}, {"held_out", true}};
+  json["evidence"] = Json(d.evidence);
+  json["where"] = JsonConditions(d.where);
+  json["remains"] = JsonConditions(d.remains);
+  json["candidates"] = ordered_json::array();
+  for (const auto& c : d.candidates) json["candidates"].push_back(Json(c, Rank::kFirst));
+  json["second_effects"] = ordered_json::array();
+  for (const auto& c : d.seconds) json["second_effects"].push_back(Json(c, Rank::kSecond));
+  ordered_json separates = ordered_json::array();
+  for (const auto& explanation : d.next_separates) separates.push_back(NameOf(explanation));
+  json["next_experiment"] = {{"command", d.next_command}, {"separates", separates}};
+  json["explanation"] = d.explanation;
+  json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
+  if (d.model) json["model"] = JsonModel(RunModelOf(*d.model, d.values));
+  if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
+  if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
+  json["budget_spent"] = d.budget_spent;
+  json["seed"] = run.info.seed;
+  json["versions"] = JsonVersions(run.info);
+  return json;
+}
+
+std::string ToTable(const DiagnoseRun& run) {
+  const Diagnosis& d = run.diagnosis;
   std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
   for (const auto& found : d.effects) {
     text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap\n", found.use.effect, found.use.on,
@@ -47,7 +128,7 @@ std::string DiagnosisTable(const Diagnosis& d) {
   }
   for (const auto& group : d.ambiguous) {
     std::string names;
-    for (const auto& name : group) names += (names.empty() ? "" : ", ") + name;
+    for (const auto& use : group) names += (names.empty() ? "" : ", ") + use.Text();
     text += "  cannot be told apart on these logs: " + names + "\n";
   }
   text += fmt::format(
@@ -60,89 +141,11 @@ std::string DiagnosisTable(const Diagnosis& d) {
   std::size_t shown = 0;
   for (const auto& c : d.candidates) {
     if (!c.refitted && ++shown > 4) continue;
-    text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", c.name, c.probability,
+    text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", NameOf(c.effect), c.probability,
                         c.refitted ? fmt::format("{:.4g}", c.held_out_error) : "-", c.reason);
   }
   text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.budget_spent ? ", the whole budget" : "");
   return text;
-}
-
-std::string DiagnosisJson(const Diagnosis& d, std::uint64_t seed) {
-  ordered_json json = {{"schema", "gapscope.diagnosis/1"},
-                       {"verdict", VerdictName(d.verdict)},
-                       {"probability", d.probability},
-                       {"effects", ordered_json::array()}};
-  for (const auto& found : d.effects) {
-    ordered_json parameters = ordered_json::object();
-    for (const auto& p : found.parameters)
-      parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
-    json["effects"].push_back({{"name", found.use.effect},
-                               {"on", found.use.on},
-                               {"probability", found.probability},
-                               {"parameters", parameters},
-                               {"error_before", JsonNumber(found.error_before)},
-                               {"error_after", JsonNumber(found.error_after)},
-                               {"share_of_gap", JsonNumber(found.share_of_gap)}});
-  }
-  json["ambiguous"] = ordered_json::array();
-  for (const auto& group : d.ambiguous) {
-    ordered_json names = ordered_json::array();
-    for (const auto& name : group) names.push_back(name.substr(0, name.find('@')));
-    json["ambiguous"].push_back(names);
-  }
-  json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},   {"final", JsonNumber(d.final)},
-                 {"floor", JsonNumber(d.floor)},     {"closed", JsonNumber(d.closed)}, {"held_out", true}};
-  const VerdictEvidence& e = d.evidence;
-  json["evidence"] = {{"floors_before", JsonNumber(e.floors_before)},
-                      {"floors_left", JsonNumber(e.floors_left)},
-                      {"removed", JsonNumber(e.removed)},
-                      {"free_run_before", JsonNumber(e.free_run_before)},
-                      {"free_run_left", JsonNumber(e.free_run_left)},
-                      {"free_run_removed", JsonNumber(e.free_run_removed)},
-                      {"gain_train", JsonNumber(e.gain_train)},
-                      {"gain_held_out", JsonNumber(e.gain_held_out)},
-                      {"standard_errors", JsonNumber(e.z)},
-                      {"rival_lead", JsonNumber(e.rival_lead)},
-                      {"rival_standard_errors", JsonNumber(e.rival_z)}};
-  json["where"] = JsonConditions(d.where);
-  json["remains"] = JsonConditions(d.remains);
-  json["candidates"] = ordered_json::array();
-  for (const auto& c : d.candidates) {
-    const std::size_t at = c.name.find('@');
-    ordered_json entry = {{"name", c.name.substr(0, at)}};
-    if (at != std::string::npos) entry["on"] = c.name.substr(at + 1);
-    entry.update({{"probability", c.probability},
-                  {"held_out_error", JsonNumber(c.held_out_error)},
-                  {"screen_drop", c.screen_drop},
-                  {"absorbed", c.absorbed},
-                  {"refitted", c.refitted},
-                  {"converged", c.converged},
-                  {"bic", JsonNumber(c.bic)},
-                  {"reason", c.reason}});
-    json["candidates"].push_back(std::move(entry));
-  }
-  json["second_effects"] = ordered_json::array();
-  for (const auto& c : d.seconds) {
-    const std::size_t at = c.name.find('@');
-    json["second_effects"].push_back({{"name", c.name.substr(0, at)},
-                                      {"on", c.name.substr(at + 1)},
-                                      {"held_out_error", JsonNumber(c.held_out_error)},
-                                      {"screen_drop", c.screen_drop},
-                                      {"absorbed", c.absorbed},
-                                      {"refitted", c.refitted},
-                                      {"converged", c.converged},
-                                      {"reason", c.reason}});
-  }
-  json["next_experiment"] = {{"command", d.next_command}, {"separates", d.next_separates}};
-  json["explanation"] = d.explanation;
-  json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
-  if (d.model) json["model"] = JsonModel(*d.model, d.values);
-  if (d.refit_model) json["refit_model"] = JsonModel(*d.refit_model, d.refit_values);
-  json["wall_s"] = d.wall_s;
-  json["budget_spent"] = d.budget_spent;
-  json["seed"] = seed;
-  json["versions"] = JsonVersions();
-  return json.dump(2);
 }
 
 }  // namespace gapscope

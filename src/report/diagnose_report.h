@@ -2,15 +2,22 @@
 #ifndef GAPSCOPE_REPORT_DIAGNOSE_REPORT_H_
 #define GAPSCOPE_REPORT_DIAGNOSE_REPORT_H_
 
-#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "src/diagnose/diagnosis.h"
+#include "src/report/json.h"
+#include "src/report/run.h"
 
 namespace gapscope {
 
-std::string DiagnosisTable(const Diagnosis& diagnosis);
-std::string DiagnosisJson(const Diagnosis& diagnosis, std::uint64_t seed);
+struct DiagnoseRun {
+  RunInfo info;
+  Diagnosis diagnosis;
+};
+
+nlohmann::ordered_json ToJson(const DiagnoseRun& run, Timing timing = Timing::kInclude);
+std::string ToTable(const DiagnoseRun& run);
 
 }  // namespace gapscope
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "src/compare/decimate.h"
 #include "src/compare/frequency_response.h"
@@ -146,8 +147,8 @@ ordered_json Traces(const ReportSource& source, std::size_t index, std::size_t m
   return json;
 }
 
-ordered_json Data(const ReportSource& source, std::size_t most_rows) {
-  ordered_json data = {{"result", ordered_json::parse(source.result_json)}, {"command", source.command_line}};
+ordered_json Data(const ordered_json& result, const ReportSource& source, std::size_t most_rows) {
+  ordered_json data = {{"result", result}, {"command", source.command_line}};
   data["experiment"] = FileStamp(source.experiment->path);
   data["model"] = FileStamp(source.experiment->model_path);
   data["parameters"] = ordered_json::array();
@@ -215,18 +216,18 @@ bool IsPlainName(const std::string& name) {
 
 }  // namespace
 
-std::string ReportHtml(const ReportSource& source, std::size_t most_rows) {
+std::string ReportHtml(const ordered_json& result, const ReportSource& source, std::size_t most_rows) {
   GS_CHECK(source.experiment != nullptr);
   std::string page = assets::kPage;
   page = Filled(page, "/*style*/", std::string(assets::kDygraphsStyle) + assets::kStyle);
   page = Filled(page, "/*dygraphs*/", assets::kDygraphs);
   page = Filled(page, "/*script*/", assets::kScript);
-  return Filled(page, "/*data*/", ForScript(Data(source, most_rows)));
+  return Filled(page, "/*data*/", ForScript(Data(result, source, most_rows)));
 }
 
-Status WriteReportHtml(const std::string& folder, const ReportSource& source) {
+Status WriteReportHtml(const std::string& folder, const ordered_json& result, const ReportSource& source) {
   const std::filesystem::path path = std::filesystem::path(folder) / "report.html";
-  std::string page = ReportHtml(source);
+  std::string page = ReportHtml(result, source);
   std::error_code failure;
   if (std::filesystem::exists(path.parent_path() / "video.mp4", failure))
     page = Filled(page, kVideoSlot, "data-video=\"video.mp4\"");

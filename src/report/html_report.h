@@ -3,7 +3,7 @@
 #ifndef GAPSCOPE_REPORT_HTML_REPORT_H_
 #define GAPSCOPE_REPORT_HTML_REPORT_H_
 
-#include <span>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -17,8 +17,8 @@ struct ReportPrediction {
   std::vector<LogReplay> logs;  // by recording; one without signals was not predicted
 };
 
+// What a page shows beside the result.
 struct ReportSource {
-  std::string result_json;   // replay, tune or diagnosis, as --json prints it
   std::string command_line;  // as it was given
   const Experiment* experiment = nullptr;
   std::vector<const Recording*> recordings;
@@ -31,11 +31,12 @@ struct ReportSource {
   std::vector<Parameter> parameters;
 };
 
-// Long logs are thinned by ExtremeRows, so that a page holds about `most_rows` rows in all.
-std::string ReportHtml(const ReportSource& source, std::size_t most_rows = 60000);
+// `result`: of replay, tune or diagnose, the value that --json prints. Long logs are thinned by ExtremeRows, so that a
+// page holds about `most_rows` rows in all.
+std::string ReportHtml(const nlohmann::ordered_json& result, const ReportSource& source, std::size_t most_rows = 60000);
 
 // Writes `folder`/report.html. A video.mp4 that is already there is shown in it.
-Status WriteReportHtml(const std::string& folder, const ReportSource& source);
+Status WriteReportHtml(const std::string& folder, const nlohmann::ordered_json& result, const ReportSource& source);
 
 // Shows `video`, a file beside the report, in a report that was written before. Does nothing, and says false, where
 // there is no report.

@@ -3,16 +3,16 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
+#include <nlohmann/json.hpp>
 
-#include "src/core/file.h"
 #include "src/report/json.h"
 
 namespace gapscope {
 
 using nlohmann::ordered_json;
 
-std::string IdentifyTable(const Identification& result) {
+std::string ToTable(const IdentifyRun& run) {
+  const Identification& result = run.result;
   std::string text =
       fmt::format("{}\n\n{:<28} {:>12}   {:<26} {}\n", result.relation, "", "value", "95 % interval", "unit");
   for (const auto& v : result.values) {
@@ -28,7 +28,8 @@ std::string IdentifyTable(const Identification& result) {
   return text;
 }
 
-std::string IdentifyJson(const Identification& result, const std::vector<Recording>& recordings) {
+ordered_json ToJson(const IdentifyRun& run) {
+  const Identification& result = run.result;
   ordered_json json = {{"schema", "gapscope.identify." + result.method + "/1"},
                        {"relation", result.relation},
                        {"values", ordered_json::object()}};
@@ -48,24 +49,17 @@ std::string IdentifyJson(const Identification& result, const std::vector<Recordi
     }
     json["tables"][table.name] = {{"columns", table.columns}, {"rows", rows}};
   }
-  json["logs"] = ordered_json::array();
-  for (const auto& recording : recordings) json["logs"].push_back(recording.log_path);
-  json["versions"] = JsonVersions();
-  return json.dump(2);
+  json["logs"] = run.logs;
+  json["versions"] = JsonVersions(run.info);
+  return json;
 }
 
-Status WritePoints(const std::string& folder, const Identification& result) {
-  for (const auto& table : result.tables) {
-    std::string csv;
-    for (std::size_t c = 0; c < table.columns.size(); ++c) csv += (c > 0 ? "," : "") + table.columns[c];
-    for (const auto& row : table.rows) {
-      csv += "\n";
-      for (std::size_t c = 0; c < row.size(); ++c)
-        csv += fmt::format("{}{}", c > 0 ? "," : "", std::isfinite(row[c]) ? fmt::format("{:.10g}", row[c]) : "");
-    }
-    GS_RETURN_IF_ERROR(WriteFile(std::filesystem::path(folder) / (table.name + ".csv"), csv + "\n"));
+std::vector<std::vector<double>> ColumnsOf(const PointTable& table) {
+  std::vector<std::vector<double>> columns(table.columns.size());
+  for (const auto& row : table.rows) {
+    for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(row[c]);
   }
-  return Ok();
+  return columns;
 }
 
 }  // namespace gapscope

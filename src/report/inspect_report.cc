@@ -3,15 +3,17 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "src/log/inspect_json.h"
+#include "src/report/json.h"
 
 namespace gapscope {
 namespace {
 
 std::string Percent(double share) { return std::isfinite(share) ? fmt::format("{:.3g} %", 100 * share) : "-"; }
 
-}  // namespace
-
-std::string InspectTable(const InspectReport& r, const std::string& log_path) {
+std::string LogTable(const InspectReport& r, const std::string& log_path) {
   std::string text = fmt::format("{}\n  {}\n", log_path, r.fit ? "fit for use" : "NOT fit for use");
   for (const auto& reason : r.unfit_because) text += "  because " + reason + "\n";
   text += fmt::format(
@@ -40,6 +42,24 @@ std::string InspectTable(const InspectReport& r, const std::string& log_path) {
   }
   for (const auto& finding : r.findings) text += "  found: " + finding.text + "\n";
   for (const auto& line : r.verdict) text += "  - " + line + "\n";
+  return text;
+}
+
+}  // namespace
+
+nlohmann::ordered_json ToJson(const InspectRun& run) {
+  nlohmann::ordered_json json = {{"schema", "gapscope.inspect/1"}, {"logs", nlohmann::ordered_json::array()}};
+  for (const auto& [log, report] : run.logs) json["logs"].push_back(ToJson(report, log));
+  json["versions"] = JsonVersions(run.info);
+  return json;
+}
+
+std::string ToTable(const InspectRun& run) {
+  std::string text;
+  for (const auto& [log, report] : run.logs) {
+    if (!text.empty()) text += '\n';
+    text += LogTable(report, log);
+  }
   return text;
 }
 

@@ -1,35 +1,39 @@
-// A replay for people and programs: console table, JSON (gapscope.replay/1), traces as CSV.
+// A replay's result for people and programs: console table, JSON (gapscope.replay/1).
 #ifndef GAPSCOPE_REPORT_REPLAY_REPORT_H_
 #define GAPSCOPE_REPORT_REPLAY_REPORT_H_
 
-#include <cstdint>
 #include <limits>
-#include <span>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "src/compare/comparison.h"
+#include "src/report/closed_loop_report.h"
 #include "src/report/console.h"
+#include "src/report/json.h"
+#include "src/report/run.h"
 
 namespace gapscope {
 
-struct ReplayReport {
-  const ReplayResult& result;
-  const Comparison& comparison;
-  const Model& model;
-  std::span<const double> values;  // of the model's parameters
-  std::uint64_t seed = 0;
+struct ReplayRun {
+  RunInfo info;
+  ReplayResult result;    // the traces
+  Comparison comparison;  // their scores, log by log
+  RunModel model;
+  std::vector<std::pair<std::string, double>> parameters;  // of the model, without the rig's own sizes
   double other_error = 0;  // of a free run where the replay was in windows, in windows where it was a free run
   double nominal_error =
       std::numeric_limits<double>::quiet_NaN();  // of the nominal model, where this one has effects or other values
+  std::optional<LoopStatistics> loop;            // of a replay with the loop closed
 };
+// The parts that come from the model. `values` as model.Nominal().
+ReplayRun ReplayRunOf(const Model& model, std::span<const double> values, ReplayResult result, Comparison comparison);
 
+nlohmann::ordered_json ToJson(const ReplayRun& run, Timing timing = Timing::kInclude);
 // At most 100 columns.
-std::string ReplayTable(const ReplayReport& report, const Console& console = {});
-std::string ReplayJson(const ReplayReport& report);
-
-// One CSV per log in `folder`, for PlotJuggler: __time, command/ACTUATOR, measured/SIGNAL, predicted/SIGNAL. Logs of
-// the same file name get their position in front.
-Status WriteTraces(const std::string& folder, const ReplayResult& result, const std::vector<Recording>& recordings);
+std::string ToTable(const ReplayRun& run, const Console& console = {});
 
 }  // namespace gapscope
 

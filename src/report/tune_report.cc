@@ -2,26 +2,66 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
-
-#include "src/report/json.h"
 
 namespace gapscope {
 namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json Logs(const std::vector<LogReplay>& logs) {
+std::vector<TuneRun::Log> Scored(const std::vector<LogReplay>& replays) {
+  std::vector<TuneRun::Log> logs;
+  for (const auto& replay : replays) {
+    TuneRun::Log log{.log = replay.log_path, .outcome = replay.outcome, .signals = {}};
+    for (const auto& s : replay.signals)
+      log.signals.push_back(ScoreSignal(s.signal, replay.time_s, s.measured, s.predicted, s.resolution));
+    logs.push_back(std::move(log));
+  }
+  return logs;
+}
+
+ordered_json Json(const std::vector<TuneRun::Log>& logs) {
   ordered_json list = ordered_json::array();
   for (const auto& log : logs) {
-    ordered_json entry = {{"log", log.log_path},
-                          {"outcome", log.outcome == Outcome::kCompleted ? "completed" : "diverged"},
-                          {"signals", ordered_json::object()}};
-    for (const auto& s : log.signals)
-      entry["signals"][s.signal] = JsonScore(ScoreSignal(s.signal, log.time_s, s.measured, s.predicted, s.resolution));
+    ordered_json entry = {{"log", log.log}, {"outcome", OutcomeName(log.outcome)}, {"signals", ordered_json::object()}};
+    for (const auto& score : log.signals) entry["signals"][score.signal] = JsonScore(score);
     list.push_back(std::move(entry));
   }
   return list;
+}
+
+std::string ParameterLines(const TuneRun& run, const Console& console) {
+  std::string text = console.Bold(fmt::format("{:<44} {:>11} {:>11}   {:<24} {}", "parameter", "nominal", "value",
+                                              "95 % interval", "unit")) +
+                     "\n";
+  for (const auto& p : run.parameters) {
+    text += fmt::format("{:<44} {:>11.4g} {:>11.4g}   {:<24} {}{}\n", p.name, p.nominal, p.value,
+                        p.identifiable ? fmt::format("{:.4g} .. {:.4g}", p.low, p.high) : "not known", p.unit,
+                        p.at_bound ? console.Warn("  at its bound") : "");
+  }
+  std::set<std::string> said;  // two directions may lead with the same parameter
+  for (const auto& flat : run.flat) {
+    if (said.insert(flat.text).second) text += "flat: " + flat.text + "\n";
+  }
+  for (const auto& [a, b, r] : run.correlated)
+    text += fmt::format("{} and {} go together (correlation {:.3f})\n", a, b, r);
+  return text;
+}
+
+std::string HeldOutLines(const TuneRun& run, const Console& console) {
+  std::string text =
+      console.Bold(fmt::format("{:<44} {:<18} {:>10} {:>10} {:>8}", "held-out log", "signal", "RMSE", "MAE", "nRMSE")) +
+      "\n";
+  for (const auto& log : run.held_out) {
+    const std::string name = log.log.size() > 44 ? "..." + log.log.substr(log.log.size() - 41) : log.log;
+    for (const auto& score : log.signals) {
+      text += fmt::format("{:<44} {:<18} {:>10.4g} {:>10.4g} {:>8.4g}\n", &score == &log.signals.front() ? name : "",
+                          score.signal, score.rmse, score.mae, score.nrmse);
+    }
+  }
+  return text;
 }
 
 }  // namespace
@@ -47,97 +87,107 @@ std::string FlatText(const FlatDirection& flat, const Model& model) {
                                       " (logarithms where the bounds are positive) open";
 }
 
-std::string TuneTable(const TuneSummary& summary, const Model& model, const Console& console) {
-  std::string text = console.Bold(fmt::format("{:<44} {:>11} {:>11}   {:<24} {}", "parameter", "nominal", "value",
-                                              "95 % interval", "unit")) +
-                     "\n";
+TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed) {
+  TuneRun run{.info = {.seed = seed},
+              .optimizer = summary.optimizer,
+              .termination = TerminationText(summary.termination),
+              .starts_agree = summary.starts_agree,
+              .starts = summary.start_costs.size(),
+              .evaluations = summary.evaluations,
+              .replays = summary.replays,
+              .wall_s = summary.wall_s,
+              .solve_s = summary.solve_s,
+              .error_nominal = summary.error_nominal,
+              .error_train = summary.error_train,
+              .error_held_out = summary.error_held_out,
+              .held_out_by = summary.split,
+              .train = Scored(summary.train),
+              .held_out = Scored(summary.held_out),
+              .model = RunModelOf(model, summary.values),
+              .time_step_s = summary.time_step_s,
+              .command_shift_s = summary.shift_s};
+  const auto name = [&](int index) { return model.parameters()[index].name; };
   for (const auto& t : summary.tuned) {
-    const Parameter& p = model.parameters()[t.index];
-    text += fmt::format("{:<44} {:>11.4g} {:>11.4g}   {:<24} {}{}\n", p.name, p.nominal, t.value,
-                        t.identifiable ? fmt::format("{:.4g} .. {:.4g}", t.low, t.high) : "not known", p.unit,
-                        t.at_bound ? console.Warn("  at its bound") : "");
+    const gapscope::Parameter& p = model.parameters()[t.index];
+    run.parameters.push_back({p.name, p.unit, p.nominal, t.value, t.low, t.high, t.at_bound, t.identifiable});
   }
-  std::set<std::string> said;  // two directions may lead with the same parameter
   for (const auto& flat : summary.flat) {
-    if (const std::string line = FlatText(flat, model); said.insert(line).second) text += "flat: " + line + "\n";
+    TuneRun::Flat entry{.direction = {}, .text = FlatText(flat, model)};
+    for (const auto& [index, weight] : flat.parts) entry.direction.emplace_back(name(index), weight);
+    run.flat.push_back(std::move(entry));
   }
-  for (const auto& [a, b, r] : summary.correlated)
-    text += fmt::format("{} and {} go together (correlation {:.3f})\n", model.parameters()[a].name,
-                        model.parameters()[b].name, r);
-  text.append("\n")
-      .append(console.Bold(
-          fmt::format("{:<44} {:<18} {:>10} {:>10} {:>8}", "held-out log", "signal", "RMSE", "MAE", "nRMSE")))
-      .append("\n");
-  for (const auto& log : summary.held_out) {
-    for (const auto& s : log.signals) {
-      const SignalScore score = ScoreSignal(s.signal, log.time_s, s.measured, s.predicted, s.resolution);
-      const std::string name =
-          log.log_path.size() > 44 ? "..." + log.log_path.substr(log.log_path.size() - 41) : log.log_path;
-      text += fmt::format("{:<44} {:<18} {:>10.4g} {:>10.4g} {:>8.4g}\n", &s == &log.signals.front() ? name : "",
-                          s.signal, score.rmse, score.mae, score.nrmse);
-    }
-  }
-  text += fmt::format("\nerror: nominal {:.4g}, train {:.4g}, held out {:.4g} ({})\n", summary.error_nominal,
-                      summary.error_train, summary.error_held_out, summary.split);
-  text += fmt::format(
-      "{}: {}; {} evaluations, {} replays of all logs, {:.2f} s; time step {:.3g} ms; commands {:+.3f} ms late\n",
-      summary.optimizer, TerminationText(summary.termination), summary.evaluations, summary.replays, summary.wall_s,
-      1e3 * summary.time_step_s, 1e3 * summary.shift_s);
-  if (summary.start_costs.size() > 1) {
-    text += fmt::format("{} starts {}\n", summary.start_costs.size(),
-                        summary.starts_agree ? "agree"
-                                             : "end in different places: the best is shown; more starts (--starts) or "
-                                               "a global search (--optimizer crs2) may find better");
-  }
-  return text;
+  for (const auto& [a, b, r] : summary.correlated) run.correlated.push_back({name(a), name(b), r});
+  return run;
 }
 
-std::string TuneJson(const TuneSummary& summary, const Model& model, std::uint64_t seed) {
-  ordered_json json = {{"schema", "gapscope.tune/1"},
-                       {"optimizer", summary.optimizer},
-                       {"termination", TerminationText(summary.termination)},
-                       {"starts_agree", summary.starts_agree},
-                       {"starts", summary.start_costs.size()},
-                       {"evaluations", summary.evaluations},
-                       {"replays", summary.replays},
-                       {"wall_s", summary.wall_s},
-                       {"solve_s", summary.solve_s}};
-  json["parameters"] = ordered_json::array();
-  for (const auto& t : summary.tuned) {
-    const Parameter& p = model.parameters()[t.index];
-    json["parameters"].push_back({{"name", p.name},
-                                  {"unit", p.unit},
-                                  {"nominal", p.nominal},
-                                  {"value", t.value},
-                                  {"low", t.low},
-                                  {"high", t.high},
-                                  {"at_bound", t.at_bound},
-                                  {"identifiable", t.identifiable}});
+ordered_json JsonParameters(const TuneRun& run) {
+  ordered_json list = ordered_json::array();
+  for (const auto& p : run.parameters) {
+    list.push_back({{"name", p.name},
+                    {"unit", p.unit},
+                    {"nominal", p.nominal},
+                    {"value", p.value},
+                    {"low", p.low},
+                    {"high", p.high},
+                    {"at_bound", p.at_bound},
+                    {"identifiable", p.identifiable}});
   }
+  return list;
+}
+
+ordered_json JsonErrors(const TuneRun& run) {
+  return {{"nominal", JsonNumber(run.error_nominal)},
+          {"train", JsonNumber(run.error_train)},
+          {"held_out", JsonNumber(run.error_held_out)}};
+}
+
+ordered_json ToJson(const TuneRun& run, Timing timing) {
+  ordered_json json = {{"schema", "gapscope.tune/1"},    {"optimizer", run.optimizer},
+                       {"termination", run.termination}, {"starts_agree", run.starts_agree},
+                       {"starts", run.starts},           {"evaluations", run.evaluations},
+                       {"replays", run.replays}};
+  if (timing == Timing::kInclude) {
+    json["wall_s"] = run.wall_s;
+    json["solve_s"] = run.solve_s;
+  }
+  json["parameters"] = JsonParameters(run);
   json["flat"] = ordered_json::array();
-  for (const auto& flat : summary.flat) {
+  for (const auto& flat : run.flat) {
     ordered_json parts = ordered_json::object();
-    for (const auto& [index, weight] : flat.parts) parts[model.parameters()[index].name] = weight;
-    json["flat"].push_back({{"direction", parts}, {"text", FlatText(flat, model)}});
+    for (const auto& [name, weight] : flat.direction) parts[name] = weight;
+    json["flat"].push_back({{"direction", parts}, {"text", flat.text}});
   }
   json["correlated"] = ordered_json::array();
-  for (const auto& [a, b, r] : summary.correlated)
-    json["correlated"].push_back(
-        {{"parameters", {model.parameters()[a].name, model.parameters()[b].name}}, {"correlation", r}});
-  json["error"] = {{"nominal", JsonNumber(summary.error_nominal)},
-                   {"train", JsonNumber(summary.error_train)},
-                   {"held_out", JsonNumber(summary.error_held_out)}};
-  json["held_out_by"] = summary.split;
-  json["train"] = Logs(summary.train);
-  json["held_out"] = Logs(summary.held_out);
-  json["effects"] = ordered_json::array();
-  for (const auto& use : model.effects()) json["effects"].push_back({{"name", use.effect}, {"on", use.on}});
-  json["model"] = JsonModel(model, summary.values);
-  json["time_step_s"] = summary.time_step_s;
-  json["command_shift_s"] = summary.shift_s;
-  json["seed"] = seed;
-  json["versions"] = JsonVersions();
-  return json.dump(2);
+  for (const auto& [a, b, r] : run.correlated)
+    json["correlated"].push_back({{"parameters", {a, b}}, {"correlation", r}});
+  json["error"] = JsonErrors(run);
+  json["held_out_by"] = run.held_out_by;
+  json["train"] = Json(run.train);
+  json["held_out"] = Json(run.held_out);
+  json["effects"] = JsonEffects(run.model.effects);
+  json["model"] = JsonModel(run.model);
+  json["time_step_s"] = run.time_step_s;
+  json["command_shift_s"] = run.command_shift_s;
+  json["seed"] = run.info.seed;
+  json["versions"] = JsonVersions(run.info);
+  return json;
+}
+
+std::string ToTable(const TuneRun& run, const Console& console) {
+  std::string text = ParameterLines(run, console) + "\n" + HeldOutLines(run, console);
+  text += fmt::format("\nerror: nominal {:.4g}, train {:.4g}, held out {:.4g} ({})\n", run.error_nominal,
+                      run.error_train, run.error_held_out, run.held_out_by);
+  text += fmt::format(
+      "{}: {}; {} evaluations, {} replays of all logs, {:.2f} s; time step {:.3g} ms; commands {:+.3f} ms late\n",
+      run.optimizer, run.termination, run.evaluations, run.replays, run.wall_s, 1e3 * run.time_step_s,
+      1e3 * run.command_shift_s);
+  if (run.starts > 1) {
+    text += fmt::format("{} starts {}\n", run.starts,
+                        run.starts_agree ? "agree"
+                                         : "end in different places: the best is shown; more starts (--starts) or "
+                                           "a global search (--optimizer crs2) may find better");
+  }
+  return text;
 }
 
 }  // namespace gapscope

@@ -2,16 +2,63 @@
 #ifndef GAPSCOPE_REPORT_TUNE_REPORT_H_
 #define GAPSCOPE_REPORT_TUNE_REPORT_H_
 
-#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "src/report/console.h"
+#include "src/report/json.h"
+#include "src/report/run.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {
 
-std::string TuneTable(const TuneSummary& summary, const Model& model, const Console& console = {});
-std::string TuneJson(const TuneSummary& summary, const Model& model, std::uint64_t seed);
+// All that tune's result says, by names: what ReadTuneRun gives back of a result.json. Numbers that do not exist are
+// NaN.
+struct TuneRun {
+  struct Parameter {
+    std::string name, unit;
+    double nominal = 0, value = 0, low = 0, high = 0;  // low, high: 95 % interval
+    bool at_bound = false, identifiable = true;
+  };
+  struct Flat {
+    std::vector<std::pair<std::string, double>> direction;  // see FlatDirection
+    std::string text;                                       // what it leaves, in words
+  };
+  struct Correlated {
+    std::string a, b;
+    double correlation = 0;
+  };
+  struct Log {
+    std::string log;
+    Outcome outcome = Outcome::kCompleted;
+    std::vector<SignalScore> signals;
+  };
+
+  RunInfo info;
+  std::string optimizer, termination;
+  bool starts_agree = true;
+  std::size_t starts = 0, evaluations = 0, replays = 0;
+  double wall_s = 0, solve_s = 0;  // all; the optimiser alone
+  std::vector<Parameter> parameters;
+  std::vector<Flat> flat;
+  std::vector<Correlated> correlated;
+  double error_nominal = 0, error_train = 0, error_held_out = 0;
+  std::string held_out_by;  // how logs were held out, for the user
+  std::vector<Log> train, held_out;
+  RunModel model;
+  double time_step_s = 0, command_shift_s = 0;
+};
+TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed);
+
+nlohmann::ordered_json ToJson(const TuneRun& run, Timing timing = Timing::kInclude);
+std::string ToTable(const TuneRun& run, const Console& console = {});
+
+// The parts that a merge of many results repeats.
+nlohmann::ordered_json JsonParameters(const TuneRun& run);
+nlohmann::ordered_json JsonErrors(const TuneRun& run);
+
 // "only motor.kt / motor.resistance is known": what a flat direction leaves, in words.
 std::string FlatText(const FlatDirection& flat, const Model& model);
 

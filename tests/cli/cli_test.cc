@@ -189,6 +189,26 @@ TEST_F(CliTest, OutWritesResultTracesAndModelAndNothingElse) {
   EXPECT_TRUE(Files(scratch_.Path("cwd")).empty());
 }
 
+TEST_F(CliTest, AClosedLoopsPageHoldsTheResultThatIsPrinted) {
+  // A pendulum that its controller holds up: it stands still.
+  std::string text = "t,target_theta,target_alpha,theta,alpha,feedforward,plant_input\n";
+  for (int k = 0; k < 800; ++k) text += std::to_string(0.002 * k) + ",0,0,0.01,0.005,0,0\n";
+  const std::string out = scratch_.Path("loop");
+  const Answer answer =
+      Run("replay '" + kModels + "qube_koopman/experiment.yaml' '" + scratch_.Write("upright.csv", text) +
+          "' --mode closed_loop --json --quiet --out '" + out + "'");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  EXPECT_EQ(ReadAll(out + "/result.json"), answer.out);
+  const auto json = nlohmann::ordered_json::parse(answer.out);
+  EXPECT_TRUE(json["logs"][0]["statistics"].contains("command motor"));
+  const std::string page = ReadAll(out + "/report.html"), open = "id=\"report-data\">";
+  const std::size_t begin = page.find(open) + open.size();
+  const auto data = nlohmann::ordered_json::parse(page.substr(begin, page.find("</script>", begin) - begin));
+  EXPECT_EQ(data["result"], json);
+  const std::string sent = ReadAll(out + "/closed_loop/upright.csv");
+  EXPECT_EQ(sent.substr(0, sent.find('\n')), "__time,logged/motor,closed_loop/motor");
+}
+
 TEST_F(CliTest, AnUnwritableOutIsRefused) {
   const std::string log = JointLog();
   const std::string file = scratch_.Write("in_the_way", "x");

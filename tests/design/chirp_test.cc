@@ -27,7 +27,7 @@ TEST(ChirpTest, TableHasTheDocumentsDigits) {
   const auto rows = DesignChirps(Document());
   ASSERT_TRUE(rows.ok());
   std::vector<std::vector<std::string>> cells;
-  std::istringstream table(ChirpTable(rows.value()));
+  std::istringstream table(ToTable(ChirpRun{.info = {}, .rows = rows.value()}));
   for (std::string line; std::getline(table, line);) {
     std::istringstream words(line.substr(34));
     cells.emplace_back();

@@ -38,7 +38,7 @@ TEST(DiagnoseReportTest, UnknownSaysWhatWasFoundAndWhereTheRestLies) {
                                "arm_rad, speed 4..9 rad/s."),
             std::string::npos)
       << d.explanation;
-  const std::string page = DiagnosisTable(d);
+  const std::string page = ToTable(DiagnoseRun{.info = {}, .diagnosis = d});
   EXPECT_LT(page.find("angle 0.4..0.8 rad"), page.find("\nwhat remains"));
   EXPECT_LT(page.find("\nwhat remains"), page.rfind("speed 4..9 rad/s"));
 }
@@ -55,7 +55,7 @@ TEST(DiagnoseReportTest, UnknownWithoutAnEffectSaysWhereTheGapLies) {
 }
 
 TEST(DiagnoseReportTest, JsonHoldsBothPlaces) {
-  const auto json = nlohmann::json::parse(DiagnosisJson(Unfinished(), 0));
+  const auto json = ToJson(DiagnoseRun{.info = {}, .diagnosis = Unfinished()});
   EXPECT_EQ(json["where"][0]["condition"], "angle 0.4..0.8 rad");
   EXPECT_EQ(json["remains"][0]["condition"], "speed 4..9 rad/s");
   EXPECT_EQ(json["remains"][0]["share_of_time"], 0.1);

@@ -19,8 +19,13 @@ nlohmann::json DataOf(const std::string& page) {
   return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
 }
 
+std::string PageOf(const std::string& kind) {
+  const auto page = DemoPage(kind);
+  return ReportHtml(page->result, page->source);
+}
+
 TEST(HtmlReportTest, IsOneFileWithoutTheNetwork) {
-  const std::string page = ReportHtml(DemoPage("diagnosis")->source);
+  const std::string page = PageOf("diagnosis");
   // Nothing is fetched: no element names a source, and what the libraries mention in comments is never asked for.
   for (const char* fetching : {"<link", "<img", "src=\"http", "@import", "url(http", "fetch(", "XMLHttpRequest("}) {
     const std::string text = fetching;
@@ -35,7 +40,7 @@ TEST(HtmlReportTest, IsOneFileWithoutTheNetwork) {
 }
 
 TEST(HtmlReportTest, TextFromOutsideCannotEndTheScript) {
-  const std::string page = ReportHtml(DemoPage("diagnosis")->source);
+  const std::string page = PageOf("diagnosis");
   EXPECT_EQ(page.find("</script><b>"), std::string::npos);
   const auto data = DataOf(page);
   ASSERT_FALSE(data.is_discarded());
@@ -44,7 +49,7 @@ TEST(HtmlReportTest, TextFromOutsideCannotEndTheScript) {
 
 TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
   const auto page = DemoPage("diagnosis");
-  const auto data = DataOf(ReportHtml(page->source));
+  const auto data = DataOf(ReportHtml(page->result, page->source));
   const auto& log = data["logs"][0];
   EXPECT_EQ(log["sha256"], Sha256OfFile(page->recordings[0].log_path).value());
   EXPECT_EQ(log["traces"]["time"].size(), page->recordings[0].rows());
@@ -58,7 +63,7 @@ TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
 
 TEST(HtmlReportTest, ALongLogKeepsItsSpikeInFewRows) {
   const auto page = LongPage(1000000, 654321);
-  const std::string text = ReportHtml(page->source);
+  const std::string text = ReportHtml(page->result, page->source);
   const auto data = DataOf(text);
   const auto& traces = data["logs"][0]["traces"];
   EXPECT_LT(traces["time"].size(), 80000u);
@@ -71,7 +76,7 @@ TEST(HtmlReportTest, ALongLogKeepsItsSpikeInFewRows) {
 TEST(HtmlReportTest, ShowsTheVideoBesideIt) {
   const Scratch scratch;
   const auto page = DemoPage("replay");
-  ASSERT_TRUE(WriteReportHtml(scratch.Path("a"), page->source).ok());
+  ASSERT_TRUE(WriteReportHtml(scratch.Path("a"), page->result, page->source).ok());
   const std::string report = scratch.Path("a/report.html");
   EXPECT_NE(ReadAll(report).find("data-video=\"\""), std::string::npos);
   EXPECT_FALSE(AttachVideo(report, "\"><script>").value());
@@ -80,7 +85,7 @@ TEST(HtmlReportTest, ShowsTheVideoBesideIt) {
   EXPECT_TRUE(AttachVideo(report, "video.mp4").value());
   EXPECT_FALSE(AttachVideo(scratch.Path("b/report.html"), "video.mp4").value());
   scratch.Write("c/video.mp4", "x");
-  ASSERT_TRUE(WriteReportHtml(scratch.Path("c"), page->source).ok());
+  ASSERT_TRUE(WriteReportHtml(scratch.Path("c"), page->result, page->source).ok());
   EXPECT_NE(ReadAll(scratch.Path("c/report.html")).find("data-video=\"video.mp4\""), std::string::npos);
 }
 

@@ -36,8 +36,8 @@ std::unique_ptr<Page> DemoPage(const std::string& kind) {
   page->recordings = {LoadRecording(experiment.value(), root + "/demo/qube.csv").value()};
   ThreadPool pool(1);
   std::vector<double> values = page->model->Nominal();
-  page->source = {.result_json = kDiagnosis,
-                  .command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv",
+  page->result = nlohmann::ordered_json::parse(kDiagnosis);
+  page->source = {.command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv",
                   .experiment = &page->model->experiment(),
                   .recordings = {&page->recordings.front()},
                   .held_out = {true},
@@ -51,9 +51,8 @@ std::unique_ptr<Page> DemoPage(const std::string& kind) {
   page->source.predictions.push_back(
       {"diagnosed", Replay(*page->model, page->recordings, {.time_step_s = 0.002, .values = values}, pool).logs});
   if (kind == "replay") {
-    const Comparison comparison = Compare(nominal, page->recordings, pool);
-    page->source.result_json =
-        ReplayJson({.result = nominal, .comparison = comparison, .model = *page->model, .values = page->source.values});
+    page->result =
+        ToJson(ReplayRunOf(*page->model, page->source.values, nominal, Compare(nominal, page->recordings, pool)));
     page->source.predictions.pop_back();
   }
   return page;

@@ -4,6 +4,7 @@
 #define GAPSCOPE_TESTS_REPORT_PAGES_H_
 
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@
 
 namespace gapscope::testing {
 
-// A source and what it points to.
+// A result, what its page shows beside it, and what that points to.
 struct Page {
+  nlohmann::ordered_json result;
   std::shared_ptr<const Model> model;
   std::vector<Recording> recordings;
   ReportSource source;

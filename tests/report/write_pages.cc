@@ -9,8 +9,10 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const std::string folder = argv[1];
   bool good = true;
-  for (const std::string kind : {"replay", "diagnosis"})
-    good = good && WriteFile(folder + "/" + kind + ".html", ReportHtml(testing::DemoPage(kind)->source)).ok();
-  good = good && WriteFile(folder + "/long.html", ReportHtml(testing::LongPage(1000000, 654321)->source)).ok();
+  const auto write = [&](const std::string& name, const testing::Page& page) {
+    good = good && WriteFile(folder + "/" + name + ".html", ReportHtml(page.result, page.source)).ok();
+  };
+  for (const std::string kind : {"replay", "diagnosis"}) write(kind, *testing::DemoPage(kind));
+  write("long", *testing::LongPage(1000000, 654321));
   return good ? 0 : 1;
 }

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "src/core/file.h"
 #include "src/report/tune_report.h"
@@ -41,10 +42,8 @@ class JournalTest : public ::testing::Test {
     return Tune(*rig_.model, SplitData(logs_, {}), rig_.model->Nominal(), options, pool);
   }
   // The whole result but the time that it took.
-  std::string Bytes(Result<TuneSummary> summary) {
-    TuneSummary value = std::move(summary).value();
-    value.wall_s = value.solve_s = 0;
-    return TuneJson(value, *rig_.model, 0);
+  std::string Bytes(const Result<TuneSummary>& summary) {
+    return ToJson(TuneRunOf(summary.value(), *rig_.model, 0), Timing::kLeaveOut).dump();
   }
 
   std::filesystem::path folder_;

@@ -1,0 +1,130 @@
+#include "src/report/read_run.h"
+
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "src/core/file.h"
+
+namespace gapscope {
+namespace {
+
+using nlohmann::ordered_json;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Null stands for a number that does not exist.
+double Number(const ordered_json& json) { return json.is_null() ? kNan : json.get<double>(); }
+double NumberAt(const ordered_json& json, const char* key) { return Number(json.at(key)); }
+
+RunModel ModelFrom(const ordered_json& json) {
+  RunModel model;
+  for (const auto& effect : json.at("effects")) model.effects.push_back({effect.at("name"), effect.at("on")});
+  for (const auto& [name, value] : json.at("values").items()) model.values.emplace_back(name, Number(value));
+  return model;
+}
+
+SignalScore ScoreFrom(const std::string& signal, const ordered_json& json) {
+  return {.signal = signal,
+          .rmse = NumberAt(json, "rmse"),
+          .mae = NumberAt(json, "mae"),
+          .nrmse = NumberAt(json, "nrmse"),
+          .max = NumberAt(json, "max"),
+          .lag_s = NumberAt(json, "lag_s"),
+          .correlation = NumberAt(json, "correlation")};
+}
+
+std::vector<TuneRun::Log> LogsFrom(const ordered_json& json) {
+  std::vector<TuneRun::Log> logs;
+  for (const auto& entry : json) {
+    TuneRun::Log log{
+        .log = entry.at("log"),
+        .outcome = entry.at("outcome") == OutcomeName(Outcome::kDiverged) ? Outcome::kDiverged : Outcome::kCompleted,
+        .signals = {}};
+    for (const auto& [signal, score] : entry.at("signals").items()) log.signals.push_back(ScoreFrom(signal, score));
+    logs.push_back(std::move(log));
+  }
+  return logs;
+}
+
+void ReadKnowledge(const ordered_json& json, TuneRun* run) {
+  for (const auto& p : json.at("parameters")) {
+    run->parameters.push_back({.name = p.at("name"),
+                               .unit = p.at("unit"),
+                               .nominal = NumberAt(p, "nominal"),
+                               .value = NumberAt(p, "value"),
+                               .low = NumberAt(p, "low"),
+                               .high = NumberAt(p, "high"),
+                               .at_bound = p.at("at_bound"),
+                               .identifiable = p.at("identifiable")});
+  }
+  for (const auto& entry : json.at("flat")) {
+    TuneRun::Flat flat{.direction = {}, .text = entry.at("text")};
+    for (const auto& [name, weight] : entry.at("direction").items()) flat.direction.emplace_back(name, Number(weight));
+    run->flat.push_back(std::move(flat));
+  }
+  for (const auto& entry : json.at("correlated")) {
+    const auto& names = entry.at("parameters");
+    run->correlated.push_back({names.at(0), names.at(1), NumberAt(entry, "correlation")});
+  }
+}
+
+TuneRun TuneRunFrom(const ordered_json& json) {
+  const auto& error = json.at("error");
+  const auto& versions = json.at("versions");
+  TuneRun run{
+      .info = {.seed = json.at("seed"), .gapscope = versions.at("gapscope"), .mujoco = versions.at("mujoco")},
+      .optimizer = json.at("optimizer"),
+      .termination = json.at("termination"),
+      .starts_agree = json.at("starts_agree"),
+      .starts = json.at("starts"),
+      .evaluations = json.at("evaluations"),
+      .replays = json.at("replays"),
+      .wall_s = json.value("wall_s", kNan),
+      .solve_s = json.value("solve_s", kNan),
+      .error_nominal = NumberAt(error, "nominal"),
+      .error_train = NumberAt(error, "train"),
+      .error_held_out = NumberAt(error, "held_out"),
+      .held_out_by = json.at("held_out_by"),
+      .train = LogsFrom(json.at("train")),
+      .held_out = LogsFrom(json.at("held_out")),
+      .model = ModelFrom(json.at("model")),
+      .time_step_s = NumberAt(json, "time_step_s"),
+      .command_shift_s = NumberAt(json, "command_shift_s"),
+  };
+  ReadKnowledge(json, &run);
+  return run;
+}
+
+// `read` may throw what nlohmann does at a missing key or a wrong kind of value.
+template <class Read>
+auto Guarded(const Read& read, const std::string& where, const char* allowed) -> Result<decltype(read())> {
+  try {
+    return read();
+  } catch (const ordered_json::exception& e) {
+    return Error{.what = "not a result that can be read", .where = where, .actual = e.what(), .allowed = allowed};
+  }
+}
+
+}  // namespace
+
+Result<ordered_json> ReadJson(const std::string& path) {
+  std::error_code failure;
+  const std::string file =
+      std::filesystem::is_directory(path, failure) ? (std::filesystem::path(path) / "result.json").string() : path;
+  GS_ASSIGN(const std::string text, ReadFile(file));
+  ordered_json json = ordered_json::parse(text, nullptr, false);
+  if (json.is_discarded()) return Error{.what = "not JSON", .where = file};
+  return json;
+}
+
+Result<RunModel> ReadRunModel(const ordered_json& json, const std::string& where) {
+  const auto read = [&] { return ModelFrom(json.at("model")); };
+  return Guarded(read, where, "a result of gapscope replay, tune or diagnose");
+}
+
+Result<TuneRun> ReadTuneRun(const ordered_json& json, const std::string& where) {
+  const auto read = [&] { return TuneRunFrom(json); };
+  return Guarded(read, where, "gapscope.tune/1");
+}
+
+}  // namespace gapscope

@@ -1,0 +1,38 @@
+#include "src/report/write_run.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "src/core/file.h"
+
+namespace gapscope {
+
+std::vector<RunTable> TraceTables(const std::vector<LogReplay>& logs, const std::vector<Recording>& recordings) {
+  std::vector<std::string> paths;
+  for (const auto& log : logs) paths.push_back(log.log_path);
+  const std::vector<std::string> names = CsvNames(paths);
+  std::vector<RunTable> tables;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    RunTable table{.path = "traces/" + names[l], .columns = {{"__time", logs[l].time_s}}};
+    for (const auto& command : recordings[l].commands)
+      table.columns.push_back({"command/" + command.actuator, command.values});
+    for (const auto& signal : logs[l].signals) {
+      table.columns.push_back({"measured/" + signal.signal, signal.measured});
+      table.columns.push_back({"predicted/" + signal.signal, signal.predicted});
+    }
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+Status WriteRun(const std::string& folder, const nlohmann::ordered_json& result, const RunFiles& files) {
+  const std::filesystem::path out = folder;
+  GS_RETURN_IF_ERROR(WriteFile(out / "result.json", result.dump(2) + "\n"));
+  if (!files.model_xml.empty()) GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", files.model_xml));
+  for (const auto& table : files.tables)
+    GS_RETURN_IF_ERROR(WriteFile(out / table.path, CsvText(table.columns, table.digits)));
+  if (files.report) GS_RETURN_IF_ERROR(WriteReportHtml(folder, result, *files.report));
+  return Ok();
+}
+
+}  // namespace gapscope

@@ -311,7 +311,7 @@ void AddPlan(CLI::App& program, Run& run) {
   shard->add_option("folder", shard_flags->folder, "The plan's folder")->required();
   shard->add_option("--shard", shard_flags->shard, "i/N: every N-th log from the i-th on")->required();
   AddCommonFlags(*shard, shard_flags->common, false);
-  shard->footer("Example: gapscope run --shard 0/8 work");
+  shard->footer("Example: gapscope run --shard 1/8 work");
   shard->callback([shard_flags, &run] { run = [shard_flags] { return RunShard(*shard_flags); }; });
 
   auto merge_flags = std::make_shared<ShardFlags>();

@@ -134,7 +134,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
     moves_.push_back(plugin < 0 || actuator == 0 || plugin != mujoco_->actuator_plugin[actuator - 1]);
   }
   apart_.resize(model.mirrored_joints().size());
-  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nu,
+  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nactuator,
                                               [](int plugin) { return plugin >= 0; });
   for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
 }

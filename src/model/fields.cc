@@ -102,8 +102,8 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
   const mjtNum* bias = m.actuator_biasprm + id * mjNBIAS;
   // The element's own, plugin or not.
   if (field == "forcerange" || field == "ctrlrange") {
-    const mjtNum* range = field == "ctrlrange" ? m.actuator_ctrlrange + 2 * m.actuator_ctrladr[id]
-                                               : m.actuator_forcerange + 2 * m.actuator_outadr[id];
+    const mjtNum* range =
+        field == "ctrlrange" ? m.actuator_ctrlrange + 2 * m.actuator_ctrladr[id] : m.actuator_forcerange + 2 * id;
     Field result;
     for (int i = 0; i < 2; ++i) result.components.push_back({{.offset = OffsetOf(m, range + i)}});
     return result;

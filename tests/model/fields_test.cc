@@ -135,6 +135,30 @@ TEST(FieldsTest, NumericsAreWrittenWhole) {
   EXPECT_EQ(model->numeric_data[1], 7);
 }
 
+TEST(FieldsTest, ARangeIsItsActuatorsOwnBesideOneOfSeveralForces) {
+  const ModelPtr model = Compile(R"(<mujoco>
+    <worldbody>
+      <body><joint name="ball" type="ball"/><geom size="0.1"/></body>
+      <body pos="3 0 0"><joint name="hinge"/><geom size="0.1"/></body>
+    </worldbody>
+    <actuator>
+      <orientation name="turret" joint="ball" kp="1"/>
+      <position name="servo" joint="hinge" kp="2" forcerange="-3 4" ctrlrange="-5 6"/>
+    </actuator>
+  </mujoco>)");
+  ASSERT_TRUE(model);
+  ASSERT_EQ(model->actuator_outadr[1], 3);  // the turret has three forces and three controls
+  ASSERT_EQ(model->actuator_ctrladr[1], 3);
+  for (const auto& [text, low, high] :
+       {std::tuple{"actuator/servo/forcerange", -3.0, 4.0}, std::tuple{"actuator/servo/ctrlrange", -5.0, 6.0}}) {
+    const auto field = ResolveField(*model, text, "");
+    ASSERT_TRUE(field.ok());
+    const char* buffer = static_cast<const char*>(model->buffer);
+    EXPECT_EQ(*reinterpret_cast<const mjtNum*>(buffer + field.value().components[0][0].offset), low) << text;
+    EXPECT_EQ(*reinterpret_cast<const mjtNum*>(buffer + field.value().components[1][0].offset), high) << text;
+  }
+}
+
 TEST(FieldsTest, WrongFieldsNameTheNearest) {
   const ModelPtr model = Compile(kRobot);
   const std::vector<std::array<const char*, 2>> cases = {{"joint/hinge/dampng", "did you mean 'damping'?"},

@@ -270,6 +270,34 @@ TEST_F(SimulatorTest, ALaggingDriveStartsFromRestWithTheLog) {
   }
 }
 
+TEST(SimulatorMemoryTest, AMotorRemembersBesideAnActuatorWithoutControls) {
+  // A passive drive on a joint of its own makes more actuators than controls; the motor behind it still is one that
+  // remembers, so its late torque is that of before the window.
+  const Scratch scratch;
+  const auto predicted = [&](const std::string& beside) {
+    const std::string mjcf =
+        R"(<mujoco><option timestep="0.001" gravity="0 0 0"/><extension><plugin plugin="gapscope.motor"><instance name="drive">
+          <config key="law" value="torque"/><config key="torque_delay_s" value="0.02"/></instance></plugin></extension>
+        <worldbody><body><joint name="hinge" damping="0.05"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body>
+          <body><joint name="other"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>
+        <actuator>)" +
+        beside + R"(<plugin name="motor" joint="hinge" plugin="gapscope.motor" instance="drive"/></actuator></mujoco>)";
+    const auto experiment = MakeExperiment(scratch, mjcf,
+                                           "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - "
+                                           "{signal: q, column: q, joint: hinge, unit: rad}\n");
+    const auto model = MakeModel(experiment);
+    const Recording recording =
+        MakeRecording(experiment, 100, 0.002, [](int, double t) { return t < 0.1 ? 1.0 : -1.0; });
+    Simulator simulator(*model, 0);
+    EXPECT_TRUE(simulator.SetParameters(model->Nominal(), recording));
+    std::vector<double> angle(38);
+    EXPECT_EQ(simulator.Run(recording, {52, 90}, AtRest(*model), angle).outcome, Outcome::kCompleted);
+    return angle;
+  };
+  EXPECT_EQ(predicted(R"(<dcmotor name="passive" joint="other" motorconst="1 1" resistance="1" input="none"/>)"),
+            predicted(""));
+}
+
 TEST(EarlierCommandsTest, WhatHoldsAWeightHeldItBeforeTheLog) {
   // A spring-loaded disc that its first command holds still: the lag has nothing to do.
   const Scratch scratch;

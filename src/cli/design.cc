@@ -56,7 +56,7 @@ void AddRigFlags(CLI::App& command, RigFlags& flags) {
   command.add_option("--duration", flags.duration_s, "s")->check(FinitePositive())->capture_default_str();
   command.add_option("--rate", flags.rate_hz, "Rows a second")->check(FinitePositive())->capture_default_str();
   command.add_option("--margin", flags.margin, "Share of every limit that may be used")
-      ->check(CLI::Range(0.01, 1.0))
+      ->check(FiniteIn(0.01, 1))
       ->capture_default_str();
   command.add_option("--actuator", flags.actuator, "Which command is driven (default: the experiment's first)");
   command.add_option("--hold", flags.hold, "Another command's constant value: ACTUATOR=VALUE")->allow_extra_args(false);

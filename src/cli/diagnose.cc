@@ -75,9 +75,9 @@ void AddDiagnose(CLI::App& program, Run& run) {
   AddCommonFlags(*command, flags->common, true);
   command->add_option("--hold-out", flags->hold_out, "A log to judge by, not to fit")->allow_extra_args(false);
   command->add_option("--budget", flags->budget_s, "Seconds; the best verdict so far when they are spent")
-      ->check(CLI::PositiveNumber)
+      ->check(FinitePositive())
       ->capture_default_str();
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(CLI::PositiveNumber);
+  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
   command->footer(
       "Example: gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis");
   command->callback([flags, &run] { run = [flags] { return RunDiagnose(*flags); }; });

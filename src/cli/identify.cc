@@ -94,7 +94,7 @@ void AddIdentify(CLI::App& program, Run& run) {
         ->add_option("--cutoff", o.cutoff_hz,
                      "Of the zero-phase low pass, Hz (default: a twelfth of the sample rate, at most 15)")
         ->check(FinitePositive());
-    command->add_option("--from", o.from_s, "Use the logs from this time on, s")->check(CLI::Range(0.0, 1e9));
+    command->add_option("--from", o.from_s, "Use the logs from this time on, s")->check(FiniteIn(0, 1e9));
     command->add_option("--to", o.to_s, "Use the logs up to this time, s")->check(FinitePositive());
     command->add_option("--joint", o.joint,
                         "Which joint (default: the driven one; ring-down, resonance: the swinging one)");
@@ -120,15 +120,14 @@ void AddIdentify(CLI::App& program, Run& run) {
       command
           ->add_option("--torque-delay", o.torque_delay_s,
                        "Of a servo whose torque is logged, s (from identify pd): which target a logged torque has seen")
-          ->check(CLI::Range(0.0, 1.0));
+          ->check(FiniteIn(0, 1));
     }
     if (name == "friction" || name == "cable")
       command->add_flag("--free-inertia", o.free_inertia,
                         "Scale the model's inertial torques to the log: for fast motion, where the model's inertia is "
                         "not known well");
     if (name == "steady")
-      command->add_option("--coulomb", o.coulomb_n_m, "Dry friction, N m (default: fitted)")
-          ->check(CLI::Range(0.0, 1e6));
+      command->add_option("--coulomb", o.coulomb_n_m, "Dry friction, N m (default: fitted)")->check(FiniteIn(0, 1e6));
     if (name == "state-space") {
       command->add_option("--bounds", o.bounds_share, "Coefficients stay within this share of nominal")
           ->check(FinitePositive())

@@ -179,13 +179,13 @@ void AddRender(CLI::App& program, Run& run) {
   command->add_option("--speed", flags->speed, "Seconds of the log per second of video: 0.25 is slow motion")
       ->check(FinitePositive())
       ->capture_default_str();
-  command->add_option("--from", flags->from_s, "Where to begin, s of the log")->check(CLI::NonNegativeNumber);
+  command->add_option("--from", flags->from_s, "Where to begin, s of the log")->check(FiniteNonNegative());
   command->add_option("--to", flags->to_s, "Where to end, s of the log (default: its end)")->check(FinitePositive());
   command->add_option("--at", flags->at_s, "Time of a still, s of the log (default: of the greatest error)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(FiniteNonNegative());
   command->add_option("--size", flags->size, "WIDTHxHEIGHT in pixels, even")->capture_default_str();
   command->add_option("--fps", flags->frames_per_s, "Frames per second")
-      ->check(CLI::Range(1.0, 240.0))
+      ->check(FiniteIn(1, 240))
       ->capture_default_str();
   command->add_option("--mode", flags->mode, "free_run or windows (default: the experiment's)")
       ->check(CLI::IsMember({"free_run", "windows"}));

@@ -6,19 +6,41 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <functional>
 #include <optional>
+#include <set>
 
 namespace gapscope::cli {
 
-CLI::Validator FinitePositive() {
+namespace {
+
+// `allowed` of a finite number that `good` accepts; `name` stands in the help.
+CLI::Validator Finite(const std::string& allowed, const std::string& name, std::function<bool(double)> good) {
   return CLI::Validator(
-      [](std::string& text) {
+      [allowed, good = std::move(good)](std::string& text) {
         double value = 0;
         const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool good = code == std::errc() && end == text.data() + text.size() && std::isfinite(value) && value > 0;
-        return good ? std::string() : "'" + text + "' is not a finite number above zero";
+        const bool number = code == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+        return number && good(value) ? std::string() : "'" + text + "' is not a finite number " + allowed;
       },
-      "POSITIVE");
+      name);
+}
+
+}  // namespace
+
+CLI::Validator FinitePositive() {
+  return Finite("above zero", "POSITIVE", [](double value) { return value > 0; });
+}
+
+CLI::Validator FiniteNonNegative() {
+  return Finite("of at least zero", "NONNEGATIVE", [](double value) { return value >= 0; });
+}
+
+CLI::Validator FiniteIn(double low, double high) {
+  const std::string range = fmt::format("{:g} - {:g}", low, high);
+  return Finite("in " + range, "FLOAT in [" + range + "]",
+                [low, high](double value) { return value >= low && value <= high; });
 }
 
 void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
@@ -117,12 +139,21 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
 }
 
 Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const std::vector<std::string>& hold_out) {
+  // One file may be spelled in two ways.
+  const auto file = [](const std::string& path) {
+    std::error_code failure;
+    const auto canonical = std::filesystem::weakly_canonical(path, failure);
+    return failure ? std::filesystem::path(path) : canonical;
+  };
   HeldOutLogs result{.all = logs};
+  std::set<std::filesystem::path> known, held;
+  for (const auto& log : logs) known.insert(file(log));
   for (const auto& log : hold_out) {
-    if (std::find(result.all.begin(), result.all.end(), log) == result.all.end()) result.all.push_back(log);
+    held.insert(file(log));
+    if (known.insert(file(log)).second) result.all.push_back(log);
   }
   for (std::size_t i = 0; i < result.all.size(); ++i) {
-    if (std::find(hold_out.begin(), hold_out.end(), result.all[i]) != hold_out.end()) result.held_out.push_back(i);
+    if (held.contains(file(result.all[i]))) result.held_out.push_back(i);
   }
   if (result.held_out.size() == result.all.size()) {
     return Error{.what = "every log is held out",

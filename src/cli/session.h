@@ -25,8 +25,11 @@ struct CommonFlags {
   std::string out;
 };
 
-// Accepts finite numbers above zero: CLI11's own check lets nan and inf through.
+// Accept finite numbers above zero, of at least zero, from low to high: CLI11's own checks let nan through, and tell of
+// a bound in 300 digits.
 CLI::Validator FinitePositive();
+CLI::Validator FiniteNonNegative();
+CLI::Validator FiniteIn(double low, double high);
 
 // Adds --json, --jobs, --seed, --quiet; and --out where the command writes a folder.
 void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder);
@@ -65,7 +68,8 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common);
 Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,
                                               ThreadPool& pool);
 
-// The logs of a command with --hold-out: all of them once, and which are held out. Error: nothing is left to fit.
+// The logs of a command with --hold-out: all of them once, as the user spells them, and which files are held out.
+// Error: nothing is left to fit.
 struct HeldOutLogs {
   std::vector<std::string> all;
   std::vector<std::size_t> held_out;

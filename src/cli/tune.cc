@@ -181,12 +181,12 @@ void AddTune(CLI::App& program, Run& run) {
   command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")
       ->check(FinitePositive());
   command->add_option("--tolerance", flags->tolerance, "Stop when a step lowers the cost by less than this share")
-      ->check(CLI::Range(1e-9, 0.1))
+      ->check(FiniteIn(1e-9, 0.1))
       ->capture_default_str();
   command
       ->add_option("--huber", flags->huber,
                    "Weigh residuals beyond this many standard deviations down; 0: plain squares")
-      ->check(CLI::NonNegativeNumber)
+      ->check(FiniteNonNegative())
       ->capture_default_str();
   command->add_option("--starts", flags->starts, "Starting points: the nominal values, then random ones")
       ->check(CLI::Range(1, 1000))

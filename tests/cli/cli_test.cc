@@ -99,6 +99,42 @@ TEST_F(CliTest, WrongArguments) {
   ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above nan", {"--fail-above"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --window inf", {"--window"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above 0", {"--fail-above"});
+  // No number of 300 digits in a message, and nan is in no range.
+  for (const auto& [command, flag, allowed] :
+       {std::tuple{"diagnose", "--budget", "above zero"}, std::tuple{"diagnose", "--window", "above zero"},
+        std::tuple{"tune", "--huber", "of at least zero"}, std::tuple{"tune", "--tolerance", "in 1e-09 - 0.1"},
+        std::tuple{"render --out still.png", "--at", "of at least zero"},
+        std::tuple{"render --out still.png", "--fps", "in 1 - 240"}}) {
+    for (const char* value : {"inf", "nan"}) {
+      const std::string line = std::string(command) + " " + Joint() + " '" + log + "' " + flag + " " + value;
+      ExpectRefused(line, {flag, std::string("'") + value + "' is not a finite number " + allowed});
+      EXPECT_LT(Run(line).err.size(), 200u);
+    }
+  }
+}
+
+TEST_F(CliTest, TheShardOfTheHelpsOwnExampleIsOne) {
+  const std::string help = Run("run --help").out;
+  const std::size_t at = help.find("Example: gapscope run --shard ");
+  ASSERT_NE(at, std::string::npos) << help;
+  const std::size_t shard = help.find("--shard", at);
+  const Answer answer = Run("run " + help.substr(shard, help.find('\n', shard) - shard));
+  EXPECT_EQ(answer.err.find("not a shard"), std::string::npos) << answer.err;
+  EXPECT_NE(answer.err.find("plan.json"), std::string::npos) << answer.err;  // what the folder of the example lacks
+}
+
+TEST_F(CliTest, ALogIsHeldOutHoweverItIsSpelled) {
+  JointLog("cwd/a.csv"), JointLog("cwd/b.csv", 0.01);
+  const std::string tune =
+      "tune " + Joint() + " a.csv b.csv --hold-out ./b.csv --quiet --json --starts 1 --tolerance 0.1 ";
+  const Answer answer = Run(tune + "--freeze motor.kp --freeze joint.inertia --freeze motor.kd");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  const auto result = nlohmann::json::parse(answer.out);
+  ASSERT_EQ(result["train"].size(), 1u);
+  ASSERT_EQ(result["held_out"].size(), 1u);
+  EXPECT_EQ(result["train"][0]["log"], "a.csv");
+  EXPECT_EQ(result["held_out"][0]["log"], "b.csv");
+  ExpectRefused("tune " + Joint() + " a.csv --hold-out ./a.csv", {"every log is held out"});
 }
 
 TEST_F(CliTest, FilesEffectsAndParametersThatAreWrong) {

@@ -23,7 +23,7 @@ Hypothesis MakeHypothesis(std::string name, std::shared_ptr<const Model> model, 
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const Parameter& p = parameters[i];
     if (p.frozen || !(p.high > p.low)) continue;
-    const bool of_effect = p.name.find('@') != std::string::npos, logarithmic = p.low > 0;
+    const bool of_effect = p.owner != Parameter::Owner::kBase, logarithmic = p.low > 0;
     Hypothesis::Free free{.parameter = static_cast<int>(i), .logarithmic = logarithmic};
     free.low = logarithmic ? std::log(p.low) : p.low;
     free.high = logarithmic ? std::log(p.high) : p.high;

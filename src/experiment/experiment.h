@@ -34,13 +34,13 @@ struct CommandSpec {
 
 enum class SignalKind { kPosition, kVelocity, kTorque };
 
-// A column that is compared with the model.
 // Second-order low-pass that the rig applies to a signal before it is logged, w^2 / (s^2 + 2 z w s + w^2): names of
 // parameters; empty: none.
 struct SensorFilter {
   std::string cutoff, damping_ratio;
 };
 
+// A column that is compared with the model.
 struct MeasuredSpec {
   std::string signal;                // name in results: "arm_rad"
   std::vector<std::string> columns;  // the first one that the log has
@@ -65,6 +65,9 @@ struct Parameter {
   // kRest: size * this. Empty: none.
   enum class With { kNone, kAngle, kRest } with = With::kNone;
   std::string size;
+  // Whose it is: the experiment's, an added effect's, or the rig's own size, which effects are scaled by: neither tuned
+  // nor shown.
+  enum class Owner { kBase, kEffect, kScale } owner = Owner::kBase;
 };
 
 // A field of the compiled model and the expressions of parameters and log values that give its components.

@@ -43,6 +43,10 @@ double ScaleOf(ScaleKind kind, const Scales& s) {
   return 1;
 }
 
+std::string ScaleName(const std::string& on, RigSize size) {
+  return "scale@" + on + (size == RigSize::kTorque ? ".torque_n_m" : ".inertia_kg_m2");
+}
+
 namespace {
 
 // Where an effect makes sense in this structure.
@@ -184,11 +188,12 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                             .high = p.high,
                             .frozen = false,
                             .with = with,
-                            .size = with == Parameter::With::kNone ? "" : names.front()});
+                            .size = with == Parameter::With::kNone ? "" : names.front(),
+                            .owner = Parameter::Owner::kEffect});
   }
-  for (const auto& [suffix, value, unit] : {std::tuple{".torque_n_m", scales.torque_n_m, "N m"},
-                                            std::tuple{".inertia_kg_m2", scales.inertia_kg_m2, "kg m^2"}}) {
-    const std::string name = "scale@" + use.on + suffix;
+  for (const auto& [size, value, unit] : {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"},
+                                          std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {
+    const std::string name = ScaleName(use.on, size);
     const auto known = std::find_if(structure.parameters.begin(), structure.parameters.end(),
                                     [&](const Parameter& q) { return q.name == name; });
     if (known == structure.parameters.end())
@@ -198,7 +203,8 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                               .nominal = value,
                               .low = value,
                               .high = value,
-                              .frozen = true});
+                              .frozen = true,
+                              .owner = Parameter::Owner::kScale});
   }
   return effect.apply(structure, use.on, names);
 }

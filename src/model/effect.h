@@ -67,6 +67,10 @@ struct Effect {
 // All effects, sorted by name; a name that acts differently on motors and joints stands twice.
 const std::vector<Effect>& Catalogue();
 
+// The rig's own size at a place, a parameter that expressions of effects there may use.
+enum class RigSize { kTorque, kInertia };  // Scales::torque_n_m, Scales::inertia_kg_m2
+std::string ScaleName(const std::string& on, RigSize size);
+
 // One effect on one place.
 struct EffectUse {
   std::string effect, on;

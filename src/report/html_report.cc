@@ -153,7 +153,7 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   data["model"] = FileStamp(source.experiment->model_path);
   data["parameters"] = ordered_json::array();
   for (const Parameter& p : source.parameters) {
-    if (p.name.starts_with("scale@")) continue;
+    if (p.owner == Parameter::Owner::kScale) continue;
     data["parameters"].push_back({{"name", p.name},
                                   {"unit", p.unit},
                                   {"doc", p.doc},

@@ -83,8 +83,9 @@ ordered_json LogJson(const LogComparison& log, const LogReplay& replay) {
 
 ReplayRun ReplayRunOf(const Model& model, std::span<const double> values, ReplayResult result, Comparison comparison) {
   ReplayRun run{.result = std::move(result), .comparison = std::move(comparison), .model = RunModelOf(model, values)};
-  for (const auto& [name, value] : run.model.values) {
-    if (!name.starts_with("scale@")) run.parameters.emplace_back(name, value);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const Parameter& p = model.parameters()[i];
+    if (p.owner != Parameter::Owner::kScale) run.parameters.emplace_back(p.name, values[i]);
   }
   return run;
 }

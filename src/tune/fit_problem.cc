@@ -43,7 +43,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
     c.low = c.ToSearch(p.low);
     c.high = c.ToSearch(p.high);
     const double value = values_[index];
-    if (options_.logarithmic_effects && !c.logarithmic && value != 0 && p.name.find('@') != std::string::npos &&
+    if (options_.logarithmic_effects && !c.logarithmic && value != 0 && p.owner == Parameter::Owner::kEffect &&
         p.unit.starts_with("N m")) {
       constexpr double kLeast = 1e-3;  // of the value: zero is out of reach, and was not the answer
       c.logarithmic = true;
@@ -152,7 +152,7 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
   prior_weight_ = Eigen::VectorXd::Zero(low_.size());
   for (std::size_t i = 0; i < coordinates_.size() && options_.prior_share > 0; ++i) {
     // In units of the noise: only meaningful with weights of 1 / noise. An effect's parameters are what is asked for.
-    if (model.parameters()[coordinates_[i].parameter].name.find('@') != std::string::npos) continue;
+    if (model.parameters()[coordinates_[i].parameter].owner != Parameter::Owner::kBase) continue;
     const auto k = static_cast<Eigen::Index>(i);
     const double deviation = options_.prior_share * (high_[k] - low_[k]);
     prior_weight_[k] = 1 / (deviation * deviation);

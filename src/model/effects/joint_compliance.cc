@@ -37,8 +37,9 @@ Effect Effect_joint_compliance() {
       .partners = {"command_delay", "backlash"},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         // Damping in proportion to the stiffness, by the ratio at the rig's own inertia.
+        const std::string inertia = ScaleName(on, RigSize::kInertia);
         const std::string damping =
-            names[2] + "*2*sqrt(" + names[0] + "*scale@" + on + ".inertia_kg_m2*" + names[1] + "*(1-" + names[1] + "))";
+            names[2] + "*2*sqrt(" + names[0] + "*" + inertia + "*" + names[1] + "*(1-" + names[1] + "))";
         return structure.AddSplit(
             {.joint = on, .share = names[1], .stiffness = names[0], .damping = damping, .gap = ""});
       },

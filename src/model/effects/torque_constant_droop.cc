@@ -32,7 +32,7 @@ Effect Effect_torque_constant_droop() {
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_at_peak", names[0]));
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_exponent", names[1]));
-        return structure.AddMotorTerm(on, "droop_reference_n_m", "scale@" + on + ".torque_n_m");
+        return structure.AddMotorTerm(on, "droop_reference_n_m", ScaleName(on, RigSize::kTorque));
       },
   };
 }

@@ -197,7 +197,7 @@ Result<int> Model::Find(const std::string& name, const std::string& where) const
   if (const int index = IndexOf(name); index >= 0) return index;
   std::vector<std::string> names;
   for (const auto& p : parameters_) {
-    if (!p.name.starts_with("scale@")) names.push_back(p.name);
+    if (p.owner != Parameter::Owner::kScale) names.push_back(p.name);
   }
   return NoElement("no such parameter", name, names, where);
 }
@@ -266,7 +266,15 @@ Result<std::string> Model::ToXml(std::span<const double> values, const std::map<
   mj_copyBack(structure.spec.get(), exported->compiled_.get());
   std::string xml(1 << 20, '\0');
   char message[512] = "";
-  if (mj_saveXMLString(structure.spec.get(), xml.data(), static_cast<int>(xml.size()), message, sizeof message) < 0) {
+  const auto save = [&] {
+    return mj_saveXMLString(structure.spec.get(), xml.data(), static_cast<int>(xml.size()), message, sizeof message);
+  };
+  int status = save();
+  if (status > 0) {  // the size that it takes
+    xml.resize(static_cast<std::size_t>(status) + 1);
+    status = save();
+  }
+  if (status != 0) {
     return Error{.what = "cannot write the tuned model: " + OneLine(message), .where = experiment_.model_path};
   }
   xml.resize(std::char_traits<char>::length(xml.c_str()));

@@ -139,7 +139,9 @@ bool Structure::IsServo(const std::string& actuator) const {
   const int id = mj_name2id(base_.get(), mjOBJ_ACTUATOR, actuator.c_str());
   const int instance = id < 0 ? -1 : base_->actuator_plugin[id];
   const char* law = instance < 0 ? nullptr : mj_getPluginConfig(base_.get(), instance, "law");
-  return law && (std::string_view(law) == "position" || std::string_view(law) == "duty");
+  // A motor without a law follows a position (src/plugins/motor/README.md).
+  if (instance < 0 || std::string_view(mjs_getString(found->plugin.plugin_name)) != "gapscope.motor") return false;
+  return !law || !*law || std::string_view(law) == "position" || std::string_view(law) == "duty";
 }
 
 bool Structure::HasSpring(const std::string& joint) const {
@@ -191,8 +193,8 @@ Status Structure::AddFrictionTerm(const std::string& joint, const std::string& k
 
 Status Structure::AddSpringTerm(const std::string& joint, const std::string& key, const std::string& expression) {
   if (!FindJoint(joint)) return NoSuch("joint", joint, Joints());
-  // Two springs on one joint keep their own rest angle: a sum of terms about zero does not exist, so the second gets
-  // its own instance.
+  // Two springs on one joint keep their own rest angle: a sum of terms about zero does not exist, so two effects that
+  // set the same number are refused.
   if (spring_[joint].contains(key)) {
     return Error{.what = "the joint '" + joint + "' has two effects that set '" + key + "'",
                  .allowed = "one",

@@ -131,6 +131,27 @@ TEST(BuildErrorsTest, EffectUses) {
   }
 }
 
+TEST(EffectPlacesTest, AMotorWithoutALawIsAServo) {
+  const auto possible = [](const std::string& config) {
+    const Scratch scratch;
+    const std::string mjcf = R"(<mujoco><extension><plugin plugin="gapscope.motor"><instance name="drive">)" + config +
+                             R"(</instance></plugin></extension>
+      <worldbody><body><joint name="hinge"/><geom size="0.1"/></body></worldbody>
+      <actuator><plugin name="motor" joint="hinge" plugin="gapscope.motor" instance="drive"/></actuator></mujoco>)";
+    const auto model = MakeModel(MakeExperiment(scratch, mjcf,
+                                                "commands:\n  - {actuator: motor, column: u}\nmeasured:\n  - {signal: "
+                                                "q, column: q, joint: hinge, unit: rad}\n"));
+    const auto uses = model->PossibleEffects();
+    EXPECT_TRUE(uses.ok());
+    return std::find(uses.value().begin(), uses.value().end(), EffectUse{"torque_delay", "motor"}) !=
+           uses.value().end();
+  };
+  const std::string kp = "<config key=\"kp\" value=\"2\"/>", law = "<config key=\"law\" value=";
+  EXPECT_TRUE(possible(kp)) << "position is the default";
+  EXPECT_TRUE(possible(kp + law + "\"position\"/>"));
+  EXPECT_FALSE(possible(law + "\"torque\"/>"));
+}
+
 TEST(ParameterWriterTest, RefusesWhatIsNotFiniteOrNotPhysical) {
   const Scratch scratch;
   const std::string yaml = std::string(kYaml) +

@@ -77,6 +77,23 @@ TEST_P(ToXmlTest, ReplaysLikeTheModelItWasMadeFrom) {
   EXPECT_LT(LargestDifference(ours, theirs), kPrinted * Largest(ours));
 }
 
+TEST(ToXmlTest, AModelOfOverAMegabyteIsWrittenWhole) {
+  const Scratch scratch;
+  const std::string long_text(3 << 20, 'x');
+  const Experiment experiment =
+      MakeExperiment(scratch, "<mujoco><custom><text name=\"long\" data=\"" + long_text + R"("/></custom>
+        <worldbody><body><joint name="hinge"/><geom size="0.1"/></body></worldbody></mujoco>)",
+                     "measured:\n  - {signal: q, column: q, joint: hinge, unit: rad}\n");
+  const auto model = MakeModel(experiment);
+  ASSERT_NE(model, nullptr);
+  const auto xml = model->ToXml({}, {}, {});
+  ASSERT_TRUE(xml.ok()) << xml.error().Text();
+  EXPECT_GT(xml.value().size(), long_text.size());
+  const ModelPtr loaded = Load(xml.value());
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(std::string(loaded->text_data), long_text);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Exports, ToXmlTest,
     ::testing::Values(Export{"joint", {}}, Export{"qube", {}}, Export{"flexjoint", {}}, Export{"flexlink", {}},

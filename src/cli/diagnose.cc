@@ -29,6 +29,7 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
   GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
   const ReportLogs logs{data.train, data.held_out};
   ReportSource source = SourceOf(experiment, logs);
+  source.content = PageOf(run);
   source.predictions = Predict(experiment, logs,
                                {{"nominal", base, base->Nominal()},
                                 {"refitted", diagnosis.refit_model, diagnosis.refit_values},

@@ -64,6 +64,7 @@ Status WriteReplay(const std::string& out, const Session& session, const ReplayR
   GS_ASSIGN(files.model_xml, session.model->ToXml(session.values, session.recordings.front().values, session.scales));
   const std::vector<Recording> none;
   ReportSource source = SourceOf(session.experiment, {session.recordings, none});
+  source.content = PageOf(run);
   const bool changed = !nominal.empty();
   if (changed) source.predictions.push_back({"nominal", std::move(nominal)});
   source.predictions.push_back({changed ? "with what was added" : "nominal", run.result.logs});

@@ -113,6 +113,7 @@ Status WriteTune(const std::string& out, const Session& session, const DataSplit
   RunFiles files{.tables = TraceTables(summary.held_out, data.held_out)};
   GS_ASSIGN(files.model_xml, session.model->ToXml(summary.values, data.train.front().values, session.scales));
   ReportSource source = SourceOf(session.experiment, {data.train, data.held_out});
+  source.content = PageOf(run);
   const auto nominal = [&](const std::vector<Recording>& recordings) {
     return Evaluate(*session.model, recordings, session.values, 0, session.experiment.replay.mode, options,
                     *session.pool);

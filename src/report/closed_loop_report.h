@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "replay/closed_loop.h"
-#include "src/report/write_run.h"
+#include "src/report/csv.h"
 
 namespace gapscope {
 

@@ -17,6 +17,13 @@ struct CsvColumn {
 // back. What is not finite, or beyond a column's end, is an empty field.
 std::string CsvText(const std::vector<CsvColumn>& columns, int digits = 0);
 
+// A CSV file of a run; `path` from the run's folder on.
+struct RunTable {
+  std::string path;
+  std::vector<CsvColumn> columns;
+  int digits = 0;
+};
+
 // A file name for each log, its own without the extension; where several have the same, from the second on with its
 // position in front.
 std::vector<std::string> CsvNames(const std::vector<std::string>& log_paths);

@@ -147,24 +147,95 @@ ordered_json Traces(const ReportSource& source, std::size_t index, std::size_t m
   return json;
 }
 
+// "Replay of a.csv and b.csv with qube.xml". `logs`: paths, in the order of the page.
+std::string Subject(const ReportSource& source, const std::vector<std::string>& logs) {
+  constexpr std::size_t kNamed = 3;
+  std::vector<std::string> names;
+  for (const auto& log : logs) {
+    std::string name = std::filesystem::path(log).filename().string();
+    if (std::ranges::find(names, name) == names.end()) names.push_back(std::move(name));
+  }
+  const bool more = names.size() > kNamed;
+  names.resize(std::min(names.size(), kNamed));
+  return fmt::format("{} of {}{} with {}", source.content.headline.kind, Listed(names), more ? " ..." : "",
+                     std::filesystem::path(source.experiment->model_path).filename().string());
+}
+
+ordered_json HeadlineJson(const Headline& headline) {
+  ordered_json json = {{"kind", headline.kind},
+                       {"title", headline.title},
+                       {"sentences", headline.sentences},
+                       {"stages", ordered_json::array()},
+                       {"confidence", JsonNumber(headline.confidence)},
+                       {"explanation", headline.explanation},
+                       {"notes", headline.notes}};
+  for (const Stage& stage : headline.stages) {
+    const char* mark = stage.mark == Stage::Mark::kBest ? "best" : stage.mark == Stage::Mark::kFloor ? "floor" : "";
+    json["stages"].push_back({{"name", stage.name}, {"error", stage.error}, {"mark", mark}, {"change", stage.change}});
+  }
+  return json;
+}
+
+// What was fitted first, then the other parameters that are not frozen, at the result's values.
+ordered_json Parameters(const ReportSource& source) {
+  const PageContent& content = source.content;
+  const auto named = [](const auto& list, const std::string& name, auto member) {
+    return std::ranges::find(list, name, member);
+  };
+  ordered_json rows = ordered_json::array();
+  const auto add = [&](const std::string& name, double value, const PageContent::Fitted* fitted) {
+    if (!std::isfinite(value)) return;
+    ordered_json row = {{"name", name}, {"value", value}};
+    const auto p = named(source.parameters, name, &Parameter::name);
+    if (p != source.parameters.end()) {
+      row.update({{"unit", p->unit},
+                  {"doc", p->doc},
+                  {"nominal", JsonNumber(p->nominal)},
+                  {"low", JsonNumber(p->low)},
+                  {"high", JsonNumber(p->high)}});
+    }
+    if (fitted) {
+      if (fitted->identifiable) row.update({{"from", JsonNumber(fitted->low)}, {"to", JsonNumber(fitted->high)}});
+      row.update({{"at_bound", fitted->at_bound}, {"identifiable", fitted->identifiable}});
+    }
+    rows.push_back(std::move(row));
+  };
+  for (const auto& fitted : content.fitted) add(fitted.name, fitted.value, &fitted);
+  for (const Parameter& p : source.parameters) {
+    if (p.frozen || named(content.fitted, p.name, &PageContent::Fitted::name) != content.fitted.end()) continue;
+    const auto value = std::ranges::find(content.values, p.name, [](const auto& pair) { return pair.first; });
+    if (value != content.values.end()) add(p.name, value->second, nullptr);
+  }
+  return rows;
+}
+
+// Words and tables, as they are shown.
+void AddContent(const ReportSource& source, ordered_json* data) {
+  const PageContent& content = source.content;
+  ordered_json& json = *data;
+  json["headline"] = HeadlineJson(content.headline);
+  json["where"] = ordered_json::array();
+  for (const auto& [title, shares] : content.where) {
+    if (!shares.empty()) json["where"].push_back({{"title", title}, {"shares", JsonConditions(shares)}});
+  }
+  json["candidates"] = ordered_json::array();
+  for (const auto& c : content.candidates) {
+    json["candidates"].push_back({{"title", c.title},
+                                  {"probability", JsonNumber(c.probability)},
+                                  {"held_out_error", JsonNumber(c.held_out_error)},
+                                  {"reason", c.reason}});
+  }
+  json["more_candidates"] = content.more_candidates;
+  json["parameters"] = Parameters(source);
+  json["next"] = {{"text", content.next_text}, {"command", content.next_command}};
+  json["map_of"] = content.mapped;
+}
+
 ordered_json Data(const ordered_json& result, const ReportSource& source, std::size_t most_rows) {
   ordered_json data = {{"result", result}, {"command", source.command_line}};
   data["experiment"] = FileStamp(source.experiment->path);
   data["model"] = FileStamp(source.experiment->model_path);
-  data["parameters"] = ordered_json::array();
-  for (const Parameter& p : source.parameters) {
-    if (p.owner == Parameter::Owner::kScale) continue;
-    data["parameters"].push_back({{"name", p.name},
-                                  {"unit", p.unit},
-                                  {"doc", p.doc},
-                                  {"nominal", JsonNumber(p.nominal)},
-                                  {"low", JsonNumber(p.low)},
-                                  {"high", JsonNumber(p.high)},
-                                  {"frozen", p.frozen}});
-  }
-  // The model whose missing torque is mapped: the nominal one where the result says what it lacks.
-  data["map_of"] =
-      source.predictions.size() > 1 && data["result"]["schema"] != "gapscope.replay/1" ? "nominal model" : "model";
+  AddContent(source, &data);
   data["logs"] = ordered_json::array();
   const std::size_t shown = std::min(kMostLogs, source.recordings.size());
   // Held-out logs first: they are what counts.
@@ -173,6 +244,7 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   const auto held_out = [&](std::size_t i) { return i < source.held_out.size() && source.held_out[i]; };
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return held_out(a) && !held_out(b); });
+  std::vector<std::string> paths;
   for (std::size_t k = 0; k < order.size(); ++k) {
     const std::size_t i = order[k];
     const Recording& recording = *source.recordings[i];
@@ -190,7 +262,9 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
       }
     }
     data["logs"].push_back(std::move(log));
+    paths.push_back(recording.log_path);
   }
+  data["subject"] = Subject(source, paths);
   return data;
 }
 

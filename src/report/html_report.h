@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "replay/replay.h"
+#include "src/report/page_content.h"
 
 namespace gapscope {
 
@@ -19,6 +20,7 @@ struct ReportPrediction {
 
 // What a page shows beside the result.
 struct ReportSource {
+  PageContent content;       // of the same result
   std::string command_line;  // as it was given
   const Experiment* experiment = nullptr;
   std::vector<const Recording*> recordings;
@@ -27,7 +29,7 @@ struct ReportSource {
   // Its missing torque is mapped. Null: no map.
   const Model* model = nullptr;
   std::vector<double> values;
-  // Nominal values, bounds and units of these parameters stand beside the values of the result.
+  // Of the result's model: nominal values, bounds and units that stand beside the fitted values.
   std::vector<Parameter> parameters;
 };
 

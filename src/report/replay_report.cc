@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/report/words.h"
+
 namespace gapscope {
 namespace {
 
@@ -22,8 +24,6 @@ const char* ModeName(ReplayMode mode) {
   return "";
 }
 
-// Of an error over the motion's own spread: from where it is marked as good, and as bad.
-constexpr double kClose = 0.05, kFarOff = 0.6;
 constexpr std::size_t kSparks = 12;
 
 // The end of a path that fits `width`.
@@ -40,9 +40,9 @@ std::string LogLines(const LogComparison& log, const LogReplay& replay, const Co
     const std::string nrmse = fmt::format("{:>7.4g}", s.nrmse);
     text += fmt::format("{:<24} {:<18} {:>9.4g} {:>9.4g} {} {:>8.2f} {:>6.3f} {}\n",
                         k == 0 ? Shorten(log.log_path, 24) : "", s.signal, s.rmse, s.mae,
-                        s.nrmse < kClose    ? console.Good(nrmse)
-                        : s.nrmse > kFarOff ? console.Bad(nrmse)
-                                            : nrmse,
+                        s.nrmse < kFollowsClosely ? console.Good(nrmse)
+                        : s.nrmse > kClearlyOff   ? console.Bad(nrmse)
+                                                  : nrmse,
                         1e3 * s.lag_s, s.correlation,
                         Sparkline(ErrorOverTime(replay.time_s, trace.measured, trace.predicted, kSparks)));
   }

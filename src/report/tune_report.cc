@@ -2,9 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <set>
 
 namespace gapscope {
 namespace {
@@ -32,6 +32,19 @@ ordered_json Json(const std::vector<TuneRun::Log>& logs) {
   return list;
 }
 
+// Two directions may lead with the same parameter and say the same: once is enough.
+std::vector<std::string> FlatTexts(const TuneRun& run) {
+  std::vector<std::string> texts;
+  for (const auto& flat : run.flat) {
+    if (std::ranges::find(texts, flat.text) == texts.end()) texts.push_back(flat.text);
+  }
+  return texts;
+}
+
+std::string CorrelatedText(const TuneRun::Correlated& pair) {
+  return fmt::format("{} and {} go together (correlation {:.3f})", pair.a, pair.b, pair.correlation);
+}
+
 std::string ParameterLines(const TuneRun& run, const Console& console) {
   std::string text = console.Bold(fmt::format("{:<44} {:>11} {:>11}   {:<24} {}", "parameter", "nominal", "value",
                                               "95 % interval", "unit")) +
@@ -41,12 +54,8 @@ std::string ParameterLines(const TuneRun& run, const Console& console) {
                         p.identifiable ? fmt::format("{:.4g} .. {:.4g}", p.low, p.high) : "not known", p.unit,
                         p.at_bound ? console.Warn("  at its bound") : "");
   }
-  std::set<std::string> said;  // two directions may lead with the same parameter
-  for (const auto& flat : run.flat) {
-    if (said.insert(flat.text).second) text += "flat: " + flat.text + "\n";
-  }
-  for (const auto& [a, b, r] : run.correlated)
-    text += fmt::format("{} and {} go together (correlation {:.3f})\n", a, b, r);
+  for (const auto& flat : FlatTexts(run)) text += "flat: " + flat + "\n";
+  for (const auto& pair : run.correlated) text += CorrelatedText(pair) + "\n";
   return text;
 }
 
@@ -85,6 +94,12 @@ std::string FlatText(const FlatDirection& flat, const Model& model) {
   return flat.parts.size() == 1 ? names + " is not known from these logs"
                                 : "only together: these logs leave the direction " + names +
                                       " (logarithms where the bounds are positive) open";
+}
+
+std::vector<std::string> ParameterNotes(const TuneRun& run) {
+  std::vector<std::string> notes = FlatTexts(run);
+  for (const auto& pair : run.correlated) notes.push_back(CorrelatedText(pair));
+  return notes;
 }
 
 TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed) {

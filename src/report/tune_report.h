@@ -59,6 +59,8 @@ std::string ToTable(const TuneRun& run, const Console& console = {});
 nlohmann::ordered_json JsonParameters(const TuneRun& run);
 nlohmann::ordered_json JsonErrors(const TuneRun& run);
 
+// What the logs leave open about the parameters, a line each: flat directions, then pairs that go together.
+std::vector<std::string> ParameterNotes(const TuneRun& run);
 // "only motor.kt / motor.resistance is known": what a flat direction leaves, in words.
 std::string FlatText(const FlatDirection& flat, const Model& model);
 

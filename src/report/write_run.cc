@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/core/file.h"
+#include "src/report/html_report.h"
 
 namespace gapscope {
 

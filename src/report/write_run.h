@@ -8,16 +8,10 @@
 
 #include "replay/replay.h"
 #include "src/report/csv.h"
-#include "src/report/html_report.h"
 
 namespace gapscope {
 
-// A CSV file; `path` from the run's folder on.
-struct RunTable {
-  std::string path;
-  std::vector<CsvColumn> columns;
-  int digits = 0;  // see CsvText
-};
+struct ReportSource;  // html_report.h
 
 // traces/LOG.csv of each log, for PlotJuggler: __time, command/ACTUATOR, measured/SIGNAL, predicted/SIGNAL. The tables
 // point into the arguments.

@@ -161,11 +161,14 @@ def main():
         subprocess.run([sys.argv[1], folder], check=True)
         driver = browser(str(Path(folder) / "profile"))
         try:
-            verdicts = {"replay": "hardly follows", "diagnosis": "The model lacks cable spring on arm and Coulomb friction on arm.", "long": "hardly follows"}
+            verdicts = {"replay": "hardly follows", "long": "hardly follows", "none": "Nothing is missing", "parameters": "other parameter values close the gap",
+                        "effects": "The model lacks cable spring on arm and Coulomb friction on arm.", "ambiguous": "lacks cable spring or gravity offset: these logs cannot tell which",
+                        "unknown": "and something that no known effect explains"}
             for name, verdict in verdicts.items():
                 for width in (390, 1440):
                     look(driver, Path(folder) / f"{name}.html", width, verdict)
-            linked_zoom(driver, Path(folder) / "diagnosis.html")
+            check("Of what cable spring on arm and Coulomb friction on arm leave" in driver.find_element(By.ID, "where").text, "unknown: what the effects leave")
+            linked_zoom(driver, Path(folder) / "effects.html")
             text = driver.find_element(By.ID, "main").text
             for part in ["91 %", "does not bend with the angle", "</script><b>held out</b>", "gapscope design triangle --seconds 20", "cable_spring@arm.stiffness_n_m_per_rad", "sha256"]:
                 check(part in text, f"the diagnosis does not say '{part}'")

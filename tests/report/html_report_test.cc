@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
-#include <regex>
+#include <set>
 
 #include "src/core/digest.h"
 #include "src/core/file.h"
@@ -19,13 +19,13 @@ nlohmann::json DataOf(const std::string& page) {
   return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
 }
 
-std::string PageOf(const std::string& kind) {
-  const auto page = DemoPage(kind);
+std::string EffectsPage() {
+  const auto page = DiagnosisPage(Verdict::kEffects);
   return ReportHtml(page->result, page->source);
 }
 
 TEST(HtmlReportTest, IsOneFileWithoutTheNetwork) {
-  const std::string page = PageOf("diagnosis");
+  const std::string page = EffectsPage();
   // Nothing is fetched: no element names a source, and what the libraries mention in comments is never asked for.
   for (const char* fetching : {"<link", "<img", "src=\"http", "@import", "url(http", "fetch(", "XMLHttpRequest("}) {
     const std::string text = fetching;
@@ -40,15 +40,15 @@ TEST(HtmlReportTest, IsOneFileWithoutTheNetwork) {
 }
 
 TEST(HtmlReportTest, TextFromOutsideCannotEndTheScript) {
-  const std::string page = PageOf("diagnosis");
+  const std::string page = EffectsPage();
   EXPECT_EQ(page.find("</script><b>"), std::string::npos);
   const auto data = DataOf(page);
   ASSERT_FALSE(data.is_discarded());
-  EXPECT_EQ(data["result"]["candidates"][0]["reason"], "accepted: </script><b>held out</b>");
+  EXPECT_EQ(data["candidates"][0]["reason"], "accepted: </script><b>held out</b>");
 }
 
 TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
-  const auto page = DemoPage("diagnosis");
+  const auto page = DiagnosisPage(Verdict::kEffects);
   const auto data = DataOf(ReportHtml(page->result, page->source));
   const auto& log = data["logs"][0];
   EXPECT_EQ(log["sha256"], Sha256OfFile(page->recordings[0].log_path).value());
@@ -58,7 +58,38 @@ TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
               1e-5);
   EXPECT_EQ(log["maps"].size(), 2u);
   EXPECT_GE(log["responses"].size(), 1u);
-  EXPECT_EQ(data["parameters"][0]["name"], "motor.resistance");
+}
+
+TEST(HtmlReportTest, SaysWhatTheProgramSays) {
+  const auto page = DiagnosisPage(Verdict::kEffects);
+  const auto data = DataOf(ReportHtml(page->result, page->source));
+  EXPECT_EQ(data["result"].dump(), nlohmann::json(page->result).dump());
+  EXPECT_EQ(data["subject"], "Diagnosis of qube.csv with qube.xml");
+  EXPECT_EQ(data["headline"]["title"], page->source.content.headline.title);
+  EXPECT_EQ(data["headline"]["stages"].size(), 5u);
+  EXPECT_EQ(data["candidates"][0]["title"], "cable spring on arm");
+  EXPECT_EQ(data["next"]["command"], "gapscope design triangle --seconds 20");
+  EXPECT_EQ(data["map_of"], "nominal model");
+  EXPECT_EQ(DataOf(ReportHtml(ReplayPage()->result, ReplayPage()->source))["map_of"], "model");
+}
+
+TEST(HtmlReportTest, FittedParametersComeFirstThenTheOthersThatAreFree) {
+  const auto page = DiagnosisPage(Verdict::kEffects);
+  const auto data = DataOf(ReportHtml(page->result, page->source));
+  std::set<std::string> names;
+  for (const auto& p : data["parameters"]) {
+    names.insert(p["name"]);
+    EXPECT_EQ(p["name"].get<std::string>().find("scale@"), std::string::npos) << p;
+  }
+  EXPECT_EQ(names.size(), data["parameters"].size()) << "none stands twice";
+  const auto& spring = data["parameters"][0];
+  EXPECT_EQ(spring["name"], "cable_spring@arm.stiffness_n_m_per_rad");
+  EXPECT_EQ(spring["unit"], "N m/rad");
+  EXPECT_EQ(spring["value"], 0.0012);
+  EXPECT_EQ(spring["from"], 0.0011);
+  EXPECT_EQ(spring["to"], 0.0013);
+  EXPECT_TRUE(names.contains("arm.damping"));
+  EXPECT_FALSE(names.contains("motor.rotor_inertia")) << "frozen";
 }
 
 TEST(HtmlReportTest, ALongLogKeepsItsSpikeInFewRows) {
@@ -75,7 +106,7 @@ TEST(HtmlReportTest, ALongLogKeepsItsSpikeInFewRows) {
 
 TEST(HtmlReportTest, ShowsTheVideoBesideIt) {
   const Scratch scratch;
-  const auto page = DemoPage("replay");
+  const auto page = ReplayPage();
   ASSERT_TRUE(WriteReportHtml(scratch.Path("a"), page->result, page->source).ok());
   const std::string report = scratch.Path("a/report.html");
   EXPECT_NE(ReadAll(report).find("data-video=\"\""), std::string::npos);

@@ -8,58 +8,103 @@
 namespace gapscope::testing {
 namespace {
 
-// As contract.md has it, with a name that would break a page that takes text for HTML.
-const char* const kDiagnosis = R"({
-  "schema": "gapscope.diagnosis/1", "verdict": "effects", "probability": 0.91,
-  "effects": [
-    {"name": "cable_spring", "on": "arm", "probability": 0.97, "parameters": {"stiffness_n_m_per_rad": {"value": 0.0012, "low": 0.0011, "high": 0.0013}},
-     "error_before": 1.2, "error_after": 0.3, "share_of_gap": 0.8},
-    {"name": "coulomb_friction", "on": "arm", "probability": 0.93, "parameters": {"friction_n_m": {"value": 0.0006, "low": 0.0005, "high": 0.0007}},
-     "error_before": 0.3, "error_after": 0.01, "share_of_gap": 0.2}],
-  "ambiguous": [], "gap": {"nominal": 1.77, "refit": 1.2, "final": 0.01, "floor": 0.008, "closed": 0.998, "held_out": true},
-  "where": [{"signal": "arm_rad", "condition": "angle -0.8..-0.4 rad", "share_of_error": 0.6, "share_of_time": 0.1, "low": 0.5, "high": 0.7}],
-  "candidates": [{"name": "cable_spring", "on": "arm", "probability": 0.97, "held_out_error": 0.3, "reason": "accepted: </script><b>held out</b>"},
-                 {"name": "torque_bias", "on": "arm", "probability": 0.03, "held_out_error": 0.9, "reason": "does not bend with the angle"}],
-  "next_experiment": {"command": "gapscope design triangle --seconds 20", "separates": ["cable_spring@arm", "gravity_offset@arm"]},
-  "explanation": "Something pulls the arm towards one angle.", "logs": {"train": ["a"], "held_out": ["b"]}, "seed": 3,
-  "versions": {"gapscope": "0.1.0", "mujoco": "4.0.1"}
-})";
+const EffectUse kSpring{"cable_spring", "arm"}, kFriction{"coulomb_friction", "arm"}, kGravity{"gravity_offset", "arm"};
 
-}  // namespace
+FoundEffect Found(const EffectUse& use, const EffectEstimate& size, double probability, double before, double after,
+                  double share) {
+  return {.use = use,
+          .probability = probability,
+          .parameters = {size},
+          .error_before = before,
+          .error_after = after,
+          .share_of_gap = share};
+}
 
-std::unique_ptr<Page> DemoPage(const std::string& kind) {
+// The demo log and the model with a cable spring, nominal: without it.
+std::unique_ptr<Page> BarePage() {
   auto page = std::make_unique<Page>();
   const std::string root = GAPSCOPE_SOURCE_DIR;
   auto experiment = LoadExperiment(root + "/models/qube/experiment.yaml");
   GS_CHECK(experiment.ok());
-  page->model = Model::Build(experiment.value(), {{"cable_spring", "arm"}}).value();
+  page->model = Model::Build(experiment.value(), {kSpring}).value();
   page->recordings = {LoadRecording(experiment.value(), root + "/demo/qube.csv").value()};
+  page->source.command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv";
+  page->source.experiment = &page->model->experiment();
+  page->source.recordings = {&page->recordings.front()};
+  page->source.held_out = {true};
+  page->source.model = page->model.get();
+  page->source.values = page->model->Nominal();
+  page->source.parameters = page->model->parameters();
+  return page;
+}
+
+ReplayResult Replayed(const Page& page, const std::vector<double>& values) {
   ThreadPool pool(1);
-  std::vector<double> values = page->model->Nominal();
-  page->result = nlohmann::ordered_json::parse(kDiagnosis);
-  page->source = {.command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv",
-                  .experiment = &page->model->experiment(),
-                  .recordings = {&page->recordings.front()},
-                  .held_out = {true},
-                  .predictions = {},
-                  .model = page->model.get(),
-                  .values = values,
-                  .parameters = page->model->parameters()};
-  const ReplayResult nominal = Replay(*page->model, page->recordings, {.time_step_s = 0.002, .values = values}, pool);
-  page->source.predictions.push_back({"nominal", nominal.logs});
-  values[page->model->IndexOf("cable_spring@arm.stiffness_n_m_per_rad")] = 0.0012;
-  page->source.predictions.push_back(
-      {"diagnosed", Replay(*page->model, page->recordings, {.time_step_s = 0.002, .values = values}, pool).logs});
-  if (kind == "replay") {
-    page->result =
-        ToJson(ReplayRunOf(*page->model, page->source.values, nominal, Compare(nominal, page->recordings, pool)));
-    page->source.predictions.pop_back();
+  return Replay(*page.model, page.recordings, {.time_step_s = 0.002, .values = values}, pool);
+}
+
+}  // namespace
+
+DiagnoseRun MadeDiagnosis(Verdict verdict) {
+  Diagnosis d;
+  d.verdict = verdict;
+  d.probability = 0.91;
+  d.nominal = 1.77, d.refit = 1.2, d.final = 0.01, d.floor = 0.008, d.closed = 0.998;
+  if (verdict == Verdict::kNone || verdict == Verdict::kParameters) {
+    d.final = d.refit;
+  } else {
+    d.effects = {Found(kSpring, {"stiffness_n_m_per_rad", "N m/rad", 0.0012, 0.0011, 0.0013}, 0.97, 1.2, 0.3, 0.8),
+                 Found(kFriction, {"friction_n_m", "N m", 0.0006, 0.0005, 0.0007}, 0.93, 0.3, 0.01, 0.2)};
   }
+  if (verdict == Verdict::kAmbiguous) d.ambiguous = {{kSpring, kGravity}};
+  d.where = {{.signal = "arm_rad",
+              .condition = "angle -0.8..-0.4 rad",
+              .share_of_error = 0.6,
+              .share_of_time = 0.1,
+              .low = 0.5,
+              .high = 0.7}};
+  d.remains = d.where;
+  d.remains[0].condition = "speed 4..9 rad/s";
+  d.candidates = {
+      {.effect = kSpring, .probability = 0.97, .held_out_error = 0.3, .reason = "accepted: </script><b>held out</b>"},
+      {.effect = EffectUse{"torque_bias", "arm"},
+       .probability = 0.03,
+       .held_out_error = 0.9,
+       .reason = "does not bend with the angle"}};
+  d.next_command = "gapscope design triangle --seconds 20";
+  d.next_separates = {kSpring, kGravity};
+  d.explanation = "Something pulls the arm towards one angle.";
+  d.train_logs = {"a"}, d.held_out_logs = {"b"};
+  return {.info = {.seed = 3}, .diagnosis = std::move(d)};
+}
+
+std::unique_ptr<Page> ReplayPage() {
+  auto page = BarePage();
+  ReplayResult nominal = Replayed(*page, page->source.values);
+  page->source.predictions = {{"nominal", nominal.logs}};
+  ThreadPool pool(1);
+  Comparison comparison = Compare(nominal, page->recordings, pool);
+  const ReplayRun run = ReplayRunOf(*page->model, page->source.values, std::move(nominal), std::move(comparison));
+  page->result = ToJson(run);
+  page->source.content = PageOf(run);
+  return page;
+}
+
+std::unique_ptr<Page> DiagnosisPage(Verdict verdict) {
+  auto page = BarePage();
+  DiagnoseRun run = MadeDiagnosis(verdict);
+  run.diagnosis.model = page->model;
+  run.diagnosis.values = page->source.values;
+  run.diagnosis.values[page->model->IndexOf("cable_spring@arm.stiffness_n_m_per_rad")] = 0.0012;
+  page->source.predictions = {{"nominal", Replayed(*page, page->source.values).logs},
+                              {"diagnosed", Replayed(*page, run.diagnosis.values).logs}};
+  page->result = ToJson(run);
+  page->source.content = PageOf(run);
   return page;
 }
 
 std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike) {
-  auto page = DemoPage("replay");
+  auto page = ReplayPage();
   Recording& recording = page->recordings.front();
   LogReplay& replay = page->source.predictions.front().logs.front();
   recording.time_s.resize(rows);

@@ -1,5 +1,5 @@
-// Reports to look at: a replay of the demo log, a long log, and a diagnosis made up to have everything a diagnosis can
-// have.
+// Reports to look at: a replay of the demo log, a long log, and diagnoses made up to have everything a diagnosis can
+// have, one for each verdict.
 #ifndef GAPSCOPE_TESTS_REPORT_PAGES_H_
 #define GAPSCOPE_TESTS_REPORT_PAGES_H_
 
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "src/model/model.h"
+#include "src/report/diagnose_report.h"
 #include "src/report/html_report.h"
 
 namespace gapscope::testing {
@@ -21,9 +22,14 @@ struct Page {
   ReportSource source;
 };
 
-// The log demo/qube.csv replayed by the nominal model and by one with a cable spring, under a result of each kind
-// ("replay", "diagnosis").
-std::unique_ptr<Page> DemoPage(const std::string& kind);
+// Two effects and a group, of which the verdict says what it would. A reason would break a page that takes text for
+// HTML.
+DiagnoseRun MadeDiagnosis(Verdict verdict);
+
+// The log demo/qube.csv replayed by the nominal model.
+std::unique_ptr<Page> ReplayPage();
+// The same, and replayed by a model with a cable spring, under MadeDiagnosis.
+std::unique_ptr<Page> DiagnosisPage(Verdict verdict);
 // One signal of `rows` rows with a spike of one row at `spike`.
 std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike);
 

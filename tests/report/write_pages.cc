@@ -12,7 +12,10 @@ int main(int argc, char** argv) {
   const auto write = [&](const std::string& name, const testing::Page& page) {
     good = good && WriteFile(folder + "/" + name + ".html", ReportHtml(page.result, page.source)).ok();
   };
-  for (const std::string kind : {"replay", "diagnosis"}) write(kind, *testing::DemoPage(kind));
+  write("replay", *testing::ReplayPage());
+  for (const Verdict verdict :
+       {Verdict::kNone, Verdict::kParameters, Verdict::kEffects, Verdict::kAmbiguous, Verdict::kUnknown})
+    write(VerdictName(verdict), *testing::DiagnosisPage(verdict));
   write("long", *testing::LongPage(1000000, 654321));
   return good ? 0 : 1;
 }

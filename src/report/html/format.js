@@ -1,13 +1,10 @@
 "use strict";
-// Small helpers: numbers and words, elements. Texts go in as text, never as HTML: file names come from outside.
+// Small helpers: numbers, elements. Texts go in as text, never as HTML: file names come from outside.
 
 const known = (x) => typeof x === "number" && isFinite(x);
 const number = (x, digits = 4) => (known(x) ? String(Number(x.toPrecision(digits))) : "–");
 const percent = (x) => (known(x) ? `${Math.round(100 * x)} %` : "–");
-const words = (name) => name.replace("@", " on ").replaceAll("_", " ").replace(/\b(coulomb|stribeck)\b/g, (who) => who[0].toUpperCase() + who.slice(1));
 const fileName = (path) => path.split("/").pop();
-const listed = (parts, joiner = "and") => (parts.length < 2 ? parts.join("") : `${parts.slice(0, -1).join(", ")} ${joiner} ${parts[parts.length - 1]}`);
-const place = (effect) => (effect.on ? `${words(effect.name)} on ${effect.on}` : words(effect.name));
 
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);

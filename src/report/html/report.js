@@ -2,7 +2,6 @@
 // Puts the page together.
 
 const data = JSON.parse(document.getElementById("report-data").textContent);
-const result = data.result;
 let current = 0;
 
 function setTheme(theme) {
@@ -48,22 +47,20 @@ function contents() {
 }
 
 setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-const subjects = [...new Set(data.logs.map((log) => fileName(log.path)))];
-const kinds = {"gapscope.replay/1": "Replay", "gapscope.tune/1": "Tuning", "gapscope.diagnosis/1": "Diagnosis"};
-document.getElementById("subject").textContent = `${kinds[result.schema]} of ${listed(subjects.slice(0, 3))}${subjects.length > 3 ? " ..." : ""} with ${fileName(data.model.path)}`;
-writeVerdict(result);
+document.getElementById("subject").textContent = data.subject;
+writeVerdict(data.headline);
 const video = document.getElementById("video");
 if (video.dataset.video) {
   document.getElementById("player").src = video.dataset.video;
   video.hidden = false;
 }
 if (data.logs.some((log) => log.traces)) show("traces");
-if (writeConditions(result)) show("where");
+writeConditions(data.where);
 choosers();
 drawLog();
-writeCandidates(result);
-writeParameters(result, data.parameters);
-writeNext(result);
+writeCandidates(data.candidates, data.more_candidates);
+writeParameters(data.parameters, data.headline.notes);
+writeNext(data.next);
 writeQuality(data.logs);
 writeProvenance(data);
 contents();

@@ -4,31 +4,23 @@
 const shareBar = (share, mark, kind = "") => element("div", {class: "bar", "aria-hidden": "true"}, element("span", {class: kind, style: {width: `${Math.min(100, 100 * share)}%`}}),
   known(mark) ? element("i", {style: {left: `${Math.min(99, 100 * mark)}%`}}) : null);
 
-function conditionTable(caption, shares, all) {
-  const telling = shares.filter((w) => known(w.share_of_error)).map((w) => ({...w, excess: (w.low ?? w.share_of_error) - (w.share_of_time ?? 0)})).filter((w) => all || (w.excess > 0 && w.share_of_error > 0.1))
-    .sort((a, b) => b.excess - a.excess).slice(0, 10);
-  if (!telling.length) return null;
-  return table(caption, ["signal", "condition", {number: "of the error"}, "bar: of the error; mark: of the time", {number: "of the time"}, "90 % interval"],
-    telling.map((w) => [w.signal, w.condition, {number: percent(w.share_of_error)}, shareBar(w.share_of_error, w.share_of_time, "share"), {number: percent(w.share_of_time)},
+function conditionTable(shares) {
+  return table("Shares of the error by condition", ["signal", "condition", {number: "of the error"}, "bar: of the error; mark: of the time", {number: "of the time"}, "90 % interval"],
+    shares.map((w) => [w.signal, w.condition, {number: percent(w.share_of_error)}, shareBar(w.share_of_error, w.share_of_time, "share"), {number: percent(w.share_of_time)},
       known(w.low) && known(w.high) ? `${percent(w.low)} to ${percent(w.high)}` : "–"]));
 }
 
-function writeConditions(result) {
-  const parts = [conditionTable("Shares of the error by condition", result.where ?? result.logs?.[0]?.where ?? [], Boolean(result.where))];
-  if (result.verdict === "unknown" && result.effects.length) {
-    const left = conditionTable("Shares of what remains by condition", result.remains ?? [], true);
-    if (left) parts.push(element("h3", {}, `Of what ${listed(result.effects.map(place))} ${result.effects.length > 1 ? "leave" : "leaves"}`), left);
-  }
+function writeConditions(where) {
+  const parts = where.flatMap(({title, shares}) => [title ? element("h3", {}, title) : null, conditionTable(shares)]);
   document.getElementById("conditions").append(...parts.filter(Boolean));
-  return parts.some(Boolean);
+  if (where.length) show("where");
 }
 
-function writeCandidates(result) {
-  if (!result.candidates?.length) return;
-  const rows = [...result.candidates].sort((a, b) => (b.probability ?? 0) - (a.probability ?? 0));
-  const cells = rows.slice(0, 24).map((c) => [place(c), {number: percent(c.probability)}, shareBar(c.probability ?? 0), {number: number(c.held_out_error, 3)}, c.reason ?? ""]);
+function writeCandidates(candidates, more) {
+  if (!candidates.length) return;
+  const cells = candidates.map((c) => [c.title, {number: percent(c.probability)}, shareBar(c.probability ?? 0), {number: number(c.held_out_error, 3)}, c.reason]);
   document.getElementById("candidate-table").append(table("Candidates", ["explanation", {number: "probability"}, "", {number: "held-out error"}, "why, or why not"], cells));
-  if (rows.length > 24) document.getElementById("candidate-table").append(element("p", {class: "note"}, `${rows.length - 24} more, less likely ones are in result.json.`));
+  if (more) document.getElementById("candidate-table").append(element("p", {class: "note"}, `${more} more, less likely ones are in result.json.`));
   show("candidates");
 }
 
@@ -50,38 +42,22 @@ function rangePicture(p) {
   return svg;
 }
 
-function parametersOf(result, declared) {
-  const bounds = Object.fromEntries(declared.map((p) => [p.name, p])), fitted = {};
-  if (Array.isArray(result.parameters)) {
-    for (const p of result.parameters) fitted[p.name] = {value: p.value, from: p.identifiable === false ? null : p.low, to: p.identifiable === false ? null : p.high, at_bound: p.at_bound, open: p.identifiable === false};
-  }
-  for (const effect of Array.isArray(result.effects) ? result.effects : []) {
-    for (const [key, v] of Object.entries(effect.parameters ?? {})) fitted[`${effect.name}@${effect.on}.${key}`] = {value: v.value, from: v.low, to: v.high};
-  }
-  const values = result.model?.values ?? {};
-  const names = [...new Set([...Object.keys(fitted), ...declared.map((p) => p.name)])];
-  return names.map((name) => ({name, unit: bounds[name]?.unit ?? "", doc: bounds[name]?.doc, nominal: bounds[name]?.nominal, low: bounds[name]?.low, high: bounds[name]?.high, frozen: bounds[name]?.frozen,
-    value: fitted[name]?.value ?? values[name], from: fitted[name]?.from, to: fitted[name]?.to, at_bound: fitted[name]?.at_bound, open: fitted[name]?.open, fitted: name in fitted}));
-}
-
-function writeParameters(result, declared) {
-  const all = parametersOf(result, declared).filter((p) => known(p.value) && (!p.frozen || p.fitted));
-  if (!all.length) return;
-  const rows = all.map((p) => {
-    const notes = [p.open ? element("span", {class: "tag warn"}, "not known alone") : null, p.at_bound ? element("span", {class: "tag warn"}, "at its bound") : null];
-    const interval = p.open || !known(p.from) ? "–" : `${number(p.from)} to ${number(p.to)}`;
-    return [element("code", {title: p.doc ?? ""}, p.name), {number: number(p.nominal)}, {number: number(p.value)}, interval, p.unit, rangePicture(p), element("span", {}, ...notes)];
+function writeParameters(parameters, notes) {
+  if (!parameters.length) return;
+  const rows = parameters.map((p) => {
+    const open = p.identifiable === false;
+    const tags = [open ? element("span", {class: "tag warn"}, "not known alone") : null, p.at_bound ? element("span", {class: "tag warn"}, "at its bound") : null];
+    const interval = known(p.from) ? `${number(p.from)} to ${number(p.to)}` : "–";
+    return [element("code", {title: p.doc ?? ""}, p.name), {number: number(p.nominal)}, {number: number(p.value)}, interval, p.unit, rangePicture(p), element("span", {}, ...tags)];
   });
   document.getElementById("parameter-table").append(table("Parameters", ["parameter", {number: "nominal"}, {number: "value"}, "95 % interval", "unit", "dot: value; mark: nominal; line: bounds", ""], rows));
-  const notes = [...new Set((result.flat ?? []).map((f) => f.text)), ...(result.correlated ?? []).map((c) => `${listed(c.parameters)} go together (correlation ${number(c.correlation, 3)})`)];
   document.getElementById("parameter-notes").append(...notes.map((note) => element("li", {}, note)));
   show("parameters");
 }
 
-function writeNext(result) {
-  const next = result.next_experiment;
-  if (!next?.command) return;
-  document.getElementById("next-text").append(element("p", {}, next.separates?.length ? `It tells ${listed(next.separates.map(words), "from")} apart.` : "It would tell more about what is left."), element("pre", {}, next.command));
+function writeNext(next) {
+  if (!next.command) return;
+  document.getElementById("next-text").append(element("p", {}, next.text), element("pre", {}, next.command));
   show("next");
 }
 

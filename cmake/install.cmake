@@ -16,13 +16,13 @@ set_target_properties(gapscope PROPERTIES INSTALL_RPATH "$ORIGIN/${_bin_to_libra
 install(TARGETS gapscope RUNTIME)
 
 # Every folder's library that this build has, with its headers.
-foreach(name core log experiment model replay compare tune identify design diagnose video report plugins warnings)
+foreach(name core log experiment model replay compare fit tune identify design diagnose video report plugins warnings)
   if(TARGET gapscope_${name})
     set_target_properties(gapscope_${name} PROPERTIES EXPORT_NAME ${name})
     install(TARGETS gapscope_${name} EXPORT gapscope LIBRARY DESTINATION ${_libraries} ARCHIVE DESTINATION ${_libraries})
   endif()
 endforeach()
-foreach(folder src/core src/log src/experiment src/model src/compare src/tune src/identify src/design src/diagnose src/video src/report replay)
+foreach(folder src/core src/log src/experiment src/model src/compare src/fit src/tune src/identify src/design src/diagnose src/video src/report replay)
   if(EXISTS ${CMAKE_SOURCE_DIR}/${folder})
     get_filename_component(_parent ${folder} DIRECTORY)
     install(DIRECTORY ${folder} DESTINATION ${_headers}/${_parent} FILES_MATCHING PATTERN "*.h" PATTERN effects EXCLUDE)

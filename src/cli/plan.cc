@@ -16,7 +16,7 @@
 #include "src/report/read_run.h"
 #include "src/report/tune_report.h"
 #include "src/report/version.h"
-#include "src/tune/journal.h"
+#include "src/tune/job_key.h"
 
 namespace gapscope::cli {
 namespace {
@@ -38,23 +38,12 @@ struct ShardFlags {
 std::string Hex(std::uint64_t number) { return fmt::format("{:016x}", number); }
 
 // Everything that decides the task's result.
-Result<std::uint64_t> TaskHash(const Session& session, const Recording& recording, const std::string& options) {
-  GS_ASSIGN(const std::string experiment, ReadFile(session.experiment.path));
-  GS_ASSIGN(const std::string mjcf, ReadFile(session.experiment.model_path));
-  std::uint64_t hash = Hash(experiment.data(), experiment.size());
-  hash = Hash(mjcf.data(), mjcf.size(), hash);
-  const std::string text = options + VersionText();
-  hash = Hash(text.data(), text.size(), hash);
-  hash = Hash(session.values.data(), sizeof(double) * session.values.size(), hash);  // of --params files too
-  const auto add = [&](const std::vector<double>& numbers) {
-    hash = Hash(numbers.data(), sizeof(double) * numbers.size(), hash);
-  };
-  add(recording.time_s);
-  for (const auto& command : recording.commands) add(command.values);
-  for (const auto& measured : recording.measured) add(measured.values);
-  for (const auto& [name, value] : recording.values)
-    hash = Hash(&value, sizeof value, Hash(name.data(), name.size(), hash));
-  return hash;
+std::uint64_t TaskHash(const Session& session, const Recording& recording, const std::string& options) {
+  Hasher hasher;
+  hasher.Text(options).Text(VersionText()).Numbers(session.values);  // of --params files too
+  AddModel(*session.model, &hasher);
+  AddRecording(recording, &hasher);
+  return hasher.value();
 }
 
 Result<ordered_json> ReadPlan(const std::filesystem::path& folder) {
@@ -105,7 +94,7 @@ Result<int> RunPlan(const PlanFlags& flags) {
   for (const auto& log : logs) {
     model.logs = {log};
     GS_ASSIGN(const Session session, LoadSession(model, flags.common));
-    GS_ASSIGN(const std::uint64_t hash, TaskHash(session, session.recordings.front(), options));
+    const std::uint64_t hash = TaskHash(session, session.recordings.front(), options);
     plan["tasks"].push_back({{"log", log}, {"task", Hex(hash)}});
   }
   const std::filesystem::path out = flags.common.out;
@@ -127,14 +116,13 @@ Result<int> RunPlan(const PlanFlags& flags) {
 Result<TuneRun> DoTask(const ordered_json& plan, const std::string& log, const std::string& task,
                        const CommonFlags& common) {
   GS_ASSIGN(Session session, LoadSession(ModelOf(plan, log), common));
-  GS_ASSIGN(const std::uint64_t hash, TaskHash(session, session.recordings.front(), plan.at("options").dump()));
-  if (Hex(hash) != task)
+  if (Hex(TaskHash(session, session.recordings.front(), plan.at("options").dump())) != task)
     return Error{.what = "the log, the experiment or the program has changed since the plan",
                  .where = log,
                  .cure = "write the plan again"};
   TuneOptions options{.window_s = session.experiment.replay.window_s, .starts = plan.at("options").at("starts")};
   options.solve.seed = plan.at("options").at("seed");
-  if (session.experiment.replay.mode == ReplayMode::kWindows) options.objective = Objective::kWindows;
+  if (session.experiment.replay.mode == ReplayMode::kWindows) options.objective = ObjectiveKind::kWindows;
   GS_ASSIGN(const TuneSummary tuned,
             Tune(*session.model, SplitData(std::move(session.recordings), {}), session.values, options, *session.pool));
   return TuneRunOf(tuned, *session.model, options.solve.seed);

@@ -73,16 +73,14 @@ Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
                       .starts = flags.starts,
                       .resume = flags.resume};
   if (flags.normalization == "rms") options.normalization = Normalization::kRootMeanSquare;
-  const auto& names = OptimizerNames();
-  options.solve.optimizer =
-      static_cast<Optimizer>(std::find(names.begin(), names.end(), flags.optimizer) - names.begin());
+  options.solve.optimizer = FindOptimizer(flags.optimizer)->name;
   options.solve.seed = flags.common.seed;
   options.solve.tolerance = flags.tolerance;
-  options.objective = flags.objective == "windows"    ? Objective::kWindows
-                      : flags.objective == "free_run" ? Objective::kFreeRun
-                                                      : Objective::kBoth;
+  options.objective = flags.objective == "windows"    ? ObjectiveKind::kWindows
+                      : flags.objective == "free_run" ? ObjectiveKind::kFreeRun
+                                                      : ObjectiveKind::kBoth;
   if (session.experiment.replay.mode == ReplayMode::kWindows && flags.objective == "both")
-    options.objective = Objective::kWindows;
+    options.objective = ObjectiveKind::kWindows;
   for (const auto& nuisance : flags.fixed_nuisances) {
     if (nuisance == "offset") options.fit_offsets = false;
     if (nuisance == "shift") options.fit_shift = false;
@@ -167,7 +165,7 @@ void AddTune(CLI::App& program, Run& run) {
                    "state (initial)")
       ->check(CLI::IsMember({"offset", "shift", "state"}))
       ->allow_extra_args(false);
-  command->add_option("--optimizer", flags->optimizer, "lm, or NLopt's slsqp, mma, bobyqa, crs2, isres, direct")
+  command->add_option("--optimizer", flags->optimizer, OptimizerHelp())
       ->check(CLI::IsMember(OptimizerNames()))
       ->capture_default_str();
   command->add_option("--objective", flags->objective, "windows, free_run or both")

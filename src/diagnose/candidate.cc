@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "src/diagnose/rules.h"
+#include "src/diagnose/score_test.h"
 
 namespace gapscope {
 
@@ -92,11 +93,12 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   FitOptions fit = bench.Options(*candidate->model, true);
   fit.linear_terms = false;
   fit.logarithmic_effects = true;
+  // What is known lies around nominal; a model that leaves more than the noise has residuals that lie, and count for
+  // less.
+  fit.prior_centre = candidate->model->Nominal();
+  fit.prior_scale = std::max(1.0, candidate->held_out_floors * candidate->held_out_floors);
   auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
-  // The prior's centre is nominal; a model that leaves more than the noise has residuals that lie, and count for less.
-  problem->CentrePrior(candidate->model->Nominal());
-  problem->ScalePrior(std::max(1.0, candidate->held_out_floors * candidate->held_out_floors));
-  const FitPoint start = problem->FromParent(*candidate->problem, candidate->point, candidate->values, {});
+  const FitPoint start = CarryOver(*candidate->problem, candidate->point, *problem, candidate->values);
   const SolveOptions options{.max_iterations = 8,
                              .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0),
                              .coarse_step = 0.01,
@@ -125,7 +127,7 @@ std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& c
   auto problem =
       std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
   *point = problem->Start();
-  if (!std::isfinite(problem->Cost(*point))) return nullptr;
+  if (!std::isfinite(problem->Evaluate(*point, Keep::kCost).cost)) return nullptr;
   *point =
       Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
   return problem;
@@ -138,11 +140,11 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
       std::numeric_limits<double>::infinity();
   candidate->at_bound = LastEffectAtBound(bench, *candidate);
   candidate->held_out_blocks.clear();
-  candidate->train_blocks = candidate->problem->BlockCosts(candidate->point);
+  candidate->train_blocks = BlockCosts(*candidate->problem, candidate->point);
   FitPoint point;
   const auto problem = OnHeldOut(bench, *candidate, bench.Options(*candidate->model, false), &point);
   if (!problem) return;
-  candidate->held_out_blocks = problem->BlockCosts(point);
+  candidate->held_out_blocks = BlockCosts(*problem, point);
   if (candidate->held_out_blocks.empty()) return;
   candidate->held_out_cost = 0;
   for (const double cost : candidate->held_out_blocks) candidate->held_out_cost += cost;
@@ -155,7 +157,7 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
 
 double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   FitOptions options = bench.Options(*candidate.model, false);
-  options.objective = Objective::kFreeRun;
+  options.objective = ObjectiveKind::kFreeRun;
   options.fold = Fold::kAll;
   options.weights.clear();
   FitPoint point;

@@ -92,7 +92,9 @@ Result<std::vector<FoundEffect>> DescribeEffects(const SearchResult& found, cons
   std::vector<FoundEffect> effects;
   const Candidate &chosen = *found.chosen, &base = *found.base;
   if (&chosen == &base) return effects;
-  const Uncertainty uncertainty = EstimateUncertainty(*chosen.problem, chosen.point, *chosen.model, 0.01);
+  const Uncertainty uncertainty =
+      EstimateUncertainty(*chosen.problem, chosen.point,
+                          Linearize(*chosen.problem, chosen.point, {.columns = DifferenceOptions::Columns::kCentral}));
   const auto alone = [&](const EffectUse& use) {
     for (const auto& c : found.first.children) {
       if (c->effects.front() == use && std::isfinite(c->held_out_error)) return c->held_out_error;

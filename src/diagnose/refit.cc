@@ -33,7 +33,7 @@ GiveUp TooSlow(double known, int iterations) {
 
 // A fit from a start of its own, kept if it ends below the candidate's.
 void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance) {
-  if (!std::isfinite(candidate->problem->Cost(start))) return;
+  if (!std::isfinite(candidate->problem->Evaluate(start, Keep::kCost).cost)) return;
   const FitPoint before = candidate->point;
   const double cost = candidate->train_cost;
   const bool converged = candidate->converged;
@@ -52,8 +52,8 @@ FitPoint StartFrom(const FitProblem& parent, const FitPoint& at, const Trial& tr
   FitPoint best;
   double least = std::numeric_limits<double>::infinity();
   for (const double share : {1.0, 0.3, 0.0}) {
-    FitPoint start = child->FromParent(parent, at, trial.values, share * trial.dy);
-    const double cost = child->Cost(start);
+    FitPoint start = FromParent(parent, at, *child, trial.values, share * trial.dy);
+    const double cost = child->Evaluate(start, Keep::kCost).cost;
     if (best.y.size() > 0 && !(cost < least)) continue;
     least = cost;
     best = std::move(start);
@@ -83,7 +83,7 @@ void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUs
   std::vector<double> neutral = trial.values;
   for (const auto& p : placed.value())
     neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
-  TryStart(bench, child, child->problem->FromParent(*parent.problem, parent.point, neutral, {}), kFirstIterations,
+  TryStart(bench, child, CarryOver(*parent.problem, parent.point, *child->problem, neutral), kFirstIterations,
            kFirstTolerance);
 }
 
@@ -96,8 +96,8 @@ void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   constexpr std::size_t kMost = 3;
   Candidate& leader = *layer->children.front();
   if (!(leader.train_cost < kWorthImitating * parent.train_cost) || bench.Late()) return;
-  const FitPoint at = parent.problem->FromParent(*leader.problem, leader.point, leader.model->Nominal(), {});
-  const Snapshot snapshot = parent.problem->Capture(at, 0.01);
+  const FitPoint at = CarryOver(*leader.problem, leader.point, *parent.problem, leader.model->Nominal());
+  const Snapshot snapshot = Capture(*parent.problem, at, 0.01);
   if (!snapshot.valid) return;
   std::size_t tried = 0;
   for (std::size_t i = 1; i < layer->children.size() && tried < kMost && !bench.Late(); ++i) {
@@ -131,7 +131,7 @@ void StartSagFromLimit(const Workbench& bench, const Candidate& limit, Layer* la
       set("time_constant_s", time_constant_s);
       set("sag_fraction", kFalls);
       set("limit_n_m", kHigher * limit.values[limit.model->IndexOf("torque_limit@" + on + ".limit_n_m")]);
-      TryStart(bench, sag.get(), sag->problem->FromParent(*limit.problem, limit.point, values, {}), kFirstIterations,
+      TryStart(bench, sag.get(), CarryOver(*limit.problem, limit.point, *sag->problem, values), kFirstIterations,
                kFirstTolerance);
     }
     ScoreCandidate(bench, sag.get());
@@ -164,7 +164,7 @@ void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candi
         values = candidate->model->Nominal();
         for (const auto& q : placed.value()) values[candidate->model->IndexOf(q.name)] = q.start;
         values[index] = trial;
-        TryStart(bench, candidate, candidate->problem->FromParent(*parent.problem, parent.point, values, {}),
+        TryStart(bench, candidate, CarryOver(*parent.problem, parent.point, *candidate->problem, values),
                  kTasteIterations, kFirstTolerance);
       }
     }
@@ -204,8 +204,8 @@ void StartFromSimpler(const Workbench& bench, Layer* layer) {
                                                : p.key == "breakaway_n_m" ? kHump * level
                                                                           : kSliding * level;
       }
-      TryStart(bench, rich.get(), rich->problem->FromParent(*simple->problem, simple->point, values, {}),
-               kFirstIterations, kFirstTolerance);
+      TryStart(bench, rich.get(), CarryOver(*simple->problem, simple->point, *rich->problem, values), kFirstIterations,
+               kFirstTolerance);
       ScoreCandidate(bench, rich.get());
     }
   }

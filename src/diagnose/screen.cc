@@ -67,7 +67,7 @@ void Test(Candidate& child, const std::vector<PlacedParameter>& placed, const st
     std::vector<double> tried = nominal;
     for (std::size_t i = 0; i < trial.size(); ++i) tried[model.IndexOf(placed[i].name)] = trial[i];
     const ColumnTest test =
-        child.problem->TestColumn(child.problem->FromParent(parent, point, tried, {}), parent, point, base);
+        TestColumn(*child.problem, CarryOver(parent, point, *child.problem, tried), parent, point, base);
     if (!test.valid) continue;
     constexpr double kAllAbsorbed = 0.999,
                      kPromises = 0.05;  // little of a column may be its own and yet be what is missing
@@ -106,7 +106,7 @@ Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, 
   if (std::any_of(placed.value().begin(), placed.value().end(),
                   [](const PlacedParameter& p) { return p.trials.size() >= kScan; })) {
     Test(child, placed.value(), trials, parent, point,
-         parent.Thin(base, point, std::max(kFewWindows, parent.windows() / kThin)), &tests);
+         Thin(parent, base, point, std::max(kFewWindows, parent.windows().size() / kThin)), &tests);
     if (tests.best.empty()) return {};
     const Trial best = BestOfScan(std::move(tests.best), tests.scan);
     trials = {best.trial};
@@ -121,7 +121,7 @@ Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, 
 
 std::vector<Screened> Screen(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses) {
   std::vector<Screened> screened;
-  const Snapshot base = parent.problem->Capture(parent.point, 0.01);
+  const Snapshot base = Capture(*parent.problem, parent.point, 0.01);
   if (!base.valid) return screened;
   for (const EffectUse& use : uses) {
     if (std::find(parent.effects.begin(), parent.effects.end(), use) != parent.effects.end()) continue;

@@ -1,9 +1,10 @@
 // The score test over all candidate effects: what would each one explain, before any refit (see
-// FitProblem::TestColumn).
+// score_test.h).
 #ifndef GAPSCOPE_DIAGNOSE_SCREEN_H_
 #define GAPSCOPE_DIAGNOSE_SCREEN_H_
 
 #include "src/diagnose/candidate.h"
+#include "src/diagnose/score_test.h"
 
 namespace gapscope {
 

@@ -40,7 +40,7 @@ Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResul
     if (child == children.end()) {
       GS_ASSIGN(Candidate made, MakeCandidate(bench, start.effects));
       made.point = made.problem->Start();
-      made.train_cost = made.problem->Cost(made.point);
+      made.train_cost = made.problem->Evaluate(made.point, Keep::kCost).cost;
       child = children.insert(children.end(), std::make_unique<Candidate>(std::move(made)));
     }
     StartFromValues(bench, start.values, child->get());
@@ -110,7 +110,7 @@ Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say
     if (const int index = pair->model->IndexOf(other.model->parameters()[i].name); index >= 0)
       values[i] = pair->values[index];
   }
-  FitCandidate(bench, &other, other.problem->FromParent(*pair->problem, pair->point, values, {}), kFinalIterations,
+  FitCandidate(bench, &other, CarryOver(*pair->problem, pair->point, *other.problem, values), kFinalIterations,
                kFinalTolerance);
   ScoreCandidate(bench, &other);
   // In the place of an earlier fit of the same effect, if there is one.
@@ -192,7 +192,7 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   GS_ASSIGN(*result.base, MakeCandidate(bench, {}));
   Candidate& base = *result.base;
   const FitPoint start = base.problem->Start();
-  if (!std::isfinite(base.problem->Cost(start))) {
+  if (!std::isfinite(base.problem->Evaluate(start, Keep::kCost).cost)) {
     return Error{.what = "the base model cannot be simulated along these logs, even in windows",
                  .where = bench.experiment.path,
                  .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};

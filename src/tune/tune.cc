@@ -4,20 +4,19 @@
 #include <cmath>
 #include <random>
 
-#include "src/core/file.h"
-#include "src/tune/journal.h"
+#include "src/fit/journal.h"
+#include "src/tune/job_key.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kSingleLogHeldOut = 0.3;
 constexpr double kAgree = 0.01;  // starts agree when their costs differ by less than this share
 
-FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& free, double time_step_s) {
+FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& free, ObjectiveKind objective) {
   return {.free = free,
-          .objective = options.objective,
+          .objective = objective,
           .window_s = options.window_s,
-          .time_step_s = time_step_s,
+          .time_step_s = options.time_step_s,
           .fit_offsets = options.fit_offsets,
           .fit_shift = options.fit_shift,
           .fit_states = options.fit_states,
@@ -25,108 +24,191 @@ FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& fr
           .huber = options.huber};
 }
 
-// A random start inside the middle of the bounds.
-FitPoint RandomStart(const FitProblem& problem, std::mt19937_64& random) {
-  FitPoint point = problem.Start();
-  std::uniform_real_distribution<double> share(0.15, 0.85);
-  for (std::size_t i = 0; i < problem.coordinates().size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    point.y[k] = problem.low()[k] + share(random) * (problem.high()[k] - problem.low()[k]);
-  }
-  return point;
-}
-
+// Everything that decides the fit's numbers.
 std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vector<double>& start,
                      const TuneOptions& options) {
-  std::uint64_t key = Hash(start.data(), sizeof(double) * start.size());
-  const auto add = [&](const std::string& text) { key = Hash(text.data(), text.size(), key); };
-  for (const auto& p : model.parameters()) add(p.name);
+  Hasher hasher;
+  AddModel(model, &hasher);
+  hasher.Numbers(start);
   for (const auto* part : {&data.train, &data.held_out}) {
-    for (const auto& recording : *part) {
-      for (const auto& measured : recording.measured)
-        key = Hash(measured.values.data(), sizeof(double) * measured.values.size(), key);
-      for (const auto& command : recording.commands)
-        key = Hash(command.values.data(), sizeof(double) * command.values.size(), key);
-      key = Hash(recording.time_s.data(), sizeof(double) * recording.time_s.size(), key);
-    }
+    hasher.Number(static_cast<double>(part->size()));
+    for (const auto& recording : *part) AddRecording(recording, &hasher);
   }
+  const SolveOptions& solve = options.solve;
   const double numbers[] = {static_cast<double>(options.objective),
                             options.window_s,
                             static_cast<double>(options.fit_offsets),
                             static_cast<double>(options.fit_shift),
                             static_cast<double>(options.fit_states),
+                            static_cast<double>(options.normalization),
                             options.huber,
                             options.time_step_s,
                             static_cast<double>(options.starts),
-                            static_cast<double>(options.solve.optimizer),
-                            options.solve.tolerance,
-                            static_cast<double>(options.normalization),
-                            static_cast<double>(options.solve.max_iterations),
-                            static_cast<double>(options.solve.seed)};
-  key = Hash(numbers, sizeof numbers, key);
-  return Hash(options.free.data(), sizeof(int) * options.free.size(), key);
+                            solve.tolerance,
+                            solve.coarse_step,
+                            solve.fine_step,
+                            solve.damping,
+                            static_cast<double>(solve.central),
+                            static_cast<double>(solve.secant),
+                            static_cast<double>(solve.max_iterations),
+                            static_cast<double>(solve.seed)};
+  hasher.Text(solve.optimizer).Numbers(numbers);
+  return hasher.Bytes(options.free.data(), sizeof(int) * options.free.size()).value();
+}
+
+// A random start inside the middle of the bounds.
+std::vector<double> RandomStart(const SearchSpace& space, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> share(0.15, 0.85);
+  Eigen::VectorXd y(space.size());
+  for (Eigen::Index k = 0; k < y.size(); ++k)
+    y[k] = space.low()[k] + share(random) * (space.high()[k] - space.low()[k]);
+  return std::vector<double>(y.begin(), y.end());
+}
+
+// A problem with its objective, journaled where there is a journal.
+struct Stage {
+  Stage(const Model& model, const DataSplit& data, const FitOptions& options, const std::vector<double>& start,
+        ThreadPool& pool, Journal* journal_or_null)
+      : problem(model, data.train, options, start, pool), plain(problem), journal(journal_or_null) {
+    if (journal) journaled.emplace(plain, *journal);
+  }
+  Objective& objective() { return journaled ? static_cast<Objective&>(*journaled) : plain; }
+  SolveResult SolveFrom(const FitPoint& point, const SolveOptions& options) {
+    return Solve({.problem = problem, .objective = objective(), .journal = journal}, point, options);
+  }
+
+  FitProblem problem;
+  ProblemObjective plain;
+  std::optional<JournaledObjective> journaled;
+  Journal* journal;
+};
+
+// What all starts of one fit share.
+struct Fit {
+  const Model& model;
+  const DataSplit& data;
+  const std::vector<double>& start;
+  const TuneOptions& options;
+  const std::vector<int>& free;
+  ThreadPool& pool;
+  Journal* journal;
+
+  std::unique_ptr<Stage> MakeStage(ObjectiveKind objective) const {
+    return std::make_unique<Stage>(model, data, MakeFitOptions(options, free, objective), start, pool, journal);
+  }
+};
+
+// Where one start led.
+struct Found {
+  std::unique_ptr<Stage> stage;  // the last one
+  SolveResult result;
+  Work work;
+};
+
+// The states' priors and the robust threshold by the residuals at a point.
+void Reweigh(const TuneOptions& options, const FitPoint& point, FitProblem* problem) {
+  const Residuals residuals = problem->Evaluate(point, Keep::kResiduals).residuals;
+  if (options.fit_states) problem->WeighStates(residuals);
+  problem->SetHuberThreshold(residuals);
+}
+
+// The free runs beside the windows, from where the windows ended; nothing where they cannot be simulated there.
+std::optional<Found> FitBoth(const Fit& fit, const Eigen::VectorXd& y) {
+  Found both{.stage = fit.MakeStage(ObjectiveKind::kBoth), .result = {}, .work = {}};
+  FitProblem& problem = both.stage->problem;
+  FitPoint joint = problem.Start();
+  joint.y = y;
+  const Evaluation first = both.stage->objective().Evaluate(joint, Keep::kCost);
+  both.work += first.work;
+  both.result.cost = std::numeric_limits<double>::infinity();
+  if (!std::isfinite(first.cost)) return both;
+  // Windows come log by log, each log's free run last: their states are found again from the log.
+  if (fit.options.fit_states) problem.WeighStates(problem.Evaluate(joint, Keep::kResiduals).residuals);
+  joint = SolveStates(problem, both.stage->objective(), joint, 3, &both.work);
+  problem.SetHuberThreshold(problem.Evaluate(joint, Keep::kResiduals).residuals);
+  both.result = both.stage->SolveFrom(joint, fit.options.solve);
+  both.work += both.result.work;
+  return both;
+}
+
+// Windows first: they converge from far; the free run then sees what is slow, when it can be simulated at all.
+// `random`: search coordinates of the parameters; none: the given values.
+Found FitFrom(const Fit& fit, const std::optional<std::vector<double>>& random) {
+  const ObjectiveKind asked = fit.options.objective;
+  Found found{.stage = fit.MakeStage(asked == ObjectiveKind::kFreeRun ? asked : ObjectiveKind::kWindows),
+              .result = {},
+              .work = {}};
+  FitPoint point = found.stage->problem.Start();
+  if (random) std::copy(random->begin(), random->end(), point.y.begin());
+  found.result = found.stage->SolveFrom(point, fit.options.solve);
+  found.work += found.result.work;
+  if (found.result.termination == Termination::kNotSimulated) return found;
+  if (asked != ObjectiveKind::kBoth) {
+    if (fit.options.huber > 0 || fit.options.fit_states) {
+      Reweigh(fit.options, found.result.point, &found.stage->problem);
+      found.result = found.stage->SolveFrom(found.result.point, fit.options.solve);
+      found.work += found.result.work;
+    }
+    return found;
+  }
+  std::optional<Found> both = FitBoth(fit, found.result.point.y);
+  both->work += found.work;
+  if (both->result.termination != Termination::kNotSimulated && std::isfinite(both->result.cost))
+    return std::move(*both);
+  found.work = both->work;
+  return found;
+}
+
+void Score(const Model& model, const DataSplit& data, const TuneOptions& options, ThreadPool& pool,
+           TuneSummary* summary) {
+  const ReplayMode mode = model.experiment().replay.mode;
+  summary->error_nominal = ReplayError(Evaluate(model, data.held_out, model.Nominal(), 0, mode, options, pool));
+  summary->train = Evaluate(model, data.train, summary->values, summary->shift_s, mode, options, pool);
+  summary->held_out = Evaluate(model, data.held_out, summary->values, summary->shift_s, mode, options, pool);
+  summary->error_train = ReplayError(summary->train);
+  summary->error_held_out = ReplayError(summary->held_out);
+}
+
+// All starts; the best one's values, costs and work are in the summary.
+Found FitFromAll(const Fit& fit, TuneSummary* summary) {
+  std::mt19937_64 random(fit.options.solve.seed + 1);
+  const SearchSpace space(fit.model.parameters(), fit.free, fit.start, false, false);
+  Found best;
+  for (int s = 0; s < std::max(1, fit.options.starts); ++s) {
+    if (s > 0 && IsLate(fit.options.solve.deadline)) break;
+    std::optional<std::vector<double>> from;
+    if (s > 0) from = RandomStart(space, random);
+    Found found = FitFrom(fit, from);
+    summary->evaluations += found.work.evaluations, summary->replays += found.work.replays;
+    summary->start_costs.push_back(found.result.cost);
+    if (!best.stage || (std::isfinite(found.result.cost) && found.result.cost < best.result.cost))
+      best = std::move(found);
+  }
+  summary->values = best.stage->problem.Values(best.result.point);
+  summary->termination = best.result.termination;
+  for (const double cost : summary->start_costs)
+    summary->starts_agree = summary->starts_agree && cost <= best.result.cost * (1 + kAgree);
+  summary->shift_s = best.stage->problem.Shift(best.result.point);
+  return best;
 }
 
 }  // namespace
-
-Recording Slice(const Recording& recording, std::size_t begin, std::size_t end) {
-  Recording part = recording;
-  const auto cut = [&](std::vector<double>& values) {
-    values = std::vector<double>(values.begin() + static_cast<std::ptrdiff_t>(begin),
-                                 values.begin() + static_cast<std::ptrdiff_t>(end));
-  };
-  cut(part.time_s);
-  const double shift = part.time_s.front();
-  for (double& t : part.time_s) t -= shift;
-  for (auto& command : part.commands) cut(command.values);
-  for (auto& measured : part.measured) cut(measured.values);
-  return part;
-}
-
-DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::size_t>& held_out) {
-  DataSplit split;
-  std::vector<char> keep(recordings.size(), 0);
-  for (const std::size_t index : held_out) keep[index] = 1;
-  if (held_out.empty() && recordings.size() == 1) {
-    const Recording& only = recordings.front();
-    std::size_t row = 0;
-    while (row < only.rows() && only.time_s[row] < (1 - kSingleLogHeldOut) * only.duration_s()) ++row;
-    row = std::clamp<std::size_t>(row, 2, only.rows() - 2);
-    split.train.push_back(Slice(only, 0, row));
-    split.held_out.push_back(Slice(only, row, only.rows()));
-    split.how = "the last 30 % of the only log's time";
-    return split;
-  }
-  if (held_out.empty()) {
-    for (std::size_t i = 1; i < recordings.size(); i += 3) keep[i] = 1;
-  }
-  split.asked = !held_out.empty();
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    count += keep[i];
-    (keep[i] ? split.held_out : split.train).push_back(std::move(recordings[i]));
-  }
-  split.how = held_out.empty() ? "every third log, from the second on (" + std::to_string(count) + " of " +
-                                     std::to_string(recordings.size()) + ")"
-                               : "as asked (" + std::to_string(count) + ")";
-  return split;
-}
 
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
                                 const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
                                 const TuneOptions& options, ThreadPool& pool) {
   if (recordings.empty()) return {};
-  FitOptions fit = MakeFitOptions(options, {}, options.time_step_s);
-  fit.objective = mode == ReplayMode::kWindows ? Objective::kWindows : Objective::kFreeRun;
+  FitOptions fit =
+      MakeFitOptions(options, {}, mode == ReplayMode::kWindows ? ObjectiveKind::kWindows : ObjectiveKind::kFreeRun);
   fit.lead_in_s = 0;
   fit.fit_shift = !shift_s;
   fit.shift_s = shift_s.value_or(0);
   FitProblem problem(model, recordings, fit, values, pool);
   FitPoint point = problem.Start();
-  SolveOptions solve{.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01};
-  if (std::isfinite(problem.Cost(point))) {
-    problem.WeighStates(point);
-    point = Solve(problem, point, solve).point;
+  const Evaluation start = problem.Evaluate(point, Keep::kResiduals);
+  if (std::isfinite(start.cost)) {
+    problem.WeighStates(start.residuals);
+    point = Solve(problem, point, {.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01}).point;
   }
   return problem.Predict(point);
 }
@@ -134,23 +216,21 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
 Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::vector<double>& start,
                          const TuneOptions& asked, ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
+  const auto since = [](const auto& when) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - when).count();
+  };
   TuneOptions options = asked;
   std::vector<int> free = options.free;
-  if (free.empty()) {
-    for (std::size_t i = 0; i < model.parameters().size(); ++i) {
-      if (!model.parameters()[i].frozen && model.parameters()[i].low < model.parameters()[i].high)
-        free.push_back(static_cast<int>(i));
-    }
+  for (std::size_t i = 0; i < model.parameters().size() && options.free.empty(); ++i) {
+    if (!model.parameters()[i].frozen && model.parameters()[i].low < model.parameters()[i].high)
+      free.push_back(static_cast<int>(i));
   }
   if (free.empty())
     return Error{.what = "no parameter is free", .where = model.experiment().path, .cure = "use --free NAME"};
-  TuneSummary summary{
-      .optimizer = OptimizerNames()[static_cast<int>(options.solve.optimizer)], .values = start, .split = data.how};
+  TuneSummary summary{.optimizer = options.solve.optimizer, .values = start, .split = data.how};
   if (options.time_step_s <= 0) {
-    options.time_step_s =
-        ChooseTimeStep(model, data.train, {.mode = ReplayMode::kWindows, .window_s = options.window_s, .values = start},
-                       pool)
-            .step_s;
+    const ReplayOptions replay{.mode = ReplayMode::kWindows, .window_s = options.window_s, .values = start};
+    options.time_step_s = ChooseTimeStep(model, data.train, replay, pool).step_s;
   }
   summary.time_step_s = options.time_step_s;
   std::unique_ptr<Journal> journal;
@@ -158,93 +238,30 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     GS_ASSIGN(journal, Journal::Open(options.journal, JobKey(model, data, start, options), options.resume));
   }
   const auto solve_begin = std::chrono::steady_clock::now();
-  // Windows first: they converge from far; the free run then sees what is slow, when it can be simulated at all.
-  const auto solve_from = [&](const FitPoint* random, std::vector<double>* values, FitProblem** last,
-                              std::vector<std::unique_ptr<FitProblem>>* problems) -> SolveResult {
-    TuneOptions stage = options;
-    stage.objective = options.objective == Objective::kFreeRun ? Objective::kFreeRun : Objective::kWindows;
-    problems->push_back(
-        std::make_unique<FitProblem>(model, data.train, MakeFitOptions(stage, free, options.time_step_s), start, pool));
-    FitProblem* problem = problems->back().get();
-    problem->set_journal(journal.get());
-    FitPoint point = random ? *random : problem->Start();
-    SolveResult found = Solve(*problem, point, options.solve);
-    if (options.objective != Objective::kBoth && (options.huber > 0 || options.fit_states) &&
-        found.termination != Termination::kNotSimulated) {
-      if (options.fit_states) problem->WeighStates(found.point);
-      problem->UpdateRobustScale(found.point);
-      found = Solve(*problem, found.point, options.solve);
-    }
-    if (options.objective == Objective::kBoth && found.termination != Termination::kNotSimulated) {
-      problems->push_back(std::make_unique<FitProblem>(
-          model, data.train, MakeFitOptions(options, free, options.time_step_s), start, pool));
-      FitProblem* both = problems->back().get();
-      both->set_journal(journal.get());
-      FitPoint joint = both->Start();
-      joint.y = found.point.y;
-      // Windows come log by log, each log's free run last: their states are found again from the log.
-      if (std::isfinite(both->Cost(joint))) {
-        if (options.fit_states) both->WeighStates(joint);
-        joint = SolveStates(*both, joint, 3);
-        both->UpdateRobustScale(joint);
-        const SolveResult polished = Solve(*both, joint, options.solve);
-        if (polished.termination != Termination::kNotSimulated && std::isfinite(polished.cost)) {
-          found = polished;
-          problem = both;
-        }
-      }
-    }
-    *values = problem->Values(found.point);
-    *last = problem;
-    return found;
-  };
-  std::mt19937_64 random(options.solve.seed + 1);
-  std::vector<std::unique_ptr<FitProblem>> problems, best_problems;
-  FitProblem* best_problem = nullptr;
-  SolveResult best;
-  for (int s = 0; s < std::max(1, options.starts); ++s) {
-    if (s > 0 && options.solve.deadline && std::chrono::steady_clock::now() >= *options.solve.deadline) break;
-    std::vector<double> values;
-    FitProblem* problem = nullptr;
-    FitPoint from;
-    if (s > 0) {
-      TuneOptions stage = options;
-      stage.objective = options.objective == Objective::kFreeRun ? Objective::kFreeRun : Objective::kWindows;
-      FitProblem probe(model, data.train, MakeFitOptions(stage, free, options.time_step_s), start, pool);
-      from = RandomStart(probe, random);
-    }
-    SolveResult found = solve_from(s > 0 ? &from : nullptr, &values, &problem, &problems);
-    for (const auto& p : problems) summary.evaluations += p->evaluations(), summary.replays += p->replays();
-    summary.start_costs.push_back(found.cost);
-    if (!best_problem || (std::isfinite(found.cost) && found.cost < best.cost)) {
-      best = std::move(found);
-      best_problem = problem;
-      best_problems = std::move(problems);
-      summary.values = values;
-    }
-    problems.clear();
-  }
-  if (best.termination == Termination::kNotSimulated) {
+  const Found best = FitFromAll({.model = model,
+                                 .data = data,
+                                 .start = start,
+                                 .options = options,
+                                 .free = free,
+                                 .pool = pool,
+                                 .journal = journal.get()},
+                                &summary);
+  if (best.result.termination == Termination::kNotSimulated) {
     return Error{.what = "the model cannot be simulated at the start of the fit",
                  .where = model.experiment().path,
                  .cure = "check the parameters' nominal values, or use shorter windows (--window)"};
   }
-  summary.solve_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - solve_begin).count();
-  summary.termination = best.termination;
-  for (const double cost : summary.start_costs)
-    summary.starts_agree = summary.starts_agree && cost <= best.cost * (1 + kAgree);
-  summary.shift_s = best_problem->Shift(best.point);
-  Uncertainty uncertainty = EstimateUncertainty(*best_problem, best.point, model, options.solve.fine_step);
+  summary.solve_s = since(solve_begin);
+  const DifferenceOptions differences{.step = options.solve.fine_step, .columns = DifferenceOptions::Columns::kCentral};
+  const FitPoint& point = best.result.point;
+  Uncertainty uncertainty =
+      EstimateUncertainty(best.stage->problem, point, best.stage->objective().Linearize(point, differences));
   summary.tuned = std::move(uncertainty.tuned);
   summary.flat = std::move(uncertainty.flat);
   summary.correlated = std::move(uncertainty.correlated);
-  const ReplayMode mode = model.experiment().replay.mode;
-  summary.error_nominal = ReplayError(Evaluate(model, data.held_out, model.Nominal(), 0, mode, options, pool));
-  summary.train = Evaluate(model, data.train, summary.values, summary.shift_s, mode, options, pool);
-  summary.held_out = Evaluate(model, data.held_out, summary.values, summary.shift_s, mode, options, pool);
-  summary.error_train = ReplayError(summary.train);
-  summary.error_held_out = ReplayError(summary.held_out);
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  if (journal && !journal->status().ok()) summary.warnings.push_back(journal->status().error().Text());
+  Score(model, data, options, pool, &summary);
+  summary.wall_s = since(begin);
   return summary;
 }
 

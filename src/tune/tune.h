@@ -7,25 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "src/tune/solve.h"
+#include "src/fit/covariance.h"
+#include "src/fit/optimizers.h"
+#include "src/tune/split.h"
 
 namespace gapscope {
 
-// Which logs, or which rows of a single log, are fitted and which are kept to score.
-struct DataSplit {
-  std::vector<Recording> train, held_out;
-  std::string how;     // one line for the user
-  bool asked = false;  // the user said which
-};
-// `held_out` indices are kept; with none, every third log from the second on; with two logs the second; with one its
-// last 30 % of time.
-DataSplit SplitData(std::vector<Recording> recordings, const std::vector<std::size_t>& held_out);
-// Rows [begin, end) as a recording of its own; time starts anew.
-Recording Slice(const Recording& recording, std::size_t begin, std::size_t end);
-
 struct TuneOptions {
   std::vector<int> free;  // parameters; empty: all that are not frozen
-  Objective objective = Objective::kBoth;
+  ObjectiveKind objective = ObjectiveKind::kBoth;
   double window_s = 1.0;
   bool fit_offsets = true, fit_shift = true, fit_states = true;
   Normalization normalization = Normalization::kDeviation;
@@ -35,18 +25,6 @@ struct TuneOptions {
   SolveOptions solve;
   std::string journal;  // file; empty: none
   bool resume = false;
-};
-
-struct TunedParameter {
-  int index = 0;
-  double value = 0, low = 0, high = 0;  // 95 % interval; the bounds where nothing is known
-  bool at_bound = false, identifiable = true;
-};
-
-// A direction in parameter space that the logs leave open.
-struct FlatDirection {
-  std::vector<std::pair<int, double>> parts;  // parameter, exponent (logarithmic) or weight; largest first, scaled to 1
-  double deviation = 0;                       // standard deviation along it, as a share of the range
 };
 
 struct TuneSummary {
@@ -60,10 +38,12 @@ struct TuneSummary {
   std::vector<double> values;  // all parameters of the model
   std::vector<TunedParameter> tuned;
   std::vector<FlatDirection> flat;
-  std::vector<std::tuple<int, int, double>> correlated;           // |correlation| above 0.95
-  std::vector<LogReplay> train, held_out;                         // at the tuned values
-  double error_nominal = 0, error_train = 0, error_held_out = 0;  // see ReplayError; nominal on the held-out data
+  std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above 0.95
+  std::vector<LogReplay> train, held_out;                // at the tuned values
+  // See ReplayError; nominal on the held-out data.
+  double error_nominal = 0, error_train = 0, error_held_out = 0;
   std::string split;
+  std::vector<std::string> warnings;  // what went wrong beside the fit, as a journal that cannot be written
 };
 
 // Errors: nothing free; a journal that cannot be used; a start that cannot be simulated.
@@ -75,14 +55,6 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
                                 const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
                                 const TuneOptions& options, ThreadPool& pool);
-
-// Intervals, flat directions and correlations at a solved point (in tune/uncertainty.cc).
-struct Uncertainty {
-  std::vector<TunedParameter> tuned;
-  std::vector<FlatDirection> flat;
-  std::vector<std::tuple<int, int, double>> correlated;
-};
-Uncertainty EstimateUncertainty(FitProblem& problem, const FitPoint& point, const Model& model, double step);
 
 }  // namespace gapscope
 

@@ -1,5 +1,5 @@
 // An interrupted run continues to the same bytes, wherever it was cut.
-#include "src/tune/journal.h"
+#include "src/fit/journal.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -110,7 +110,7 @@ TEST(JournalPackTest, LinearizationComesBack) {
   l.block_logs = {0, 4};
   l.state_gain = {Eigen::MatrixXd::Random(2, 3), Eigen::MatrixXd(0, 3)};
   l.state_step = {Eigen::VectorXd::Random(2), Eigen::VectorXd(0)};
-  const auto again = Unpack(Pack(l));
+  const auto again = UnpackLinearization(Pack(l));
   ASSERT_TRUE(again.valid);
   EXPECT_EQ(again.hessian, l.hessian);
   EXPECT_EQ(again.gradient, l.gradient);

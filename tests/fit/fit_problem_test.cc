@@ -1,11 +1,15 @@
 // The least-squares problem against closed forms: a cart on a spring is linear in everything that is fitted.
-#include "src/tune/fit_problem.h"
+#include "src/fit/fit_problem.h"
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <random>
 
+#include "src/diagnose/score_test.h"
+#include "src/fit/optimizers.h"
+#include "src/fit/policy.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -25,13 +29,21 @@ Recording CartLog(const Rig& rig, std::size_t rows, double noise, unsigned long 
   return MakeRecording(rig, std::move(command), std::move(q), kCartStep_s);
 }
 
-FitOptions CartOptions(const Rig& rig, Objective objective) {
+FitOptions CartOptions(const Rig& rig, ObjectiveKind objective) {
   return {.free = {rig.Index("cart.gain")},
           .objective = objective,
           .window_s = 0.5,
           .lead_in_s = 0.02,
           .time_step_s = kCartStep_s,
           .fit_shift = false};
+}
+
+double CostOf(FitProblem& problem, const FitPoint& point) { return problem.Evaluate(point, Keep::kCost).cost; }
+
+FitPoint StatesSolved(FitProblem& problem, const FitPoint& point, int steps) {
+  ProblemObjective objective(problem);
+  Work work;
+  return SolveStates(problem, objective, point, steps, &work);
 }
 
 double Deviation(const std::vector<double>& y) {
@@ -77,7 +89,7 @@ Dense DenseProblem(const Rig& rig, const Recording& recording, double lead_in_s)
     }
     for (int j = 0; j < 2; ++j) {
       std::vector<double> row(columns, 0.0);
-      row[2 + 2 * w + static_cast<std::size_t>(j)] = prior * (j == 0 ? 1 : kSpeedPrior_s);
+      row[2 + 2 * w + static_cast<std::size_t>(j)] = prior * (j == 0 ? 1 : kFitPolicy.speed_prior_s);
       rows.push_back(row);
       residual.push_back(0);
     }
@@ -95,9 +107,9 @@ TEST(FitProblemTest, CostIsHalfTheSumOfSquares) {
   const Rig rig = LoadCart();
   const std::vector<Recording> logs = {CartLog(rig, 501, 0.01)};
   ThreadPool pool(1);
-  FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, ObjectiveKind::kWindows), rig.model->Nominal(), pool);
   const Dense dense = DenseProblem(rig, logs[0], 0.02);
-  EXPECT_NEAR(problem.Cost(problem.Start()), 0.5 * dense.residual.squaredNorm(),
+  EXPECT_NEAR(CostOf(problem, problem.Start()), 0.5 * dense.residual.squaredNorm(),
               kRounding * dense.residual.squaredNorm());
 }
 
@@ -105,8 +117,8 @@ TEST(FitProblemTest, EliminatedStatesGiveTheFullProblemsNormalEquations) {
   const Rig rig = LoadCart();
   const std::vector<Recording> logs = {CartLog(rig, 501, 0.01)};
   ThreadPool pool(1);
-  FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
-  const Linearization at = problem.Linearize(problem.Start(), 0.05);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, ObjectiveKind::kWindows), rig.model->Nominal(), pool);
+  const Linearization at = Linearize(problem, problem.Start(), {.step = 0.05});
   ASSERT_TRUE(at.valid);
   const Dense dense = DenseProblem(rig, logs[0], 0.02);
   const Eigen::MatrixXd full = dense.jacobian.transpose() * dense.jacobian;
@@ -121,13 +133,13 @@ TEST(FitProblemTest, EliminatedStatesGiveTheFullProblemsNormalEquations) {
   EXPECT_LT((at.gradient - gradient).norm(), 1e-6 * gradient.norm());
   // One full step lands on the solution of the whole problem: its cost is that of the dense solution.
   const Eigen::VectorXd solution = full.ldlt().solve(-slope);
-  const FitPoint moved = problem.Move(problem.Start(), at, at.hessian.ldlt().solve(-at.gradient));
+  const FitPoint moved = Move(problem, problem.Start(), at, at.hessian.ldlt().solve(-at.gradient));
   EXPECT_LT((moved.y - problem.Start().y - solution.head(2)).norm(), 1e-4 * solution.head(2).norm());
-  for (std::size_t w = 0; w < problem.windows(); ++w) {
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) {
     EXPECT_LT((moved.states[w] - solution.segment<2>(2 + 2 * static_cast<Eigen::Index>(w))).norm(), 1e-4);
   }
-  EXPECT_NEAR(problem.Cost(moved), 0.5 * (dense.residual + dense.jacobian * solution).squaredNorm(),
-              1e-6 * problem.Cost(problem.Start()));
+  EXPECT_NEAR(CostOf(problem, moved), 0.5 * (dense.residual + dense.jacobian * solution).squaredNorm(),
+              1e-6 * CostOf(problem, problem.Start()));
 }
 
 TEST(FitProblemTest, GradientIsThatOfTheReducedCost) {
@@ -141,15 +153,15 @@ TEST(FitProblemTest, GradientIsThatOfTheReducedCost) {
       *rig.model, logs,
       {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004, .fit_offsets = false},
       rig.model->Nominal(), pool);
-  FitPoint point = SolveStates(problem, problem.Start(), 6);
-  const Linearization at = problem.Linearize(point, 1e-3);
+  FitPoint point = StatesSolved(problem, problem.Start(), 6);
+  const Linearization at = Linearize(problem, point, {.step = 1e-3});
   for (Eigen::Index i = 0; i < point.y.size(); ++i) {
     const double h = i + 1 < point.y.size() ? 2e-3 : 0.1;  // the shift is linear between samples
     double cost[2];
     for (int side = 0; side < 2; ++side) {
       FitPoint other = point;
       other.y[i] += side == 0 ? -h : h;
-      cost[side] = problem.Cost(SolveStates(problem, other, 6));
+      cost[side] = CostOf(problem, StatesSolved(problem, other, 6));
     }
     EXPECT_NEAR(at.gradient[i], (cost[1] - cost[0]) / (2 * h), 0.02 * at.gradient.norm()) << i;
   }
@@ -159,7 +171,7 @@ TEST(FitProblemTest, HuberGrowsLinearlyBeyondTheThreshold) {
   const Rig rig = LoadCart();
   Recording log = CartLog(rig, 501, 0.01);
   ThreadPool pool(1);
-  FitOptions options = CartOptions(rig, Objective::kFreeRun);
+  FitOptions options = CartOptions(rig, ObjectiveKind::kFreeRun);
   options.huber = 4;
   options.fit_offsets = options.fit_states = false;
   const auto cost_with_outlier = [&](double outlier, bool robust) {
@@ -167,8 +179,8 @@ TEST(FitProblemTest, HuberGrowsLinearlyBeyondTheThreshold) {
     logs[0].measured[0].values[250] += outlier;
     options.weights = {1.0};
     FitProblem problem(*rig.model, logs, options, rig.Values({{"cart.gain", 1.2}}), pool);
-    if (robust) problem.UpdateRobustScale(problem.Start());
-    return problem.Cost(problem.Start());
+    if (robust) problem.SetHuberThreshold(problem.Evaluate(problem.Start(), Keep::kResiduals).residuals);
+    return CostOf(problem, problem.Start());
   };
   // Far out: quadratic without, linear with.
   const double plain[] = {cost_with_outlier(10, false), cost_with_outlier(20, false)},
@@ -184,7 +196,7 @@ TEST(FitProblemTest, MissingSamplesAreLeftOut) {
   for (std::size_t k = 100; k < 150; ++k) log.measured[0].values[k] = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Recording> logs = {log};
   ThreadPool pool(1);
-  FitOptions options = CartOptions(rig, Objective::kFreeRun);
+  FitOptions options = CartOptions(rig, ObjectiveKind::kFreeRun);
   FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
   const SolveResult found = Solve(problem, problem.Start(), {.tolerance = 1e-10});
   EXPECT_NEAR(problem.Values(found.point)[0], 1.2, 1e-3);
@@ -201,22 +213,23 @@ TEST(FitProblemTest, SecantUpdateExplainsItsStep) {
                      {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = 0.004},
                      rig.model->Nominal(), pool);
   const FitPoint from = problem.Start();
-  Snapshot snapshot = problem.Differentiate(from, 0.01, FitProblem::Columns::kAll);
+  Derivatives snapshot = problem.Differentiate(from, {.step = 0.01});
   const std::vector<Eigen::VectorXd> before = snapshot.residuals;
   FitPoint to = from;
   to.y[0] += 0.05;
   to.y[1] -= 0.3;
   to.states[1][0] += 0.01;
-  std::vector<Eigen::VectorXd> after;
-  const double cost = problem.CostAndResiduals(to, &after);
+  const Evaluation evaluation = problem.Evaluate(to, Keep::kResiduals);
+  const double cost = evaluation.cost;
+  Residuals after = evaluation.residuals;
   const std::vector<Eigen::VectorXd> kept = after;
-  problem.UpdateSecant(snapshot, from, to, std::move(after));
-  for (std::size_t w = 0; w < problem.windows(); ++w) {
+  UpdateSecant(problem, snapshot, from, to, std::move(after));
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) {
     Eigen::VectorXd moved(snapshot.jacobians[w].cols());
     moved << to.y - from.y, to.states[w] - from.states[w];
     EXPECT_LT((snapshot.jacobians[w] * moved - (kept[w] - before[w])).norm(), 1e-9 * kept[w].norm()) << w;
   }
-  EXPECT_NEAR(problem.Reduce(to, snapshot, false).cost, cost, 1e-12 * cost);
+  EXPECT_NEAR(Reduce(problem, to, snapshot, Blocks::kNone).cost, cost, 1e-12 * cost);
 }
 
 // Size and angle as the terms that act linearly: the same parameters, and no curved valley on the way to them.
@@ -274,22 +287,21 @@ TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
   const Rig rig = LoadCart();
   const std::vector<Recording> logs = {CartLog(rig, 501, 0.01)};
   ThreadPool pool(1);
-  FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, ObjectiveKind::kWindows), rig.model->Nominal(), pool);
   const FitPoint from = problem.Start();
-  const Snapshot snapshot = problem.Differentiate(from, 0.05, FitProblem::Columns::kAll);
-  const Linearization at = problem.Reduce(from, snapshot, false);
+  const Derivatives snapshot = problem.Differentiate(from, {.step = 0.05});
+  const Linearization at = Reduce(problem, from, snapshot, Blocks::kNone);
   FitPoint to = from, probe = from;
   to.y[0] += 0.3;
   probe.y[0] += 0.03;
-  std::vector<Eigen::VectorXd> residuals;
-  (void)problem.CostAndResiduals(probe, &residuals);
-  EXPECT_LT(problem.Bend(at, snapshot, from, to, 0.1, residuals).gradient.norm(), 1e-6 * at.gradient.norm());
+  Residuals residuals = problem.Evaluate(probe, Keep::kResiduals).residuals;
+  EXPECT_LT(Bend(problem, at, snapshot, from, to, 0.1, residuals).gradient.norm(), 1e-6 * at.gradient.norm());
   // Residuals that are off by share^2 times their Jacobian's first column are what a bend of the unit vector's size
   // makes.
   for (std::size_t w = 0; w < residuals.size(); ++w) residuals[w] += 0.01 * snapshot.jacobians[w].col(0);
-  const Linearization bent = problem.Bend(at, snapshot, from, to, 0.1, residuals);
+  const Linearization bent = Bend(problem, at, snapshot, from, to, 0.1, residuals);
   Eigen::MatrixXd hessian = at.hessian;
-  hessian.diagonal() -= problem.anchor_weight();
+  hessian.diagonal() -= problem.prior().weight;
   EXPECT_LT((bent.gradient - hessian.col(0)).norm(), 1e-5 * hessian.col(0).norm());
 }
 
@@ -297,17 +309,16 @@ TEST(TakeBetterStatesTest, EveryWindowKeepsTheStateThatCostsLess) {
   const Rig rig = LoadCart();
   const std::vector<Recording> logs = {CartLog(rig, 501, 0.01)};
   ThreadPool pool(1);
-  FitProblem problem(*rig.model, logs, CartOptions(rig, Objective::kWindows), rig.model->Nominal(), pool);
-  ASSERT_GT(problem.windows(), 2u);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, ObjectiveKind::kWindows), rig.model->Nominal(), pool);
+  ASSERT_GT(problem.windows().size(), 2u);
   // One of the two is spoilt in even windows, the other in odd ones.
   FitPoint a = problem.Start(), b = problem.Start();
-  for (std::size_t w = 0; w < problem.windows(); ++w) (w % 2 == 0 ? a : b).states[w][0] += 3;
-  std::vector<Eigen::VectorXd> of_a, of_b;
-  (void)problem.CostAndResiduals(a, &of_a);
-  (void)problem.CostAndResiduals(b, &of_b);
-  const double cost = problem.TakeBetterStates(a, of_a, b, of_b);
-  EXPECT_NEAR(cost, problem.Cost(problem.Start()), 1e-12 * cost);
-  EXPECT_NEAR(cost, problem.Cost(a), 1e-12 * cost);
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) (w % 2 == 0 ? a : b).states[w][0] += 3;
+  Residuals of_a = problem.Evaluate(a, Keep::kResiduals).residuals,
+            of_b = problem.Evaluate(b, Keep::kResiduals).residuals;
+  const double cost = TakeBetterStates(problem, a, of_a, b, of_b);
+  EXPECT_NEAR(cost, CostOf(problem, problem.Start()), 1e-12 * cost);
+  EXPECT_NEAR(cost, CostOf(problem, a), 1e-12 * cost);
 }
 
 // What went before a window is in the drive's states when it starts: with the true effect nothing is left but the
@@ -330,8 +341,8 @@ TEST(FitProblemTest, DrivesHoldTheirPastAtAWindowsStart) {
     const FitOptions options{.time_step_s = 0.002, .fit_offsets = false, .fit_shift = false};
     FitProblem truth(*rig.model, logs, options, values, pool),
         nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
-    const double left = truth.Cost(SolveStates(truth, truth.Start(), 3)),
-                 without = nothing.Cost(SolveStates(nothing, nothing.Start(), 3));
+    const double left = CostOf(truth, StatesSolved(truth, truth.Start(), 3)),
+                 without = CostOf(nothing, StatesSolved(nothing, nothing.Start(), 3));
     EXPECT_LT(left, 0.003 * without) << effect;
   }
 }
@@ -358,9 +369,9 @@ TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   FitProblem problem(*rig.model, logs, options, values, pool);
   FitProblem from_nothing(*rig.model, logs, options, rig.model->Nominal(), pool);
   FitPoint point = from_nothing.Start();
-  const double before = from_nothing.Cost(point);
+  const double before = CostOf(from_nothing, point);
   point.y = problem.Start().y;
-  EXPECT_LT(from_nothing.Cost(point), 1e-4 * before);
+  EXPECT_LT(CostOf(from_nothing, point), 1e-4 * before);
 }
 
 // A command later than one sample drives the nuisance shift onto its bound: the score test must still see what a delay
@@ -377,17 +388,15 @@ TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
   FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
   const FitPoint point = Solve(parent, parent.Start(), {.tolerance = 1e-5}).point;
   EXPECT_NEAR(parent.Shift(point), 0.004, 1e-9);
-  const Snapshot base = parent.Capture(point, 0.01);
+  const Snapshot base = Capture(parent, point, 0.01);
   ASSERT_TRUE(base.valid);
   FitOptions of_child = options;
   of_child.free = {truth.Index("motor.torque_per_ampere"), truth.Index("hub.inertia"), truth.Index("link.stiffness"),
                    truth.Index("command_delay@motor.delay_s")};
   FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
   const auto drop = [&](double delay_s) {
-    return child
-               .TestColumn(
-                   child.FromParent(parent, point, truth.Values({{"command_delay@motor.delay_s", delay_s}}), {}),
-                   parent, point, base)
+    return TestColumn(child, CarryOver(parent, point, child, truth.Values({{"command_delay@motor.delay_s", delay_s}})),
+                      parent, point, base)
                .drop /
            base.cost;
   };
@@ -404,22 +413,22 @@ TEST(TestColumnTest, FewWindowsAreTheirShareOfTheCost) {
   ThreadPool pool(2);
   const FitOptions options{.free = {rig.Index("hub.inertia")}, .time_step_s = 0.004};
   FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
-  ASSERT_EQ(parent.windows(), 4u);
+  ASSERT_EQ(parent.windows().size(), 4u);
   const FitPoint start = parent.Start();  // where neither the states nor the parameters are pulled
-  const Snapshot first = parent.Capture(start, 0.01);
-  const std::vector<double> blocks = parent.BlockCosts(start);
+  const Snapshot first = Capture(parent, start, 0.01);
+  const std::vector<double> blocks = BlockCosts(parent, start);
   ASSERT_EQ(blocks.size(), 8u);
-  EXPECT_NEAR(parent.Thin(first, start, 2).cost, blocks[0] + blocks[1] + blocks[4] + blocks[5], 1e-6 * first.cost);
-  EXPECT_DOUBLE_EQ(parent.Thin(first, start, 4).cost, first.cost);
+  EXPECT_NEAR(Thin(parent, first, start, 2).cost, blocks[0] + blocks[1] + blocks[4] + blocks[5], 1e-6 * first.cost);
+  EXPECT_DOUBLE_EQ(Thin(parent, first, start, 4).cost, first.cost);
   const FitPoint point = Solve(parent, start, {.tolerance = 1e-5}).point;
-  const Snapshot base = parent.Capture(point, 0.01), thin = parent.Thin(base, point, 2);
+  const Snapshot base = Capture(parent, point, 0.01), thin = Thin(parent, base, point, 2);
   ASSERT_TRUE(thin.valid);
   FitOptions of_child = options;
   of_child.free = {truth.Index("hub.inertia"), truth.Index("coulomb_friction@hub.friction_n_m")};
   FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
-  const FitPoint at = child.FromParent(parent, point, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), {});
-  const ColumnTest of_all = child.TestColumn(at, parent, point, base),
-                   of_few = child.TestColumn(at, parent, point, thin);
+  const FitPoint at = CarryOver(parent, point, child, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}));
+  const ColumnTest of_all = TestColumn(child, at, parent, point, base),
+                   of_few = TestColumn(child, at, parent, point, thin);
   ASSERT_TRUE(of_few.valid);
   EXPECT_GT(of_few.drop, 0.3 * thin.cost);
   EXPECT_LT(of_few.drop, of_all.drop);

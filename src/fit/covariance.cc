@@ -1,0 +1,183 @@
+#include "src/fit/covariance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/dense.h"
+#include "src/fit/policy.h"
+
+namespace gapscope {
+namespace {
+
+// 97.5 % quantile of Student's t (Abramowitz & Stegun 26.7.5, two terms).
+double StudentQuantile(double freedom) {
+  const double z = 1.959964;
+  return freedom < 1 ? 12.7
+                     : z + (z * z * z + z) / (4 * freedom) +
+                           (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96 * freedom * freedom);
+}
+
+struct Covariance {
+  Eigen::MatrixXd robust, model_based;  // of y, in units of each coordinate's range
+  double freedom = 1;
+};
+
+// The sum of blocks' outer products, and how many blocks there are beyond the unknowns.
+Eigen::MatrixXd Meat(const Linearization& at, double* freedom) {
+  const Eigen::Index n = at.gradient.size();
+  Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(n);
+  const double blocks = static_cast<double>(at.block_gradients.size());
+  for (const auto& g : at.block_gradients) mean += g / std::max(1.0, blocks);
+  // Neighbouring blocks share slow residuals: one lag with Bartlett's weight (Newey & West, Econometrica 55, 1987).
+  for (std::size_t b = 0; b < at.block_gradients.size(); ++b) {
+    const Eigen::VectorXd g = at.block_gradients[b] - mean;
+    meat += g * g.transpose();
+    if (b + 1 < at.block_gradients.size() && at.block_logs[b] == at.block_logs[b + 1]) {
+      const Eigen::VectorXd next = at.block_gradients[b + 1] - mean;
+      meat += 0.5 * (g * next.transpose() + next * g.transpose());
+    }
+  }
+  *freedom = std::max(1.0, blocks - static_cast<double>(n));
+  meat *= blocks / *freedom;
+  return meat;
+}
+
+Covariance CovarianceOf(const FitProblem& problem, const Linearization& at) {
+  Covariance result;
+  const Eigen::MatrixXd meat = Meat(at, &result.freedom);
+  const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
+  // In units of each coordinate's range, so that flat directions mean the same for all. What the prior adds is no
+  // knowledge of the logs.
+  Eigen::MatrixXd hessian = at.hessian;
+  hessian.diagonal() -= problem.prior().weight;
+  hessian = range.asDiagonal() * hessian * range.asDiagonal();
+  const SymmetricEigen eigen(hessian);
+  const double largest = std::max(eigen.values.maxCoeff(), 1e-300);
+  // Whitened: sandwich = W meat' W', the model's own covariance = noise W W'. A direction never counts as better known
+  // than the model's own covariance says, which few blocks could pretend; raising eigenvalues keeps the matrix
+  // consistent.
+  const Eigen::MatrixXd whitener =
+      eigen.vectors *
+      eigen.values.cwiseMax(kCovariancePolicy.least_eigenvalue * largest).cwiseSqrt().cwiseInverse().asDiagonal();
+  const double noise = 2 * at.cost / std::max<double>(1, static_cast<double>(problem.residuals()));
+  const SymmetricEigen spread(whitener.transpose() * range.asDiagonal() * meat * range.asDiagonal() * whitener);
+  const Eigen::MatrixXd half_covariance =
+      whitener * spread.vectors * spread.values.cwiseMax(noise).cwiseSqrt().asDiagonal();
+  result.robust = half_covariance * half_covariance.transpose();
+  result.model_based = noise * whitener * whitener.transpose();
+  return result;
+}
+
+TunedParameter OfCoordinate(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
+                            Eigen::Index i) {
+  const Coordinate& c = problem.space().coordinates()[static_cast<std::size_t>(i)];
+  const double range = problem.layout().high[i] - problem.layout().low[i];
+  const double deviation = std::sqrt(covariance.robust(i, i));
+  TunedParameter tuned{.index = c.parameter, .value = c.ToValue(point.y[i])};
+  const double half = StudentQuantile(covariance.freedom) * deviation * range;
+  tuned.low = c.ToValue(std::max(c.low, point.y[i] - half));
+  tuned.high = c.ToValue(std::min(c.high, point.y[i] + half));
+  if (tuned.low > tuned.high) std::swap(tuned.low, tuned.high);  // a negative size, as a logarithm
+  tuned.at_bound = std::min(point.y[i] - c.low, c.high - point.y[i]) <= kCovariancePolicy.bound_share * range;
+  tuned.identifiable = deviation < kCovariancePolicy.flat_share;
+  return tuned;
+}
+
+// A parameter that two coordinates give together (SearchSpace::Couple): its deviation to first order in both.
+TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
+                        const SearchSpace::Couple& couple, int index) {
+  const SearchSpace& space = problem.space();
+  std::vector<double> values = space.Values(point.y);
+  const auto k = static_cast<std::size_t>(index);
+  const Parameter& p = problem.model().parameters()[k];
+  TunedParameter tuned{.index = index, .value = values[k]};
+  const Eigen::Index at[2] = {couple.size, couple.other};
+  Eigen::Vector2d slope, range;
+  for (int side = 0; side < 2; ++side) {
+    range[side] = problem.layout().high[at[side]] - problem.layout().low[at[side]];
+    const double h = 1e-6 * range[side];
+    double out[2];
+    for (int sign = 0; sign < 2; ++sign) {
+      const double moved = (sign == 0 ? -h : h);
+      space.SetCouple(couple, point.y[couple.size] + (side == 0 ? moved : 0),
+                      point.y[couple.other] + (side == 1 ? moved : 0), &values);
+      out[sign] = values[k];
+    }
+    slope[side] = (out[1] - out[0]) / (2 * h) * range[side];
+  }
+  Eigen::Matrix2d own;
+  for (int a = 0; a < 2; ++a) {
+    for (int b = 0; b < 2; ++b) own(a, b) = covariance.robust(at[a], at[b]);
+  }
+  const double deviation = std::sqrt(std::max(0.0, slope.dot(own * slope)));
+  const double half = StudentQuantile(covariance.freedom) * deviation;
+  tuned.low = std::max(p.low, tuned.value - half);
+  tuned.high = std::min(p.high, tuned.value + half);
+  tuned.at_bound =
+      std::min(tuned.value - p.low, p.high - tuned.value) <= kCovariancePolicy.bound_share * (p.high - p.low);
+  tuned.identifiable = deviation < kCovariancePolicy.flat_share * (p.high - p.low);
+  return tuned;
+}
+
+std::vector<FlatDirection> FlatDirections(const FitProblem& problem, const Covariance& covariance) {
+  std::vector<FlatDirection> result;
+  const auto& coordinates = problem.space().coordinates();
+  const Eigen::Index n = problem.space().size();
+  const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
+  const Eigen::MatrixXd own = covariance.robust.topLeftCorner(n, n);
+  const SymmetricEigen directions(own);
+  for (Eigen::Index k = n - 1; k >= 0; --k) {
+    const double deviation = std::sqrt(std::max(0.0, directions.values[k]));
+    if (deviation < kCovariancePolicy.flat_share) break;
+    FlatDirection flat{.deviation = deviation};
+    Eigen::VectorXd parts(n);
+    for (Eigen::Index i = 0; i < n; ++i) parts[i] = directions.vectors(i, k) * range[i];
+    Eigen::Index leading = 0;
+    parts.cwiseAbs().maxCoeff(&leading);
+    const double scale = parts[leading];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (std::abs(parts[i]) > 0.2 * std::abs(scale))
+        flat.parts.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter, parts[i] / scale);
+    }
+    std::stable_sort(flat.parts.begin(), flat.parts.end(),
+                     [](const auto& a, const auto& b) { return std::abs(a.second) > std::abs(b.second); });
+    result.push_back(std::move(flat));
+  }
+  return result;
+}
+
+}  // namespace
+
+Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at) {
+  Uncertainty result;
+  const SearchSpace& space = problem.space();
+  const auto& coordinates = space.coordinates();
+  const Covariance covariance = CovarianceOf(problem, at);
+  for (Eigen::Index i = 0; i < space.size(); ++i) {
+    const auto couple = std::find_if(space.couples().begin(), space.couples().end(),
+                                     [&](const auto& c) { return c.size == i || c.other == i; });
+    const int index = coordinates[static_cast<std::size_t>(i)].parameter;
+    TunedParameter tuned = couple == space.couples().end() ? OfCoordinate(problem, point, covariance, i)
+                                                           : OfCouple(problem, point, covariance, *couple, index);
+    if (!tuned.identifiable) {
+      const Parameter& p = problem.model().parameters()[static_cast<std::size_t>(index)];
+      tuned.low = p.low;
+      tuned.high = p.high;
+    }
+    result.tuned.push_back(tuned);
+  }
+  result.flat = FlatDirections(problem, covariance);
+  const Eigen::MatrixXd& own = covariance.model_based;
+  for (Eigen::Index i = 0; i < space.size(); ++i) {
+    for (Eigen::Index j = i + 1; j < space.size(); ++j) {
+      const double correlation = own(i, j) / std::sqrt(own(i, i) * own(j, j));
+      if (std::abs(correlation) > kCovariancePolicy.correlated)
+        result.correlated.emplace_back(coordinates[static_cast<std::size_t>(i)].parameter,
+                                       coordinates[static_cast<std::size_t>(j)].parameter, correlation);
+    }
+  }
+  return result;
+}
+
+}  // namespace gapscope

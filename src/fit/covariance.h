@@ -1,0 +1,42 @@
+// What a solved fit knows of its parameters: intervals, directions that the logs leave open, parameters that go
+// together.
+//
+// Cluster-robust ("sandwich") covariance: H^-1 (sum over half-second blocks of g g') H^-1, with the finite-sample
+// factors of a clustered regression (Liang and Zeger, Biometrika 73, 1986; Cameron and Miller, J. Human Resources 50,
+// 2015): right for coloured residuals and for a wrong noise model.
+#ifndef GAPSCOPE_FIT_COVARIANCE_H_
+#define GAPSCOPE_FIT_COVARIANCE_H_
+
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "src/fit/objective.h"
+
+namespace gapscope {
+
+struct TunedParameter {
+  int index = 0;                        // in the model
+  double value = 0, low = 0, high = 0;  // 95 % interval; the bounds where nothing is known
+  bool at_bound = false, identifiable = true;
+};
+
+// A direction in parameter space that the logs leave open.
+struct FlatDirection {
+  // Parameter, exponent (logarithmic) or weight; largest first, scaled to 1.
+  std::vector<std::pair<int, double>> parts;
+  double deviation = 0;  // standard deviation along it, as a share of the range
+};
+
+struct Uncertainty {
+  std::vector<TunedParameter> tuned;
+  std::vector<FlatDirection> flat;
+  std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above CovariancePolicy::correlated
+};
+
+// At a solved point. `at`: linearized there by central differences, with blocks.
+Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_FIT_COVARIANCE_H_

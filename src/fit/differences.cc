@@ -1,0 +1,156 @@
+// Derivatives of a fit's residuals by finite differences: one replay of its window per column.
+#include <algorithm>
+#include <cmath>
+
+#include "src/fit/fit_worker.h"
+#include "src/fit/policy.h"
+
+namespace gapscope {
+
+using Columns = DifferenceOptions::Columns;
+
+// The columns of one window.
+class FitProblem::Differences {
+ public:
+  Differences(const FitProblem& problem, Worker& worker, std::size_t window, const FitPoint& point,
+              const std::vector<double>& values, const DifferenceOptions& options, Eigen::VectorXd& residual,
+              Eigen::MatrixXd& jacobian)
+      : problem_(problem),
+        layout_(problem.layout_),
+        worker_(worker),
+        window_(problem.windows_[window]),
+        point_(point),
+        values_(values),
+        state_(point.states[window]),
+        options_(options),
+        shift_(problem.Shift(point)),
+        residual_(residual),
+        jacobian_(jacobian) {}
+
+  // False: the window cannot be simulated at the point.
+  bool Make() {
+    if (residual_.size() == 0) {
+      if (!problem_.Simulate(worker_, window_, point_, values_, state_, shift_, worker_.base)) return false;
+      problem_.ResidualsOf(window_, point_, worker_.base, residual_);
+    }
+    const Eigen::Index n = layout_.low.size();
+    jacobian_.setZero(residual_.size(), n + state_.size());
+    const bool all = options_.columns != Columns::kStates;
+    if (all) Parameters();
+    if (all && layout_.shift() >= 0) {
+      const double h = kFitPolicy.shift_step;
+      if (Replay(point_, values_, state_, shift_ + h * layout_.shift_scale_s)) Difference(layout_.shift(), h);
+    }
+    States(n);
+    if (all) Offsets(n);
+    return true;
+  }
+
+ private:
+  // The residuals elsewhere, in worker_.other; false: they cannot be had.
+  bool Replay(const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift) {
+    if (!problem_.Simulate(worker_, window_, point, values, state, shift, worker_.perturbed)) return false;
+    problem_.ResidualsOf(window_, point_, worker_.perturbed, worker_.other);
+    return true;
+  }
+  void Difference(Eigen::Index column, double h) { jacobian_.col(column) = (worker_.other - residual_) / h; }
+
+  void Parameters() {
+    worker_.values = values_;
+    const auto move = [&](Eigen::Index i, double h) {
+      problem_.space_.SetCoordinate(point_.y, i, point_.y[i] + h, &worker_.values);
+      return Replay(point_, worker_.values, state_, shift_);
+    };
+    for (Eigen::Index i = 0; i < layout_.parameters; ++i) {
+      const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
+      // Towards the inside, so that the step does not leave the bounds; the other way when that cannot be simulated.
+      double h = point_.y[i] + options_.step <= c.high ? options_.step : -options_.step;
+      for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
+        if (!move(i, h)) continue;
+        Difference(i, h);
+        break;
+      }
+      const bool inside = point_.y[i] - h >= c.low && point_.y[i] - h <= c.high;
+      if (options_.columns == Columns::kCentral && inside && move(i, -h))
+        jacobian_.col(i) = 0.5 * (jacobian_.col(i) - (worker_.other - residual_) / h);
+      problem_.space_.SetCoordinate(point_.y, i, point_.y[i], &worker_.values);
+    }
+  }
+
+  void States(Eigen::Index first) {
+    Eigen::VectorXd moved = state_;
+    for (Eigen::Index j = 0; j < state_.size(); ++j) {
+      const double h = kFitPolicy.state_step / window_.prior[j];
+      moved[j] += h;
+      if (Replay(point_, values_, moved, shift_)) Difference(first + j, h);
+      moved[j] = state_[j];
+    }
+  }
+
+  // An offset moves its own prediction, and the start the other way.
+  void Offsets(Eigen::Index first_state) {
+    const auto& signals = layout_.signals[window_.log];
+    const Eigen::Index scored = window_.scored();
+    for (std::size_t s = 0; s < signals.size(); ++s) {
+      const SignalLayout& signal = signals[s];
+      if (signal.offset < 0) continue;
+      auto column = jacobian_.col(signal.offset);
+      if (signal.joint_state >= 0) {
+        column = -signal.deviation * jacobian_.col(first_state + signal.joint_state);
+      } else {
+        FitPoint other = point_;
+        other.y[signal.offset] += kFitPolicy.offset_step;
+        if (!Replay(other, values_, state_, shift_)) continue;
+        column = (worker_.other - residual_) / kFitPolicy.offset_step;
+      }
+      const double* measured =
+          problem_.recordings_[window_.log].measured[s].values.data() + window_.rows.begin + window_.first_scored;
+      for (Eigen::Index r = 0; r < scored; ++r) {
+        if (std::isfinite(measured[r]))
+          column[static_cast<Eigen::Index>(s) * scored + r] += signal.weight * signal.deviation;
+      }
+    }
+  }
+
+  const FitProblem& problem_;
+  const Layout& layout_;
+  Worker& worker_;
+  const FitWindow& window_;
+  const FitPoint& point_;
+  const std::vector<double>& values_;
+  const Eigen::VectorXd& state_;
+  const DifferenceOptions& options_;
+  const double shift_;
+  Eigen::VectorXd& residual_;
+  Eigen::MatrixXd& jacobian_;
+};
+
+Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const {
+  Work work;
+  if (!base_known) work = {.evaluations = 1, .replays = 1};
+  if (options.columns != Columns::kStates) {
+    work.replays += space_.coordinates().size() * (options.columns == Columns::kCentral ? 2 : 1);
+    if (layout_.shift() >= 0) ++work.replays;
+  }
+  if (!windows_.empty()) work.replays += static_cast<std::size_t>(windows_.front().prior.size());
+  return work;
+}
+
+Derivatives FitProblem::Differentiate(const FitPoint& point, const DifferenceOptions& options, Residuals base) {
+  Derivatives result{.residuals = std::move(base), .work = {}};
+  result.work = WorkOf(options, !result.residuals.empty());
+  result.residuals.resize(windows_.size());
+  result.jacobians.resize(windows_.size());
+  std::vector<char> good(windows_.size(), 0);
+  const std::vector<double> values = Values(point);
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    Differences differences(*this, GetWorker(index), w, point, values, options, result.residuals[w],
+                            result.jacobians[w]);
+    good[w] = differences.Make();
+  });
+  result.valid = std::all_of(good.begin(), good.end(), [](char g) { return g != 0; });
+  result.work.steps = TakeSteps();
+  return result;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,244 @@
+#include "src/fit/fit_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "src/fit/fit_worker.h"
+#include "src/fit/policy.h"
+
+namespace gapscope {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+std::size_t CountResiduals(const Layout& layout, const std::vector<FitWindow>& windows) {
+  std::size_t count = 0;
+  for (const auto& window : windows) {
+    for (const auto& signal : layout.signals[window.log]) {
+      if (signal.weight > 0) count += static_cast<std::size_t>(window.scored());
+    }
+  }
+  return count;
+}
+
+Eigen::VectorXd StartY(const SearchSpace& space, const Layout& layout) {
+  Eigen::VectorXd y = Eigen::VectorXd::Zero(layout.low.size());
+  y.head(space.size()) = space.ToSearch(space.start());
+  return y;
+}
+
+}  // namespace
+
+FitProblem::~FitProblem() = default;
+
+FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options,
+                       std::vector<double> values, ThreadPool& pool)
+    : model_(model),
+      recordings_(recordings),
+      options_(std::move(options)),
+      pool_(pool),
+      space_(model.parameters(), options_.free, std::move(values), options_.logarithmic_effects, options_.linear_terms),
+      layout_(MakeLayout(model, recordings, options_, space_)),
+      windows_(MakeFitWindows(model, recordings, options_, layout_, space_.start())),
+      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), CountResiduals(layout_, windows_))),
+      workers_(static_cast<std::size_t>(pool.workers())) {}
+
+std::size_t FitProblem::residuals() const { return CountResiduals(layout_, windows_); }
+
+FitPoint FitProblem::Start() const {
+  FitPoint point{.y = StartY(space_, layout_), .states = {}};
+  for (const auto& window : windows_) point.states.push_back(Eigen::VectorXd::Zero(window.prior.size()));
+  return point;
+}
+
+FitPoint FitProblem::At(const std::vector<double>& values, FitPoint point) const {
+  point.y.head(space_.size()) = space_.ToSearch(values);
+  return point;
+}
+
+double FitProblem::Shift(const FitPoint& point) const {
+  return layout_.shift_scale_s == 0 ? options_.shift_s : point.y[layout_.shift()] * layout_.shift_scale_s;
+}
+
+FitProblem::Worker& FitProblem::GetWorker(int index) {
+  auto& worker = workers_[static_cast<std::size_t>(index)];
+  if (!worker) worker = std::make_unique<Worker>(model_, options_.time_step_s);
+  return *worker;
+}
+
+std::size_t FitProblem::TakeSteps() {
+  std::size_t steps = 0;
+  for (const auto& worker : workers_) {
+    if (worker) steps += std::exchange(worker->steps, 0);
+  }
+  return steps;
+}
+
+void FitProblem::PlaceStart(Worker& worker, const FitWindow& window, const FitPoint& point,
+                            const std::vector<double>& values, const Eigen::VectorXd& state) const {
+  const Recording& recording = recordings_[window.log];
+  const std::vector<double>& first = space_.start();
+  // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
+  const bool late = std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) {
+    return source.delay >= 0 && values[source.delay] != first[source.delay];
+  });
+  InitialState& start = worker.start;
+  start = late ? InitialStateAt(model_, recording, window.rows.begin, values) : window.start;
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    const SignalLayout& signal = layout_.signals[window.log][s];
+    const SignalSource& source = model_.source(recording.measured[s].index);
+    if (source.kind != SignalKind::kPosition) continue;
+    if (source.offset >= 0 && !late) start.qpos[source.qpos] += first[source.offset] - values[source.offset];
+    start.qpos[source.qpos] -= layout_.Offset(point.y, window.log, s);
+    if (signal.joint_state >= 0) {
+      start.qpos[source.qpos] += state[signal.joint_state];
+      start.qvel[source.dof] += state[signal.joint_state + 1];
+    }
+  }
+  const mjModel& m = model_.compiled();
+  const auto& motor_sides = model_.mirrored_joints();
+  for (std::size_t i = 0; i < motor_sides.size(); ++i) {
+    const auto [joint, from] = motor_sides[i];
+    start.qpos[m.jnt_qposadr[joint]] = start.qpos[m.jnt_qposadr[from]];
+    start.qvel[m.jnt_dofadr[joint]] = start.qvel[m.jnt_dofadr[from]];
+    if (!options_.fit_states) continue;
+    const auto beside = state.tail(2 * static_cast<Eigen::Index>(motor_sides.size() - i));
+    start.qpos[m.jnt_qposadr[joint]] += beside[0];
+    start.qvel[m.jnt_dofadr[joint]] += beside[1];
+  }
+}
+
+bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoint& point,
+                          const std::vector<double>& values, const Eigen::VectorXd& state, double shift,
+                          std::vector<double>& predicted) const {
+  const Recording& recording = recordings_[window.log];
+  predicted.resize(window.rows.rows() * recording.measured.size());
+  worker.simulator.set_shift_s(shift);
+  if (!worker.simulator.SetParameters(values, recording)) return false;
+  PlaceStart(worker, window, point, values, state);
+  const RunResult run = worker.simulator.Run(recording, window.rows, worker.start, predicted);
+  worker.steps += run.steps;
+  return run.outcome == Outcome::kCompleted;
+}
+
+void FitProblem::ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
+                             Eigen::VectorXd& residual) const {
+  const Recording& recording = recordings_[window.log];
+  const std::size_t signals = recording.measured.size(), rows = window.rows.rows();
+  residual.resize(window.scored() * static_cast<Eigen::Index>(signals));
+  Eigen::Index i = 0;
+  for (std::size_t s = 0; s < signals; ++s) {
+    const double weight = layout_.signals[window.log][s].weight, offset = layout_.Offset(point.y, window.log, s);
+    const double* measured = recording.measured[s].values.data() + window.rows.begin;
+    for (std::size_t r = window.first_scored; r < rows; ++r) {
+      const double y = measured[r];
+      residual[i++] = weight > 0 && std::isfinite(y) ? weight * (predicted[r * signals + s] + offset - y) : 0;
+    }
+  }
+}
+
+double FitProblem::WindowCost(std::size_t window, const Eigen::VectorXd& residual, const Eigen::VectorXd& state) const {
+  return 0.5 * (huber_.Sum(residual) + windows_[window].prior.cwiseProduct(state).squaredNorm());
+}
+
+Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask) {
+  const std::vector<double> values = Values(point);
+  const double shift = Shift(point);
+  std::vector<double> costs(windows_.size());
+  Evaluation result{.log_costs = std::vector<double>(recordings_.size(), 0.0)};
+  if (keep == Keep::kResiduals) result.residuals.resize(windows_.size());
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    if (!mask.empty() && !mask[w]) return;
+    Worker& worker = GetWorker(index);
+    const FitWindow& window = windows_[w];
+    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) {
+      costs[w] = kInfinity;
+      return;
+    }
+    ResidualsOf(window, point, worker.base, worker.residual);
+    costs[w] = WindowCost(w, worker.residual, point.states[w]);
+    if (keep == Keep::kResiduals) result.residuals[w] = worker.residual;
+  });
+  double total = 0;
+  for (std::size_t w = 0; w < costs.size(); ++w) {
+    total += costs[w];
+    result.log_costs[windows_[w].log] += costs[w];
+  }
+  total += prior_.Cost(point.y);
+  result.cost = std::isnan(total) ? kInfinity : total;
+  result.work = {.evaluations = 1, .replays = 1, .steps = TakeSteps()};
+  return result;
+}
+
+std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
+  std::vector<LogReplay> logs;
+  for (const auto& recording : recordings_) logs.push_back(EmptyTraces(recording));
+  const std::vector<double> values = Values(point);
+  const double shift = Shift(point);
+  std::vector<char> failed(windows_.size(), 0);
+  pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    Worker& worker = GetWorker(index);
+    const FitWindow& window = windows_[w];
+    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) {
+      failed[w] = 1;
+      return;
+    }
+    auto& signals = logs[window.log].signals;
+    // Windows share their border row; the later one leaves it to the earlier.
+    for (std::size_t s = 0; s < signals.size(); ++s) {
+      const double offset = layout_.Offset(point.y, window.log, s);
+      for (std::size_t r = window.rows.begin == 0 ? 0 : 1; r < window.rows.rows(); ++r)
+        signals[s].predicted[window.rows.begin + r] = worker.base[r * signals.size() + s] + offset;
+    }
+  });
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    LogReplay& log = logs[windows_[w].log];
+    ++log.windows;
+    if (failed[w]) {
+      ++log.diverged_windows;
+      log.outcome = Outcome::kDiverged;
+    }
+  }
+  return logs;
+}
+
+void FitProblem::WeighStates(const Residuals& residuals) {
+  const auto priors = StatePriorsByNoise(model_, recordings_, layout_, windows_, residuals);
+  for (std::size_t w = 0; w < windows_.size(); ++w) windows_[w].prior = priors[w];
+}
+
+void FitProblem::SetHuberThreshold(const Residuals& residuals) {
+  if (options_.huber > 0) huber_.threshold = HuberThreshold(residuals, options_.huber);
+}
+
+FitPoint CarryOver(const FitProblem& from, const FitPoint& at, const FitProblem& to,
+                   const std::vector<double>& values) {
+  FitPoint point = to.Start();
+  const std::vector<double> known = from.Values(at);
+  std::vector<double> mine = values;
+  for (const Coordinate& c : to.space().coordinates()) {
+    for (const Coordinate& other : from.space().coordinates()) {
+      if (from.space().parameter(other).name == to.space().parameter(c).name)
+        mine[c.parameter] = known[other.parameter];
+    }
+  }
+  point.y.head(to.space().size()) = to.space().ToSearch(mine);
+  const Layout &a = from.layout(), &b = to.layout();
+  for (std::size_t l = 0; l < b.signals.size(); ++l) {
+    for (std::size_t s = 0; s < b.signals[l].size(); ++s) {
+      if (b.signals[l][s].offset >= 0 && a.signals[l][s].offset >= 0)
+        point.y[b.signals[l][s].offset] = at.y[a.signals[l][s].offset];
+    }
+  }
+  if (a.shift() >= 0 && b.shift() >= 0) point.y[b.shift()] = at.y[a.shift()];
+  GS_CHECK(point.states.size() == at.states.size());
+  // A motor side that only one of the two has is where the pre-roll leaves it.
+  for (std::size_t w = 0; w < point.states.size(); ++w) {
+    const Eigen::Index shared = std::min(point.states[w].size(), at.states[w].size());
+    point.states[w].head(shared) = at.states[w].head(shared);
+  }
+  return point;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,128 @@
+// The least-squares problem of a fit: residuals of replayed windows against the log, with the nuisances that every log
+// brings.
+//
+//   cost(y, x) = 1/2 sum_windows [ sum_rows,signals rho(w (predicted - measured)) + |prior(x_w)|^2 ] + prior(y)
+//
+// y and x: layout.h. Windows are independent given y. A problem knows replays, residuals and their derivatives, which
+// are finite differences (every column is a replay of its window, windows run in parallel); no optimiser, no journal.
+#ifndef GAPSCOPE_FIT_FIT_PROBLEM_H_
+#define GAPSCOPE_FIT_FIT_PROBLEM_H_
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "replay/replay.h"
+#include "src/fit/prior.h"
+#include "src/fit/robust.h"
+#include "src/fit/windows.h"
+
+namespace gapscope {
+
+// One candidate solution.
+struct FitPoint {
+  Eigen::VectorXd y;                    // parameters, then offsets, then the shift
+  std::vector<Eigen::VectorXd> states;  // per window
+};
+
+// Cost alone, or the residuals too.
+enum class Keep { kCost, kResiduals };
+
+struct Evaluation {
+  double cost = 0;                // infinity where a replay diverges
+  std::vector<double> log_costs;  // each log's part of it
+  Residuals residuals;            // with Keep::kResiduals; of a window that diverged: empty
+  Work work;
+};
+
+struct DifferenceOptions {
+  double step = 0.01;  // in search coordinates
+  // kStates: those of the windows' states alone, the rest zero. kCentral: all, those of parameters by central
+  // differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns that are
+  // parallel to rounding, which one-sided ones are not.
+  enum class Columns { kAll, kStates, kCentral } columns = Columns::kAll;
+};
+
+// Residuals and Jacobian of a point.
+struct Derivatives {
+  Residuals residuals;
+  std::vector<Eigen::MatrixXd> jacobians;  // per window: y, then the window's state
+  bool valid = false;                      // false: the point cannot be simulated
+  Work work;
+};
+
+class FitProblem {
+ public:
+  // All references must outlive the problem. `values`: fixed parameters, and where the free ones start.
+  FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options,
+             std::vector<double> values, ThreadPool& pool);
+  ~FitProblem();
+
+  const Model& model() const { return model_; }
+  const std::vector<Recording>& recordings() const { return recordings_; }
+  const FitOptions& options() const { return options_; }
+  const SearchSpace& space() const { return space_; }
+  const Layout& layout() const { return layout_; }
+  const std::vector<FitWindow>& windows() const { return windows_; }
+  const Prior& prior() const { return prior_; }
+  const Huber& huber() const { return huber_; }
+  ThreadPool& pool() const { return pool_; }
+  std::size_t residuals() const;  // scored rows x signals
+
+  FitPoint Start() const;
+  // The point with these parameters' values, its offsets, shift and states as they are.
+  FitPoint At(const std::vector<double>& values, FitPoint point) const;
+  std::vector<double> Values(const FitPoint& point) const { return space_.Values(point.y); }
+  double Shift(const FitPoint& point) const;  // s
+
+  // `mask`: windows that are left out cost nothing and have no residuals.
+  Evaluation Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask = {});
+  // `base`: the point's residuals where they are known.
+  Derivatives Differentiate(const FitPoint& point, const DifferenceOptions& options, Residuals base = {});
+  // What that takes, beside the steps.
+  Work WorkOf(const DifferenceOptions& options, bool base_known) const;
+  // Cost of one window with these residuals and this state.
+  double WindowCost(std::size_t window, const Eigen::VectorXd& residual, const Eigen::VectorXd& state) const;
+  // Predictions on all rows of the problem's windows, offsets added: one entry per recording.
+  std::vector<LogReplay> Predict(const FitPoint& point);
+
+  // Between two solves, by the residuals where the first ended: weighs the states by the sensors' noise
+  // (StatePriorsByNoise), and sets Huber's threshold where the options ask for one.
+  void WeighStates(const Residuals& residuals);
+  void SetHuberThreshold(const Residuals& residuals);
+
+ private:
+  struct Worker;
+
+  Worker& GetWorker(int index);
+  // Simulator steps since they were last taken.
+  std::size_t TakeSteps();
+  // Writes where a window starts at a point.
+  void PlaceStart(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values,
+                  const Eigen::VectorXd& state) const;
+  bool Simulate(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values,
+                const Eigen::VectorXd& state, double shift, std::vector<double>& predicted) const;
+  void ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
+                   Eigen::VectorXd& residual) const;
+  class Differences;  // the columns of one window
+
+  const Model& model_;
+  const std::vector<Recording>& recordings_;
+  FitOptions options_;
+  ThreadPool& pool_;
+  SearchSpace space_;
+  Layout layout_;
+  std::vector<FitWindow> windows_;
+  Huber huber_;
+  Prior prior_;
+  std::vector<std::unique_ptr<Worker>> workers_;
+};
+
+// A solution of `from` as a point of `to`, of the same logs and windows: parameters by name (those that `from` lacks
+// start from `values`, which are of `to`), offsets, shift and states as they are.
+FitPoint CarryOver(const FitProblem& from, const FitPoint& point, const FitProblem& to,
+                   const std::vector<double>& values);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_FIT_FIT_PROBLEM_H_

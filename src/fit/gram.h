@@ -1,0 +1,74 @@
+// Products of a fit's columns, half second by half second of the logs: what sets of effects are compared with by
+// arithmetic, without another replay.
+//
+// Columns are [y | extra | residual]: the Jacobian of y at a point, what an effect at a trial value adds to the
+// residuals there, and the residuals. Each window's state is taken out of all of them by an orthogonal projection (its
+// columns and its prior's rows), so that sums of blocks are the normal equations with the states eliminated (Reduce;
+// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the blocks.
+#ifndef GAPSCOPE_FIT_GRAM_H_
+#define GAPSCOPE_FIT_GRAM_H_
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/fit/normal_equations.h"
+
+namespace gapscope {
+
+// Products of one half second of one log, all windows there together.
+struct GramBlock {
+  std::size_t log = 0;
+  long half_second = 0;
+  std::size_t rows = 0;      // residuals
+  Eigen::MatrixXd products;  // columns x columns
+};
+
+struct GramSystem {
+  std::vector<std::string> columns;  // "arm.mass", "offset arm_rad log 0", "shift", the extra ones' names, "residual"
+  Eigen::Index parameters = 0;       // y's part of them
+  std::vector<GramBlock> blocks;     // in the order of logs and time
+  std::vector<Eigen::MatrixXd> of_priors;  // per log: the rows of its states' priors
+  bool valid = false;                      // false: the point, or an extra column, cannot be simulated
+  Work work;
+};
+
+// An effect at a trial value: residuals of `child`, at the parent's point carried over, less the parent's.
+struct ExtraColumn {
+  std::string name;
+  FitProblem* child = nullptr;  // of the same logs and windows, without parameters of its own that matter
+  std::vector<double> values;   // of the child's model
+};
+
+GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
+                    const DifferenceOptions& options);
+
+// Weighted sum over blocks; a fold that is left out weighs 0. `block_weights`: one per block, or empty for all ones.
+// The states' priors of a log weigh as much as its blocks do on average.
+Eigen::MatrixXd Sum(const GramSystem& gram, std::span<const double> block_weights = {});
+
+// The best of a set of columns by arithmetic.
+struct BoundedSolution {
+  Eigen::VectorXd values;  // one per column of the system but the residual; zero where it is not in the set
+  double cost = 0;         // half the sum of squares left, with the prior's part
+  std::vector<Eigen::Index> at_bound;
+};
+
+// Minimises 1/2 |residual + columns c|^2 + 1/2 sum weight (c + gone)^2 over the columns in `set`, low <= c <= high.
+// `sum`: of Sum(). `prior`: weight and how far the point already is from its centre, per column; low and high likewise.
+struct ColumnBounds {
+  Eigen::VectorXd low, high, prior_weight, prior_gone;  // one per column but the residual
+};
+BoundedSolution SolveBounded(const Eigen::MatrixXd& sum, std::span<const Eigen::Index> set, const ColumnBounds& bounds);
+
+// Bounds of y's steps and the prior at a point; extra columns run from 0 to `most_extra` times their trial value.
+ColumnBounds BoundsAt(const FitProblem& parent, const FitPoint& point, const GramSystem& gram, double most_extra);
+
+// Share of a column, as the states leave it, that the columns in `set` can imitate: 1 - (what is left of it) / (its own
+// square); 1 where it is nothing.
+double Absorbed(const Eigen::MatrixXd& sum, std::span<const Eigen::Index> set, const ColumnBounds& bounds,
+                Eigen::Index column);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_FIT_GRAM_H_

@@ -1,0 +1,52 @@
+// What a fit has computed so far, so that an interrupted one goes on to the same result: every evaluation or iteration
+// in order, with a hash of its point and numbers.
+#ifndef GAPSCOPE_FIT_JOURNAL_H_
+#define GAPSCOPE_FIT_JOURNAL_H_
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/fit/normal_equations.h"
+
+namespace gapscope {
+
+class Journal {
+ public:
+  // Opens `path`; `key` identifies the job: everything that its numbers depend on. With `resume`, records of the same
+  // job are kept and handed out again; a torn last record is dropped. Otherwise the journal starts empty. Errors:
+  // cannot open or write; with `resume`, a journal of another job.
+  static Result<std::unique_ptr<Journal>> Open(const std::string& path, std::uint64_t key, bool resume);
+  ~Journal();
+
+  // The recorded result of this evaluation, if the job got this far before.
+  bool Next(const FitPoint& point, std::vector<double>* record);
+  void Append(const FitPoint& point, const std::vector<double>& record);
+  // Whether all could be written so far; the error names file and reason. A run goes on without: nothing but the way
+  // back into it is lost.
+  const Status& status() const { return status_; }
+  std::size_t resumed() const { return resumed_; }
+
+ private:
+  Journal() = default;
+  Status Read(std::uint64_t key, std::size_t* good);
+  void Write(const void* bytes, std::size_t size);
+
+  std::string path_;
+  std::FILE* file_ = nullptr;
+  Status status_ = Ok();
+  std::vector<std::pair<std::uint64_t, std::vector<double>>> records_;
+  std::size_t next_ = 0, resumed_ = 0;
+};
+
+// As numbers and back; an evaluation without its residuals.
+std::vector<double> Pack(const Evaluation& evaluation);
+Evaluation UnpackEvaluation(const std::vector<double>& numbers);
+std::vector<double> Pack(const Linearization& linearization);
+Linearization UnpackLinearization(const std::vector<double>& numbers);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_FIT_JOURNAL_H_

@@ -1,0 +1,101 @@
+#include "src/fit/layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "src/compare/score.h"
+#include "src/fit/policy.h"
+
+namespace gapscope {
+namespace {
+
+double Weight(const FitOptions& options, const Recording::Measured& measured, const Moments& moments,
+              double deviation) {
+  if (!measured.spec.scored) return 0;
+  if (!options.weights.empty()) return options.weights[measured.index];
+  return 1 / (options.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean));
+}
+
+// Torques jump to the next command as soon as commands come early.
+bool ScoresTorque(const std::vector<Recording>& recordings, const Layout& layout) {
+  for (std::size_t l = 0; l < recordings.size(); ++l) {
+    for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
+      if (recordings[l].measured[s].spec.kind == SignalKind::kTorque && layout.signals[l][s].weight > 0) return true;
+    }
+  }
+  return false;
+}
+
+// One log's signals, and the bounds of the offsets that it brings.
+void AddLog(const Model& model, const Recording& recording, const FitOptions& options, Layout* layout,
+            std::vector<double>* low, std::vector<double>* high) {
+  std::vector<SignalLayout> signals(recording.measured.size());
+  std::vector<double> prior;
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    const auto& measured = recording.measured[s];
+    const Moments moments = MomentsOf(measured.values);
+    const double deviation = std::max(moments.deviation, measured.spec.resolution);
+    if (!(deviation > 0)) continue;
+    signals[s].deviation = deviation;
+    signals[s].weight = Weight(options, measured, moments, deviation);
+    if (measured.spec.kind != SignalKind::kPosition) continue;
+    if (options.fit_offsets) {
+      signals[s].offset = static_cast<int>(low->size());
+      low->push_back(-kFitPolicy.offset_bound_rad / deviation);
+      high->push_back(kFitPolicy.offset_bound_rad / deviation);
+    }
+    if (options.fit_states) {
+      signals[s].joint_state = static_cast<int>(prior.size());
+      const double weight =
+          std::sqrt(kFitPolicy.state_prior_samples) * (signals[s].weight > 0 ? signals[s].weight : 1 / deviation);
+      prior.push_back(weight);
+      prior.push_back(weight * kFitPolicy.speed_prior_s);
+    }
+  }
+  // What no sensor shows comes last: each motor side beside its load.
+  for (std::size_t i = 0; i < model.mirrored_joints().size() && options.fit_states; ++i) {
+    prior.push_back(1 / kFitPolicy.motor_side_prior_rad);
+    prior.push_back(1 / kFitPolicy.motor_side_prior_rad * kFitPolicy.speed_prior_s);
+  }
+  layout->signals.push_back(std::move(signals));
+  layout->state_priors.push_back(Eigen::Map<Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size())));
+}
+
+}  // namespace
+
+Layout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
+                  const SearchSpace& space) {
+  Layout layout{.parameters = space.size()};
+  std::vector<double> low(space.low().begin(), space.low().end()), high(space.high().begin(), space.high().end());
+  double step = std::numeric_limits<double>::infinity();
+  for (const Recording& recording : recordings) {
+    step = std::min(step, recording.timeline.median_step_s);
+    AddLog(model, recording, options, &layout, &low, &high);
+  }
+  if (options.fit_shift && model.command_delay() < 0) {
+    // In samples. No descent gets past the jump of a torque at an early command: where one is scored commands are late
+    // or on time.
+    low.push_back(ScoresTorque(recordings, layout) ? 0 : -1);
+    high.push_back(1);
+    layout.shift_scale_s = options.shift_range_s > 0 ? options.shift_range_s : step;
+  }
+  layout.low = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
+  layout.high = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));
+  return layout;
+}
+
+double Layout::Offset(const Eigen::VectorXd& y, std::size_t log, std::size_t signal) const {
+  const SignalLayout& layout = signals[log][signal];
+  return layout.offset < 0 ? 0 : y[layout.offset] * layout.deviation;
+}
+
+double Layout::UnitCost() const {
+  double unit = 0;
+  for (const auto& log : signals) {
+    for (const auto& signal : log) unit = std::max(unit, signal.weight * signal.deviation);
+  }
+  return unit * unit;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,45 @@
+// What a fit's unknowns consist of. y: the search coordinates of parameters, one zero offset per measured position and
+// log, one command shift below a sample. x of a window: what its initial state differs by from what the log says (angle
+// and speed of each measured joint, then of each hidden motor side).
+#ifndef GAPSCOPE_FIT_LAYOUT_H_
+#define GAPSCOPE_FIT_LAYOUT_H_
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "src/experiment/recording.h"
+#include "src/fit/options.h"
+#include "src/fit/search_space.h"
+#include "src/model/model.h"
+
+namespace gapscope {
+
+// How a signal of a log enters the cost.
+struct SignalLayout {
+  double weight = 0;     // of a residual: 1 / standard deviation of the signal, or as asked; 0: not scored
+  double deviation = 1;  // of the signal over the log
+  int offset = -1;       // index in y of its zero offset, which counts in deviations
+  int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
+};
+
+struct Layout {
+  std::vector<std::vector<SignalLayout>> signals;  // per log, per signal
+  std::vector<Eigen::VectorXd> state_priors;       // per log: weight of each number of a window's state
+  Eigen::VectorXd low, high;                       // of y
+  Eigen::Index parameters = 0;                     // the first numbers of y
+  double shift_scale_s = 0;                        // unit of the shift, the last number of y; 0: no shift is fitted
+
+  // Index of the shift in y; -1: none.
+  Eigen::Index shift() const { return shift_scale_s > 0 ? low.size() - 1 : -1; }
+  // Zero offset of a signal at y, in its unit.
+  double Offset(const Eigen::VectorXd& y, std::size_t log, std::size_t signal) const;
+  // Largest weight that a deviation of any signal has, squared: what one residual counts for.
+  double UnitCost() const;
+};
+
+Layout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
+                  const SearchSpace& space);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_FIT_LAYOUT_H_

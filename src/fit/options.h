@@ -1,0 +1,61 @@
+// What a fit is asked to do.
+#ifndef GAPSCOPE_FIT_OPTIONS_H_
+#define GAPSCOPE_FIT_OPTIONS_H_
+
+#include <cstddef>
+#include <vector>
+
+namespace gapscope {
+
+// Which windows of each log a problem takes: with kTrain and kHeldOut every third one, from the second on, is held out.
+enum class Fold { kAll, kTrain, kHeldOut };
+
+// What makes signals of different size comparable: 1 / standard deviation over the log, or 1 / root mean square
+// (mujoco.sysid's choice).
+enum class Normalization { kDeviation, kRootMeanSquare };
+
+// Whether the residuals are those of windows that each start from the log, of one free run per log, or of both.
+enum class ObjectiveKind { kWindows, kFreeRun, kBoth };
+
+struct FitOptions {
+  std::vector<int> free;  // indices of tuned parameters
+  ObjectiveKind objective = ObjectiveKind::kWindows;
+  double window_s = 1.0;
+  double lead_in_s = 0.05;  // start of a window that is not scored
+  Fold fold = Fold::kAll;
+  std::size_t max_windows = 0;  // 0: all; else evenly chosen ones
+  double time_step_s = 0;       // 0: the model's
+  bool fit_offsets = true;      // zero offsets of measured positions, per log
+  bool fit_shift = true;        // command shift within +-1 sample, common to all logs
+  bool fit_states = true;       // initial state of each window
+  double shift_range_s = 0;     // the shift lies within +- this; 0: one sample
+  double shift_s = 0;           // where no shift is fitted: this one
+  // Per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation.
+  std::vector<double> weights;
+  Normalization normalization = Normalization::kDeviation;
+  // Standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing.
+  double prior_share = 0;
+  double prior_offset_rad = 0;       // likewise of zero offsets, around zero; 0: nothing
+  std::vector<double> prior_centre;  // values that base parameters are known to lie around; empty: the start
+  double prior_scale = 1;            // multiplies what is known, as the variance of the residuals does that of the data
+  // Torques and stiffnesses of effects as logarithms, those of zero excepted: a factor common to all torques is then a
+  // straight line.
+  bool logarithmic_effects = false;
+  // An effect's size and angle (or rest) as the two terms that act linearly (Parameter::with): as size and angle they
+  // make curved valleys.
+  bool linear_terms = false;
+  double huber = 0;  // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
+};
+
+// What was computed: replays are passes over all windows, steps those of the simulator.
+struct Work {
+  std::size_t evaluations = 0, replays = 0, steps = 0;
+  Work& operator+=(const Work& other) {
+    evaluations += other.evaluations, replays += other.replays, steps += other.steps;
+    return *this;
+  }
+};
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_FIT_OPTIONS_H_

@@ -1,0 +1,51 @@
+#include "src/fit/prior.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/fit/policy.h"
+
+namespace gapscope {
+namespace {
+
+// Inverse variances of what is known beforehand. Only meaningful with weights of 1 / noise.
+Eigen::VectorXd Knowledge(const SearchSpace& space, const Layout& layout, const FitOptions& options) {
+  Eigen::VectorXd weight = Eigen::VectorXd::Zero(layout.low.size());
+  for (std::size_t i = 0; i < space.coordinates().size() && options.prior_share > 0; ++i) {
+    // An effect's parameters are what is asked for.
+    if (space.parameter(space.coordinates()[i]).owner == Parameter::Owner::kEffect) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    const double deviation = options.prior_share * (layout.high[k] - layout.low[k]);
+    weight[k] = 1 / (deviation * deviation);
+  }
+  for (const auto& log : layout.signals) {
+    for (const auto& signal : log) {
+      if (signal.offset >= 0 && options.prior_offset_rad > 0)
+        weight[signal.offset] = std::pow(signal.deviation / options.prior_offset_rad, 2);
+    }
+  }
+  return weight;
+}
+
+}  // namespace
+
+Prior MakePrior(const SearchSpace& space, const Layout& layout, const FitOptions& options, const Eigen::VectorXd& start,
+                std::size_t residuals) {
+  // In units of the signals' standard deviations, as without weights.
+  const double unit = options.weights.empty() ? 1 : layout.UnitCost();
+  const Eigen::VectorXd range = layout.high - layout.low, knowledge = Knowledge(space, layout, options);
+  Prior prior{.centre = start,
+              .weight = kFitPolicy.anchor * unit * static_cast<double>(residuals) *
+                        range.cwiseAbs2().cwiseMax(1e-12).cwiseInverse()};
+  prior.weight += knowledge;
+  prior.weight += (options.prior_scale - 1) * knowledge;
+  for (std::size_t i = 0; i < space.coordinates().size() && !options.prior_centre.empty(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const Coordinate& c = space.coordinates()[i];
+    if (knowledge[k] > 0)
+      prior.centre[k] = std::clamp(c.ToSearch(options.prior_centre[c.parameter]), layout.low[k], layout.high[k]);
+  }
+  return prior;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,217 @@
+// Sums of Gram blocks against the normal equations, the score test and problems solved in full.
+#include "src/fit/gram.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "src/core/dense.h"
+#include "src/diagnose/score_test.h"
+#include "src/fit/blocks.h"
+#include "tests/tune/fixture.h"
+
+namespace gapscope::testing {
+namespace {
+
+constexpr double kRounding = 1e-12;
+
+double Wave(double t) { return 1.5 * std::sin(6 * t + 2 * t * t); }
+
+// Two logs of a Qube whose arm has friction that the model lacks.
+struct Bench {
+  Rig truth = LoadRig("qube", {"coulomb_friction@arm"}), rig = LoadRig("qube");
+  std::vector<Recording> logs;
+  ThreadPool pool{2};
+  Bench() {
+    const auto values = truth.Values({{"coulomb_friction@arm.friction_n_m", 5e-4}, {"arm.damping", 2e-4}});
+    for (unsigned long k = 0; k < 2; ++k) {
+      const auto command = [k](double t) { return (k == 0 ? 1 : 0.7) * Wave(t); };
+      logs.push_back(MakeLog(truth, values, command, 2.3, 0.004, 1e-3, k));
+    }
+  }
+  FitOptions Options(const Rig& of) const {
+    return {.free = {of.Index("motor.kt"), of.Index("arm.damping"), of.Index("pendulum.length")}, .time_step_s = 0.004};
+  }
+};
+
+std::vector<Eigen::Index> First(Eigen::Index n) {
+  std::vector<Eigen::Index> all(static_cast<std::size_t>(n));
+  std::iota(all.begin(), all.end(), Eigen::Index{0});
+  return all;
+}
+
+TEST(GramTest, SumsAreTheReducedNormalEquations) {
+  Bench bench;
+  for (const double huber : {0.0, 2.0}) {
+    FitOptions options = bench.Options(bench.rig);
+    options.huber = huber;
+    FitProblem problem(*bench.rig.model, bench.logs, options, bench.rig.model->Nominal(), bench.pool);
+    FitPoint point = problem.Start();
+    for (auto& state : point.states) state.setConstant(1e-3);  // so that the states' priors have a slope
+    problem.SetHuberThreshold(problem.Evaluate(point, Keep::kResiduals).residuals);
+    const Linearization at = Linearize(problem, point, {});
+    const GramSystem gram = MakeGram(problem, point, {}, {});
+    ASSERT_TRUE(at.valid && gram.valid);
+    const Eigen::MatrixXd sum = Sum(gram);
+    const Eigen::Index n = gram.parameters;
+    Eigen::MatrixXd hessian = sum.topLeftCorner(n, n);
+    hessian.diagonal() += problem.prior().weight;
+    const Eigen::VectorXd gradient = sum.col(n).head(n) + problem.prior().Gradient(point.y);
+    EXPECT_LT((hessian - at.hessian).norm(), kRounding * at.hessian.norm()) << huber;
+    EXPECT_LT((gradient - at.gradient).norm(), kRounding * at.gradient.norm()) << huber;
+    // Half the squares left are the cost with the states at their best.
+    if (huber == 0) {
+      EXPECT_NEAR(0.5 * sum(n, n) + problem.prior().Cost(point.y), at.reduced_cost, 1e-10 * at.cost);
+    }
+  }
+}
+
+TEST(GramTest, LogThatWeighsNothingIsNotThere) {
+  Bench bench;
+  FitProblem both(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  const std::vector<Recording> one = {bench.logs[0]};
+  FitProblem alone(*bench.rig.model, one, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  const GramSystem gram = MakeGram(both, both.Start(), {}, {}), wanted = MakeGram(alone, alone.Start(), {}, {});
+  std::vector<double> weights;
+  for (const GramBlock& block : gram.blocks) weights.push_back(block.log == 0 ? 1 : 0);
+  const Eigen::MatrixXd sum = Sum(gram, weights), expected = Sum(wanted);
+  const Eigen::Index r = gram.parameters, q = wanted.parameters;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) EXPECT_NEAR(sum(i, j), expected(i, j), 1e-10 * std::abs(expected(i, i)));
+    EXPECT_NEAR(sum(i, r), expected(i, q), 1e-10 * std::abs(expected(i, q)));
+  }
+  EXPECT_NEAR(sum(r, r), expected(q, q), 1e-10 * expected(q, q));
+  EXPECT_EQ(gram.columns.back(), "residual");
+  EXPECT_EQ(gram.columns[0], "motor.kt");
+}
+
+TEST(GramTest, ExtraColumnSaysWhatTheScoreTestSays) {
+  Bench bench;
+  FitProblem parent(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  const FitPoint point = Solve(parent, parent.Start(), {}).point;
+  const auto values = bench.truth.Values({{"coulomb_friction@arm.friction_n_m", 3e-4}});
+  FitProblem child(*bench.truth.model, bench.logs, bench.Options(bench.truth), values, bench.pool);
+  const FitPoint carried = CarryOver(parent, point, child, values);
+  const Snapshot base = Capture(parent, point, 0.01);
+  const ColumnTest test = TestColumn(child, carried, parent, point, base);
+  ASSERT_TRUE(test.valid && test.scale > 0 && test.scale < 2);
+  const ExtraColumn friction{.name = "friction", .child = &child, .values = values};
+  const GramSystem gram = MakeGram(parent, point, {&friction, 1}, {.step = 0.01});
+  ASSERT_TRUE(gram.valid);
+  const Eigen::MatrixXd sum = Sum(gram);
+  ColumnBounds bounds = BoundsAt(parent, point, gram, 2);
+  const Eigen::Index n = gram.parameters;
+  const BoundedSolution without = SolveBounded(sum, {}, bounds), with = SolveBounded(sum, First(n + 1), bounds);
+  // The score test keeps y where it is but for its answer: at the parent's optimum there is nothing else to gain.
+  EXPECT_NEAR(without.cost - with.cost, test.drop, 0.02 * test.drop);
+  EXPECT_NEAR(with.values[n], test.scale, 0.02 * test.scale);
+  // The score test counts what the states imitate too.
+  double raw = 0;
+  const Residuals moved = child.Evaluate(carried, Keep::kResiduals).residuals;
+  for (std::size_t w = 0; w < moved.size(); ++w) raw += (moved[w] - base.derivatives.residuals[w]).squaredNorm();
+  const double left = sum(n, n) * (1 - Absorbed(sum, First(n), bounds, n));
+  EXPECT_NEAR(1 - left / raw, test.absorbed, 0.02);
+  EXPECT_GE(gram.work.replays, 2u);
+}
+
+TEST(GramTest, BoundedStepOfALinearProblemIsItsSolution) {
+  const Rig rig = LoadCart(-10, 2.0);
+  std::vector<double> command(501);
+  for (std::size_t k = 0; k < command.size(); ++k) command[k] = std::sin(0.03 * static_cast<double>(k));
+  const std::vector<Recording> logs = {MakeRecording(rig, command, CartMotion(2.6, 0.1, 0, command), kCartStep_s)};
+  ThreadPool pool(1);
+  const FitOptions options{
+      .free = {rig.Index("cart.gain")}, .window_s = 0.5, .time_step_s = kCartStep_s, .fit_shift = false};
+  FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
+  const FitPoint start = problem.Start();
+  const GramSystem gram = MakeGram(problem, start, {}, {});
+  const Eigen::MatrixXd sum = Sum(gram);
+  const BoundedSolution solution = SolveBounded(sum, First(gram.parameters), BoundsAt(problem, start, gram, 1));
+  // The gain's bound is below its solution; the zero offset is the best one for that.
+  ASSERT_EQ(solution.at_bound, std::vector<Eigen::Index>{0});
+  const SolveResult solved = Solve(problem, start, {.tolerance = 1e-12});
+  EXPECT_NEAR(start.y[0] + solution.values[0], solved.point.y[0], 1e-12);
+  EXPECT_NEAR(start.y[1] + solution.values[1], solved.point.y[1], 1e-5);
+  EXPECT_NEAR(solution.cost, solved.cost, 1e-6 * problem.Evaluate(start, Keep::kCost).cost);
+}
+
+// Against every choice of bounds, solved one by one.
+TEST(SolveBoundedTest, IsTheBestOfAllActiveSets) {
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  for (int trial = 0; trial < 200; ++trial) {
+    constexpr Eigen::Index k = 4;
+    const Eigen::MatrixXd rows = Eigen::MatrixXd::NullaryExpr(9, k + 1, [&] { return normal(random); });
+    const Eigen::MatrixXd sum = rows.transpose() * rows;
+    const ColumnBounds bounds{.low = Eigen::VectorXd::Constant(k, -0.2),
+                              .high = Eigen::VectorXd::Constant(k, 0.3),
+                              .prior_weight = Eigen::VectorXd::Constant(k, 0.5),
+                              .prior_gone = Eigen::VectorXd::Constant(k, 0.1)};
+    const auto cost = [&](const Eigen::VectorXd& c) {
+      return 0.5 * (rows.leftCols(k) * c + rows.col(k)).squaredNorm() + 0.25 * (c + bounds.prior_gone).squaredNorm();
+    };
+    double least = 1e300;
+    for (int code = 0; code < 81; ++code) {
+      Eigen::MatrixXd h = sum.topLeftCorner(k, k) + 0.5 * Eigen::MatrixXd::Identity(k, k);
+      Eigen::VectorXd right = -(sum.col(k).head(k) + 0.5 * bounds.prior_gone);
+      for (int i = 0, rest = code; i < k; ++i, rest /= 3) {
+        if (rest % 3 == 0) continue;
+        h.row(i).setZero();
+        h(i, i) = 1;
+        right[i] = rest % 3 == 1 ? bounds.low[i] : bounds.high[i];
+      }
+      const Eigen::VectorXd c = SolveLu(h, right);
+      const bool inside = (c - bounds.low).minCoeff() > -1e-12 && (bounds.high - c).minCoeff() > -1e-12;
+      if (inside) least = std::min(least, cost(c));
+    }
+    const BoundedSolution found = SolveBounded(sum, First(k), bounds);
+    EXPECT_NEAR(found.cost, least, 1e-9 * least) << trial;
+    EXPECT_NEAR(cost(found.values), found.cost, 1e-9 * least) << trial;
+  }
+}
+
+TEST(BlocksTest, CostsOfBlocksAddUpAndMasksLeaveOut) {
+  Bench bench;
+  FitProblem problem(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  const FitPoint point = problem.Start();  // where no state or parameter is pulled
+  const Evaluation all = problem.Evaluate(point, Keep::kResiduals);
+  const std::vector<BlockCost> blocks = CostsByBlock(problem, all.residuals);
+  double sum = 0;
+  std::size_t residuals = 0;
+  for (const BlockCost& block : blocks) sum += block.cost, residuals += block.residuals;
+  EXPECT_NEAR(sum, all.cost, 1e-10 * all.cost);
+  EXPECT_EQ(residuals, problem.residuals());
+  EXPECT_EQ(blocks.size(), 10u);  // five half seconds of each log: 2.3 s
+  WindowMask mask(problem.windows().size(), 0);
+  for (std::size_t w = 0; w < mask.size(); ++w) mask[w] = problem.windows()[w].log == 1;
+  const Evaluation masked = problem.Evaluate(point, Keep::kResiduals, mask);
+  EXPECT_EQ(masked.log_costs[0], 0);
+  EXPECT_EQ(masked.log_costs[1], all.log_costs[1]);
+  for (const BlockCost& block : CostsByBlock(problem, masked.residuals)) EXPECT_EQ(block.log, 1u);
+  EXPECT_LT(masked.work.steps, all.work.steps);
+}
+
+TEST(WorkTest, StepsOfTheSimulatorAreCounted) {
+  const Rig rig = LoadCart();
+  const std::vector<double> command(401, 1.0);
+  const std::vector<Recording> logs = {MakeRecording(rig, command, CartMotion(1, 0, 0, command), kCartStep_s)};
+  for (const int jobs : {1, 3}) {
+    ThreadPool pool(jobs);
+    const FitOptions options{.free = {rig.Index("cart.gain")},
+                             .objective = ObjectiveKind::kFreeRun,
+                             .time_step_s = kCartStep_s,
+                             .fit_offsets = false,
+                             .fit_shift = false};
+    FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
+    EXPECT_EQ(problem.Evaluate(problem.Start(), Keep::kCost).work.steps, 400u);
+    // The point itself, one parameter, two numbers of the initial state.
+    const Derivatives at = problem.Differentiate(problem.Start(), {});
+    EXPECT_EQ(at.work.replays, 4u);
+    EXPECT_EQ(at.work.steps, 1600u);
+  }
+}
+
+}  // namespace
+}  // namespace gapscope::testing

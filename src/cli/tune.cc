@@ -141,6 +141,7 @@ Result<int> RunTune(const TuneFlags& flags) {
   const auto tuned = Tune(*session.model, data, session.values, options, *session.pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!tuned.ok()) return tuned.error();
+  for (const auto& warning : tuned.value().warnings) fmt::print(stderr, "warning: {}\n", warning);
   const TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
   if (!flags.common.out.empty())
     GS_RETURN_IF_ERROR(WriteTune(flags.common.out, session, data, options, tuned.value(), run));

@@ -96,6 +96,40 @@ TEST_F(JournalTest, JournalOfAnotherJobIsRefused) {
   EXPECT_FALSE(Run(Path("text"), true).ok());
 }
 
+// What the numbers depend on is not only what the options and the measurements say.
+TEST_F(JournalTest, ChangedModelIsAnotherJob) {
+  ASSERT_TRUE(Run(Path("journal"), false).ok());
+  const auto refused = [&](const std::string& what) {
+    const auto again = Run(Path("journal"), true);
+    ASSERT_FALSE(again.ok()) << what;
+    EXPECT_NE(again.error().Text().find("another job"), std::string::npos) << what;
+  };
+  const Rig before = rig_;
+  rig_ = LoadCart(-10, 9.5);
+  refused("a bound");
+  rig_.experiment = before.experiment;
+  rig_.experiment.settings.push_back({"option/gravity", {"0", "0", "-1"}, "test"});
+  rig_.model = Model::Build(rig_.experiment).value();
+  refused("a setting");
+  rig_ = before;
+  rig_.experiment.measured[0].resolution = 1e-3;
+  rig_.model = Model::Build(rig_.experiment).value();
+  refused("a sensor's resolution");
+  rig_ = before;
+  const auto logs = logs_;
+  logs_[0].values["log.supply_v"] = 7.4;
+  refused("a log's value");
+  logs_ = logs;
+  EXPECT_TRUE(Run(Path("journal"), true).ok());
+}
+
+TEST_F(JournalTest, DiskThatIsFullIsSaidAndLosesNothing) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full on this system";
+  const auto refused = Run("/dev/full", false);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().Text().find("cannot be written"), std::string::npos);
+}
+
 TEST_F(JournalTest, NumberOfWorkersDoesNotMatter) {
   const std::string one = Bytes(Run("", false, 1));
   EXPECT_TRUE(one == Bytes(Run("", false, 2)));

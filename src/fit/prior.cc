@@ -13,7 +13,7 @@ Eigen::VectorXd Knowledge(const SearchSpace& space, const Layout& layout, const 
   Eigen::VectorXd weight = Eigen::VectorXd::Zero(layout.low.size());
   for (std::size_t i = 0; i < space.coordinates().size() && options.prior_share > 0; ++i) {
     // An effect's parameters are what is asked for.
-    if (space.parameter(space.coordinates()[i]).owner == Parameter::Owner::kEffect) continue;
+    if (space.parameter(space.coordinates()[i]).owner != Parameter::Owner::kBase) continue;
     const auto k = static_cast<Eigen::Index>(i);
     const double deviation = options.prior_share * (layout.high[k] - layout.low[k]);
     weight[k] = 1 / (deviation * deviation);

@@ -56,7 +56,7 @@ ColumnTest BestScale(const TrialColumn& column, const FitProblem& parent, const 
   const Eigen::Index n = at.gradient.size();
   std::vector<int> bound(static_cast<std::size_t>(n), 0);  // 1: on its upper bound, -1: on its lower one
   std::vector<char> fixed(static_cast<std::size_t>(n), 0);
-  const Layout& layout = parent.layout();
+  const FitLayout& layout = parent.layout();
   for (Eigen::Index i = 0; i < n; ++i) {
     const double edge = 1e-6 * (layout.high[i] - layout.low[i]);
     const auto k = static_cast<std::size_t>(i);

@@ -113,7 +113,7 @@ class FitProblem::Differences {
   }
 
   const FitProblem& problem_;
-  const Layout& layout_;
+  const FitLayout& layout_;
   Worker& worker_;
   const FitWindow& window_;
   const FitPoint& point_;

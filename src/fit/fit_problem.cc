@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::size_t CountResiduals(const Layout& layout, const std::vector<FitWindow>& windows) {
+std::size_t CountResiduals(const FitLayout& layout, const std::vector<FitWindow>& windows) {
   std::size_t count = 0;
   for (const auto& window : windows) {
     for (const auto& signal : layout.signals[window.log]) {
@@ -22,7 +22,7 @@ std::size_t CountResiduals(const Layout& layout, const std::vector<FitWindow>& w
   return count;
 }
 
-Eigen::VectorXd StartY(const SearchSpace& space, const Layout& layout) {
+Eigen::VectorXd StartY(const SearchSpace& space, const FitLayout& layout) {
   Eigen::VectorXd y = Eigen::VectorXd::Zero(layout.low.size());
   y.head(space.size()) = space.ToSearch(space.start());
   return y;
@@ -224,7 +224,7 @@ FitPoint CarryOver(const FitProblem& from, const FitPoint& at, const FitProblem&
     }
   }
   point.y.head(to.space().size()) = to.space().ToSearch(mine);
-  const Layout &a = from.layout(), &b = to.layout();
+  const FitLayout &a = from.layout(), &b = to.layout();
   for (std::size_t l = 0; l < b.signals.size(); ++l) {
     for (std::size_t s = 0; s < b.signals[l].size(); ++s) {
       if (b.signals[l][s].offset >= 0 && a.signals[l][s].offset >= 0)

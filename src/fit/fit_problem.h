@@ -62,7 +62,7 @@ class FitProblem {
   const std::vector<Recording>& recordings() const { return recordings_; }
   const FitOptions& options() const { return options_; }
   const SearchSpace& space() const { return space_; }
-  const Layout& layout() const { return layout_; }
+  const FitLayout& layout() const { return layout_; }
   const std::vector<FitWindow>& windows() const { return windows_; }
   const Prior& prior() const { return prior_; }
   const Huber& huber() const { return huber_; }
@@ -111,7 +111,7 @@ class FitProblem {
   FitOptions options_;
   ThreadPool& pool_;
   SearchSpace space_;
-  Layout layout_;
+  FitLayout layout_;
   std::vector<FitWindow> windows_;
   Huber huber_;
   Prior prior_;

@@ -18,7 +18,7 @@ double Weight(const FitOptions& options, const Recording::Measured& measured, co
 }
 
 // Torques jump to the next command as soon as commands come early.
-bool ScoresTorque(const std::vector<Recording>& recordings, const Layout& layout) {
+bool ScoresTorque(const std::vector<Recording>& recordings, const FitLayout& layout) {
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
       if (recordings[l].measured[s].spec.kind == SignalKind::kTorque && layout.signals[l][s].weight > 0) return true;
@@ -28,7 +28,7 @@ bool ScoresTorque(const std::vector<Recording>& recordings, const Layout& layout
 }
 
 // One log's signals, and the bounds of the offsets that it brings.
-void AddLog(const Model& model, const Recording& recording, const FitOptions& options, Layout* layout,
+void AddLog(const Model& model, const Recording& recording, const FitOptions& options, FitLayout* layout,
             std::vector<double>* low, std::vector<double>* high) {
   std::vector<SignalLayout> signals(recording.measured.size());
   std::vector<double> prior;
@@ -64,9 +64,9 @@ void AddLog(const Model& model, const Recording& recording, const FitOptions& op
 
 }  // namespace
 
-Layout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
-                  const SearchSpace& space) {
-  Layout layout{.parameters = space.size()};
+FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
+                     const SearchSpace& space) {
+  FitLayout layout{.parameters = space.size()};
   std::vector<double> low(space.low().begin(), space.low().end()), high(space.high().begin(), space.high().end());
   double step = std::numeric_limits<double>::infinity();
   for (const Recording& recording : recordings) {
@@ -85,12 +85,12 @@ Layout MakeLayout(const Model& model, const std::vector<Recording>& recordings, 
   return layout;
 }
 
-double Layout::Offset(const Eigen::VectorXd& y, std::size_t log, std::size_t signal) const {
+double FitLayout::Offset(const Eigen::VectorXd& y, std::size_t log, std::size_t signal) const {
   const SignalLayout& layout = signals[log][signal];
   return layout.offset < 0 ? 0 : y[layout.offset] * layout.deviation;
 }
 
-double Layout::UnitCost() const {
+double FitLayout::UnitCost() const {
   double unit = 0;
   for (const auto& log : signals) {
     for (const auto& signal : log) unit = std::max(unit, signal.weight * signal.deviation);

@@ -22,7 +22,7 @@ struct SignalLayout {
   int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
 };
 
-struct Layout {
+struct FitLayout {
   std::vector<std::vector<SignalLayout>> signals;  // per log, per signal
   std::vector<Eigen::VectorXd> state_priors;       // per log: weight of each number of a window's state
   Eigen::VectorXd low, high;                       // of y
@@ -37,8 +37,8 @@ struct Layout {
   double UnitCost() const;
 };
 
-Layout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
-                  const SearchSpace& space);
+FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
+                     const SearchSpace& space);
 
 }  // namespace gapscope
 

@@ -161,7 +161,7 @@ struct Callback {
 Eigen::VectorXd Point(const Callback& callback, const std::vector<double>& x) {
   const Eigen::VectorXd z = Eigen::Map<const Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
   if (callback.whitened) return callback.whitened->Y(z);
-  const Layout& layout = callback.problem->layout();
+  const FitLayout& layout = callback.problem->layout();
   return layout.low + z.cwiseProduct(layout.high - layout.low);
 }
 
@@ -179,7 +179,7 @@ double Callee(const std::vector<double>& x, std::vector<double>& gradient, void*
   out.setZero();
   if (!std::isfinite(known.cost)) return kPolicy.not_simulated;
   const Eigen::VectorXd z = Eigen::Map<const Eigen::VectorXd>(x.data(), out.size());
-  const Layout& layout = callback->problem->layout();
+  const FitLayout& layout = callback->problem->layout();
   out = callback->whitened ? callback->whitened->Gradient(z, known.at.gradient)
                            : callback->scale * known.at.gradient.cwiseProduct(layout.high - layout.low).eval();
   return callback->scale * known.cost;
@@ -294,7 +294,7 @@ SolveResult SearchWithNlopt(const SolveTask& task, const FitPoint& start, const 
     local.set_maxeval(kPolicy.evaluations);
     opt.set_local_optimizer(local);
   }
-  const Layout& layout = task.problem.layout();
+  const FitLayout& layout = task.problem.layout();
   const Eigen::VectorXd share = (start.y - layout.low).cwiseQuotient(layout.high - layout.low);
   const Termination searched = Optimize(opt, std::vector<double>(share.begin(), share.end()));
   SolveResult found = Finish(task, start, first.cost, searched, projected);

@@ -9,7 +9,7 @@ namespace gapscope {
 namespace {
 
 // Inverse variances of what is known beforehand. Only meaningful with weights of 1 / noise.
-Eigen::VectorXd Knowledge(const SearchSpace& space, const Layout& layout, const FitOptions& options) {
+Eigen::VectorXd Knowledge(const SearchSpace& space, const FitLayout& layout, const FitOptions& options) {
   Eigen::VectorXd weight = Eigen::VectorXd::Zero(layout.low.size());
   for (std::size_t i = 0; i < space.coordinates().size() && options.prior_share > 0; ++i) {
     // An effect's parameters are what is asked for.
@@ -29,8 +29,8 @@ Eigen::VectorXd Knowledge(const SearchSpace& space, const Layout& layout, const 
 
 }  // namespace
 
-Prior MakePrior(const SearchSpace& space, const Layout& layout, const FitOptions& options, const Eigen::VectorXd& start,
-                std::size_t residuals) {
+Prior MakePrior(const SearchSpace& space, const FitLayout& layout, const FitOptions& options,
+                const Eigen::VectorXd& start, std::size_t residuals) {
   // In units of the signals' standard deviations, as without weights.
   const double unit = options.weights.empty() ? 1 : layout.UnitCost();
   const Eigen::VectorXd range = layout.high - layout.low, knowledge = Knowledge(space, layout, options);

@@ -18,8 +18,8 @@ struct Prior {
 };
 
 // `start`: y of the start; `residuals`: how many scored numbers the problem has.
-Prior MakePrior(const SearchSpace& space, const Layout& layout, const FitOptions& options, const Eigen::VectorXd& start,
-                std::size_t residuals);
+Prior MakePrior(const SearchSpace& space, const FitLayout& layout, const FitOptions& options,
+                const Eigen::VectorXd& start, std::size_t residuals);
 
 }  // namespace gapscope
 

@@ -36,7 +36,7 @@ std::vector<double> MismatchOf(std::size_t log, std::size_t signals, const std::
 }  // namespace
 
 std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Recording>& recordings,
-                                      const FitOptions& options, const Layout& layout,
+                                      const FitOptions& options, const FitLayout& layout,
                                       const std::vector<double>& values) {
   std::vector<FitWindow> windows;
   for (std::size_t l = 0; l < recordings.size(); ++l) {
@@ -64,7 +64,7 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
 }
 
 std::vector<Eigen::VectorXd> StatePriorsByNoise(const Model& model, const std::vector<Recording>& recordings,
-                                                const Layout& layout, const std::vector<FitWindow>& windows,
+                                                const FitLayout& layout, const std::vector<FitWindow>& windows,
                                                 const Residuals& residuals) {
   std::vector<Eigen::VectorXd> priors;
   for (const FitWindow& window : windows) priors.push_back(window.prior);

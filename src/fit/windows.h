@@ -27,13 +27,13 @@ struct FitWindow {
 
 // `values`: parameters that the starts are read with.
 std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Recording>& recordings,
-                                      const FitOptions& options, const Layout& layout,
+                                      const FitOptions& options, const FitLayout& layout,
                                       const std::vector<double>& values);
 
 // Priors of the windows' states that weigh the log's own initial states by its sensors' noise, in units of `residuals`:
 // a model that misses by far must not make up for it by starting where the mechanism was not. Never less than now.
 std::vector<Eigen::VectorXd> StatePriorsByNoise(const Model& model, const std::vector<Recording>& recordings,
-                                                const Layout& layout, const std::vector<FitWindow>& windows,
+                                                const FitLayout& layout, const std::vector<FitWindow>& windows,
                                                 const Residuals& residuals);
 
 }  // namespace gapscope

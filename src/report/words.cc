@@ -183,10 +183,14 @@ Headline HeadlineOf(const DiagnoseRun& run) {
   }
   AddStage(&headline.stages, "nominal", d.nominal);
   AddStage(&headline.stages, "best parameters", d.refit);
+  // An effect's own error_after is that of the final model: with the others of the verdict. What it reaches alone
+  // stands before the next one.
   for (std::size_t i = 0; i < d.effects.size(); ++i) {
     const bool last = i + 1 == d.effects.size();
-    AddStage(&headline.stages, "with " + found[i], last && std::isfinite(d.final) ? d.final : d.effects[i].error_after,
-             last ? Stage::Mark::kBest : Stage::Mark::kNone, d.effects[i].share_of_gap);
+    const double error =
+        last ? (std::isfinite(d.final) ? d.final : d.effects[i].error_after) : d.effects[i + 1].error_before;
+    AddStage(&headline.stages, "with " + found[i], error, last ? Stage::Mark::kBest : Stage::Mark::kNone,
+             d.effects[i].share_of_gap);
   }
   if (d.effects.empty() && d.final != d.refit) AddStage(&headline.stages, "final", d.final, Stage::Mark::kBest);
   AddStage(&headline.stages, "floor of the sensors", d.floor, Stage::Mark::kFloor);

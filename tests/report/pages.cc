@@ -53,7 +53,7 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   if (verdict == Verdict::kNone || verdict == Verdict::kParameters) {
     d.final = d.refit;
   } else {
-    d.effects = {Found(kSpring, {"stiffness_n_m_per_rad", "N m/rad", 0.0012, 0.0011, 0.0013}, 0.97, 1.2, 0.3, 0.8),
+    d.effects = {Found(kSpring, {"stiffness_n_m_per_rad", "N m/rad", 0.0012, 0.0011, 0.0013}, 0.97, 0.9, 0.01, 0.8),
                  Found(kFriction, {"friction_n_m", "N m", 0.0006, 0.0005, 0.0007}, 0.93, 0.3, 0.01, 0.2)};
   }
   if (verdict == Verdict::kAmbiguous) d.ambiguous = {{kSpring, kGravity}};

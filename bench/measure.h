@@ -10,7 +10,7 @@
 
 namespace gapscope::bench {
 
-// One line of the result (contract.md: gapscope.bench/1).
+// One line of the result (schema gapscope.bench/1).
 struct Row {
   std::string name;
   double value = 0, low = 0, high = 0;  // median, 10th and 90th percentile of the repeats

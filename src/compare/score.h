@@ -1,4 +1,4 @@
-// How far a predicted signal lies from the measured one, as the numbers of contract.md ("signals" of replay --json).
+// How far a predicted signal lies from the measured one, as the numbers under "signals" of `replay --json`.
 #ifndef GAPSCOPE_COMPARE_SCORE_H_
 #define GAPSCOPE_COMPARE_SCORE_H_
 

@@ -1,6 +1,6 @@
 // Each experiment file against its MJCF: every field of `set` exists and, at the nominal values, is what the MJCF
 // already holds, so that the bare MJCF and the experiment describe the same rig; bounds, units and signals as
-// contract.md asks.
+// users of the rigs rely on.
 #include <gtest/gtest.h>
 #include <muParser.h>
 #include <yaml-cpp/yaml.h>
@@ -162,7 +162,7 @@ TEST(ExperimentFilesTest, ParametersHaveUnitsBoundsAndSources) {
   }
 }
 
-// contract.md's tables: signals and columns.
+// What logs of the shipped rigs hold: signals and columns.
 TEST(ExperimentFilesTest, SignalsAndColumnsOfTheContract) {
   const std::map<std::string, std::vector<std::string>> signals = {
       {"joint", {"position_rad", "velocity_rad_per_s", "torque_n_m"}},

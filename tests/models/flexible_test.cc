@@ -75,7 +75,7 @@ TEST(FlexibleModelTest, LinearisedMatricesOfTheReport) {
   }
 }
 
-// contract.md: 2.70 Hz with the hub clamped; the seed's resonance of 3.84568 Hz.
+// The rig's nominal values: 2.70 Hz with the hub clamped; the seed's resonance of 3.84568 Hz.
 TEST(FlexibleModelTest, ClampedFrequencies) {
   const auto hertz = [](const FlexibleConstants& p) { return std::sqrt(p.k / p.j2) / (2 * 3.14159265358979323846); };
   EXPECT_NEAR(hertz(Cases()[0].p), 3.84568, 5e-4);

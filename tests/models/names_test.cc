@@ -1,4 +1,4 @@
-// What contract.md fixes about every rig: names of joints and actuators, what a base model may hold, what can be
+// What users of the shipped rigs rely on: names of joints and actuators, what a base model may hold, what can be
 // rendered.
 #include <gtest/gtest.h>
 

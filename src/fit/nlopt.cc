@@ -10,179 +10,184 @@ namespace gapscope {
 namespace {
 
 struct NloptPolicy {
-  int most_rounds = 6;
-  int evaluations = 30;             // of a round of a method with gradients
+  int most_rounds = 30;
+  int evaluations = 8;              // of a round of a method with gradients
   int evaluations_per_unknown = 8;  // of one without
   double reach = 2;                 // of z: a quadratic cost of one has its bottom at most sqrt(2) away
+  double coarse_tolerance = 10;     // times the solve's: what little is left is for the finer difference to find
   double tolerance_share = 0.3;     // of the solve's own, for a round
-  double first_step = 0.5;          // of z, of a method without gradients
-  double least_diagonal = 1e-12;    // of the largest one: below it a direction is open, and left where it is
-  int search_unit = 100;            // evaluations of a global search per iteration that is allowed
-  double not_simulated = 1e3;       // times the start's cost
+  int state_steps = 3;              // at most, for the states at one y
+  double state_share = 3e-3;        // of the cost: less to be gained by the states is nothing
+  // Of the Hessian's diagonal, as in Levenberg-Marquardt: how far a round may go along directions that hardly matter.
+  double first_damping = 1e-2, least_damping = 1e-9, shrink = 0.1, grow = 30;
+  int most_quiet = 3;             // rounds that gain hardly anything, each nearer than the one before
+  double inside = 0.99;           // of the way to a bound, where a coordinate starts that leaves it
+  double first_step = 0.5;        // of z, of a method without gradients
+  double least_diagonal = 1e-12;  // of the largest one: below it a direction is open, and left where it is
+  int search_unit = 100;          // evaluations of a global search per iteration that is allowed
+  double not_simulated = 1e3;     // times the start's cost
 };
 constexpr NloptPolicy kPolicy;
 
-// What is known of one point.
+// A point with its derivatives, and the normal equations there.
 struct Known {
   FitPoint point;
+  Derivatives derivatives;
   Linearization at;
-  double cost = std::numeric_limits<double>::infinity();  // with the states at their optimum
+  double cost() const { return at.valid ? at.cost : std::numeric_limits<double>::infinity(); }
 };
 
-// The projected cost F of a problem, evaluation by evaluation. Nothing may be thrown through NLopt's C code but its own
-// forced_stop.
+// The cost around the point where a round begins: one Jacobian there, then a replay or a few an evaluation. States go
+// where the last equations send them, and Broyden's update keeps the Jacobian true along the steps that were made.
 class Projected {
  public:
-  Projected(const SolveTask& task, const SolveOptions& options) : task_(task), options_(options) {}
+  // `step`: of the finite differences.
+  Projected(FitProblem& problem, const SolveOptions& options, double step)
+      : problem_(problem), options_(options), step_(step) {}
 
-  // F at y with gradient and Hessian. States start where the last linearization sends them.
-  const Known& Linearized(const Eigen::VectorXd& y) {
-    last_.point = last_.at.valid ? Move(task_.problem, last_.point, last_.at, y - last_.point.y)
-                                 : FitPoint{.y = y, .states = last_.point.states};
-    last_.at = task_.objective.Linearize(last_.point, {.step = options_.fine_step});
-    last_.cost = last_.at.valid ? last_.at.reduced_cost : std::numeric_limits<double>::infinity();
-    Count(last_.at.work);
-    if (!last_.at.valid) {
-      last_ = best_;  // states from where the model could be simulated
-      refused_.cost = std::numeric_limits<double>::infinity();
-      return refused_;
+  // A true Jacobian at a point; false: it cannot be simulated.
+  bool Begin(const FitPoint& point) {
+    last_.point = point;
+    last_.derivatives = problem_.Differentiate(point, {.step = step_});
+    last_.at = Reduce(problem_, point, last_.derivatives, Blocks::kNone);
+    Count(last_.derivatives.work);
+    best_ = last_;
+    return last_.at.valid;
+  }
+
+  // The cost and the equations at y, the states near their optimum; null: it cannot be simulated there.
+  const Known* At(const Eigen::VectorXd& y) {
+    Known least;
+    for (int step = 0; step < kPolicy.state_steps; ++step) {
+      const FitPoint point = Move(problem_, last_.point, last_.at, y - last_.point.y);
+      Evaluation there = problem_.Evaluate(point, Keep::kResiduals);
+      Count(there.work);
+      if (!std::isfinite(there.cost)) break;
+      UpdateSecant(problem_, last_.derivatives, last_.point, point, there.residuals);
+      last_.point = point;
+      last_.at = Reduce(problem_, point, last_.derivatives, Blocks::kNone);
+      if (last_.cost() < least.cost()) least = last_;
+      if (last_.cost() - last_.at.reduced_cost < kPolicy.state_share * last_.cost()) break;
     }
-    if (last_.cost < best_.cost) best_ = last_;
-    return last_;
+    if (!least.at.valid) return nullptr;
+    last_ = std::move(least);
+    if (last_.cost() < best_.cost()) best_ = last_;
+    return &last_;
   }
 
-  // F at y alone: the states by one Gauss-Newton step from where the last linearization sends them.
-  double Cost(const Eigen::VectorXd& y) {
-    FitPoint point = last_.at.valid ? Move(task_.problem, last_.point, last_.at, y - last_.point.y)
-                                    : FitPoint{.y = y, .states = last_.point.states};
-    Work work;
-    point = SolveStates(task_.problem, task_.objective, point, 1, &work);
-    const Evaluation evaluation = task_.objective.Evaluate(point, Keep::kCost);
-    work += evaluation.work;
-    Count(work);
-    if (evaluation.cost < best_.cost) best_ = {.point = point, .at = {}, .cost = evaluation.cost};
-    return evaluation.cost;
-  }
-
-  // Makes the Hessian known at the best point, if it is not.
-  bool LinearizeBest() {
-    if (best_.at.valid) return true;
-    last_ = best_;
-    const double cost = best_.cost;
-    (void)Linearized(best_.point.y);
-    if (!best_.at.valid) {
-      best_ = last_;
-      best_.cost = std::min(cost, last_.cost);
-    }
-    return best_.at.valid;
-  }
-
-  void Start(const FitPoint& start) { last_.point = best_.point = start; }
   const Known& best() const { return best_; }
   const Work& work() const { return work_; }
-  int evaluations() const { return evaluations_; }
   bool Late() const { return IsLate(options_.deadline); }
 
  private:
   void Count(const Work& work) {
     work_ += work;
-    ++evaluations_;
     if (options_.progress)
-      options_.progress({.best = best_.cost, .evaluations = work_.evaluations, .iteration = evaluations_});
+      options_.progress({.best = best_.cost(), .evaluations = work_.evaluations, .iteration = ++evaluations_});
   }
 
-  const SolveTask& task_;
+  FitProblem& problem_;
   const SolveOptions& options_;
-  Known last_, best_, refused_;
+  const double step_;
+  Known last_, best_;
   Work work_;
   int evaluations_ = 0;
 };
 
-// Coordinates of one round: y = clamp(y0 + L^-T z), in units where the cost at z = 0 is one and its Hessian the
-// identity.
+// Coordinates of one round, in units where the cost at z = 0 is one and its Hessian the identity. Bounds are put into a
+// smooth map first (James and Roos, "Minuit", Computer Physics Communications 10, 1975): y = middle + half sin(u),
+// u = u0 + L^-T z, L L' the Hessian by u.
 class Whitened {
  public:
-  Whitened(const Known& at, const Eigen::VectorXd& low, const Eigen::VectorXd& high)
-      : y0_(at.point.y), low_(low), high_(high), scale_(1 / at.cost) {
-    const Eigen::MatrixXd& h = at.at.hessian;
-    const double least = kPolicy.least_diagonal * h.diagonal().maxCoeff();
-    for (Eigen::Index i = 0; i < y0_.size(); ++i) {
-      const double edge = 1e-9 * (high[i] - low[i]), slope = at.at.gradient[i];
-      const bool held = (y0_[i] <= low[i] + edge && slope > 0) || (y0_[i] >= high[i] - edge && slope < 0);
-      if (!held && h(i, i) > least) free_.push_back(i);
+  Whitened(const Known& at, const Eigen::VectorXd& low, const Eigen::VectorXd& high, double damping)
+      : middle_(0.5 * (low + high)), half_(0.5 * (high - low)), u0_(middle_.size()), scale_(1 / at.cost()) {
+    const Eigen::Index n = u0_.size();
+    const Eigen::VectorXd& g = at.at.gradient;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double share = std::clamp((at.point.y[i] - middle_[i]) / half_[i], -1.0, 1.0);
+      // On a bound the map stands still: what the slope pulls inside starts a little inside.
+      const bool inward = share * g[i] > 0;
+      u0_[i] = std::asin(inward ? std::clamp(share, -kPolicy.inside, kPolicy.inside) : share);
     }
-    Eigen::MatrixXd own(size(), size());
-    for (Eigen::Index a = 0; a < size(); ++a) {
-      for (Eigen::Index b = 0; b < size(); ++b) own(a, b) = scale_ * h(Free(a), Free(b));
-      own(a, a) *= 1 + 1e-9;
-    }
-    factor_.compute(own);
+    const Eigen::VectorXd slope = half_.cwiseProduct(u0_.array().cos().matrix());
+    Eigen::MatrixXd hessian = scale_ * slope.asDiagonal() * at.at.hessian * slope.asDiagonal();
+    for (Eigen::Index i = 0; i < n; ++i) hessian(i, i) += std::max(0.0, -scale_ * g[i] * half_[i] * std::sin(u0_[i]));
+    const double least = kPolicy.least_diagonal * std::max(hessian.diagonal().maxCoeff(), 1e-300);
+    hessian.diagonal() = (hessian.diagonal() * (1 + damping)).cwiseMax(least);
+    factor_.compute(hessian);
   }
-  bool good() const { return factor_.info() == Eigen::Success; }
-  Eigen::Index size() const { return static_cast<Eigen::Index>(free_.size()); }
+  bool good() const { return u0_.size() > 0 && factor_.info() == Eigen::Success; }
+  Eigen::Index size() const { return u0_.size(); }
   double scale() const { return scale_; }
 
   Eigen::VectorXd Y(const Eigen::VectorXd& z) const {
-    const Eigen::VectorXd moved = factor_.matrixU().solve(z);
-    Eigen::VectorXd y = y0_;
-    for (Eigen::Index a = 0; a < size(); ++a)
-      y[Free(a)] = std::clamp(y0_[Free(a)] + moved[a], low_[Free(a)], high_[Free(a)]);
-    return y;
+    return middle_ + half_.cwiseProduct(U(z).array().sin().matrix());
   }
-  // Of the scaled cost by z. A coordinate that is held on its bound does not move with z.
+  // Of the scaled cost by z.
   Eigen::VectorXd Gradient(const Eigen::VectorXd& z, const Eigen::VectorXd& gradient) const {
-    const Eigen::VectorXd moved = factor_.matrixU().solve(z);
-    Eigen::VectorXd own(size());
-    for (Eigen::Index a = 0; a < size(); ++a) {
-      const double y = y0_[Free(a)] + moved[a];
-      own[a] = y < low_[Free(a)] || y > high_[Free(a)] ? 0 : scale_ * gradient[Free(a)];
-    }
-    return factor_.matrixL().solve(own);
+    const Eigen::VectorXd slope = half_.cwiseProduct(U(z).array().cos().matrix());
+    return factor_.matrixL().solve(scale_ * slope.cwiseProduct(gradient));
   }
 
  private:
-  Eigen::Index Free(Eigen::Index a) const { return free_[static_cast<std::size_t>(a)]; }
+  Eigen::VectorXd U(const Eigen::VectorXd& z) const { return u0_ + factor_.matrixU().solve(z); }
 
-  Eigen::VectorXd y0_;
-  const Eigen::VectorXd &low_, &high_;
+  Eigen::VectorXd middle_, half_, u0_;
   double scale_;
-  std::vector<Eigen::Index> free_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
 };
 
-// What an NLopt callback is given.
-struct Callback {
+// What the callback of a round is given. Nothing may be thrown through NLopt's C code but its own forced_stop, which
+// NLopt's C++ wrapper catches and remembers.
+struct RoundCall {
   Projected* projected;
-  const Whitened* whitened;  // null: the argument is y in shares of its range
-  const FitProblem* problem;
-  double scale;  // of the cost
+  const Whitened* whitened;
 };
 
-Eigen::VectorXd Point(const Callback& callback, const std::vector<double>& x) {
+double CallRound(const std::vector<double>& x, std::vector<double>& gradient, void* data) {
+  const auto& [projected, whitened] = *static_cast<RoundCall*>(data);
+  if (projected->Late()) throw nlopt::forced_stop();
   const Eigen::VectorXd z = Eigen::Map<const Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
-  if (callback.whitened) return callback.whitened->Y(z);
-  const FitLayout& layout = callback.problem->layout();
-  return layout.low + z.cwiseProduct(layout.high - layout.low);
+  const Known* known = projected->At(whitened->Y(z));
+  if (!gradient.empty()) {
+    Eigen::Map<Eigen::VectorXd> out(gradient.data(), z.size());
+    out = known ? whitened->Gradient(z, known->at.gradient) : Eigen::VectorXd::Zero(z.size()).eval();
+  }
+  return known ? whitened->scale() * known->cost() : kPolicy.not_simulated;
 }
 
-double Callee(const std::vector<double>& x, std::vector<double>& gradient, void* data) {
-  const auto* callback = static_cast<Callback*>(data);
-  Projected& projected = *callback->projected;
-  if (projected.Late()) throw nlopt::forced_stop();  // nlopt's own C++ wrapper catches and remembers it
-  const Eigen::VectorXd y = Point(*callback, x);
-  if (gradient.empty()) {
-    const double cost = callback->scale * projected.Cost(y);
-    return std::isfinite(cost) ? cost : kPolicy.not_simulated;
+// What the callback of a global search is given: the argument is y in shares of its range.
+struct SearchCall {
+  const SolveTask* task;
+  const SolveOptions* options;
+  FitPoint start;
+  double scale;
+  FitPoint best;
+  double least;
+  Work work;
+};
+
+double CallSearch(const std::vector<double>& x, std::vector<double>& gradient, void* data) {
+  auto& call = *static_cast<SearchCall*>(data);
+  if (IsLate(call.options->deadline)) throw nlopt::forced_stop();
+  const FitLayout& layout = call.task->problem.layout();
+  const Eigen::VectorXd range = layout.high - layout.low;
+  const Eigen::VectorXd share = Eigen::Map<const Eigen::VectorXd>(x.data(), static_cast<Eigen::Index>(x.size()));
+  const FitPoint point{.y = layout.low + share.cwiseProduct(range), .states = call.start.states};
+  const auto columns = gradient.empty() ? DifferenceOptions::Columns::kStates : DifferenceOptions::Columns::kAll;
+  const Linearization at = call.task->objective.Linearize(point, {.step = call.options->fine_step, .columns = columns});
+  call.work += at.work;
+  if (!gradient.empty()) {
+    Eigen::Map<Eigen::VectorXd> out(gradient.data(), share.size());
+    out = at.valid ? (call.scale * at.gradient.cwiseProduct(range)).eval() : Eigen::VectorXd::Zero(share.size()).eval();
   }
-  const Known& known = projected.Linearized(y);
-  Eigen::Map<Eigen::VectorXd> out(gradient.data(), static_cast<Eigen::Index>(gradient.size()));
-  out.setZero();
-  if (!std::isfinite(known.cost)) return kPolicy.not_simulated;
-  const Eigen::VectorXd z = Eigen::Map<const Eigen::VectorXd>(x.data(), out.size());
-  const FitLayout& layout = callback->problem->layout();
-  out = callback->whitened ? callback->whitened->Gradient(z, known.at.gradient)
-                           : callback->scale * known.at.gradient.cwiseProduct(layout.high - layout.low).eval();
-  return callback->scale * known.cost;
+  if (!at.valid) return kPolicy.not_simulated;
+  if (at.reduced_cost < call.least) {
+    call.least = at.reduced_cost;
+    call.best = Move(call.task->problem, point, at, Eigen::VectorXd::Zero(share.size()));
+  }
+  if (call.options->progress) call.options->progress({.best = call.least, .evaluations = call.work.evaluations});
+  return call.scale * at.reduced_cost;
 }
 
 // Runs what is set up; exceptions become terminations.
@@ -199,16 +204,16 @@ Termination Optimize(nlopt::opt& opt, std::vector<double> x) {
   }
 }
 
-// One round of a local method from the best point.
-Termination Round(const SolveTask& task, const SolveOptions& options, nlopt::algorithm algorithm,
+// One round of a local method from where `projected` begins.
+Termination Round(const FitProblem& problem, const SolveOptions& options, nlopt::algorithm algorithm, double damping,
                   Projected* projected) {
-  const Whitened whitened(projected->best(), task.problem.layout().low, task.problem.layout().high);
+  const Whitened whitened(projected->best(), problem.layout().low, problem.layout().high, damping);
   if (!whitened.good() || whitened.size() == 0) return Termination::kConverged;
   const auto n = static_cast<unsigned>(whitened.size());
   nlopt::opt opt(algorithm, n);
-  Callback callback{.projected = projected, .whitened = &whitened, .problem = &task.problem, .scale = whitened.scale()};
+  RoundCall call{.projected = projected, .whitened = &whitened};
   const bool gradient = algorithm != nlopt::LN_BOBYQA;
-  opt.set_min_objective(Callee, &callback);
+  opt.set_min_objective(CallRound, &call);
   opt.set_lower_bounds(-kPolicy.reach);
   opt.set_upper_bounds(kPolicy.reach);
   opt.set_ftol_rel(kPolicy.tolerance_share * options.tolerance);
@@ -217,53 +222,96 @@ Termination Round(const SolveTask& task, const SolveOptions& options, nlopt::alg
   return Optimize(opt, std::vector<double>(n, 0.0));
 }
 
-// The best point with its states solved, as a result.
-SolveResult Finish(const SolveTask& task, const FitPoint& start, double start_cost, Termination termination,
-                   const Projected& projected) {
-  SolveResult result{.point = start, .cost = start_cost, .termination = termination, .work = projected.work()};
-  result.iterations = projected.evaluations();
-  if (!std::isfinite(projected.best().cost)) return result;
+// Where a run is between two rounds: all that it takes to go on.
+struct RoundState {
+  FitPoint point;
+  double cost = 0, difference = 0, damping = 0;
+  int rounds = 0, quiet = 0;
+  bool done = false;
+  Termination termination = Termination::kIterations;
+  Work work;
+};
+
+std::vector<double> Pack(const RoundState& s) {
+  std::vector<double> record = {s.cost, s.difference, s.damping};
+  for (const std::size_t n :
+       {static_cast<std::size_t>(s.rounds), static_cast<std::size_t>(s.quiet), static_cast<std::size_t>(s.done),
+        static_cast<std::size_t>(s.termination), s.work.evaluations, s.work.replays, s.work.steps})
+    record.push_back(static_cast<double>(n));
+  record.insert(record.end(), s.point.y.begin(), s.point.y.end());
+  for (const auto& state : s.point.states) record.insert(record.end(), state.begin(), state.end());
+  return record;
+}
+
+void Unpack(const std::vector<double>& record, RoundState* s) {
+  s->cost = record[0], s->difference = record[1], s->damping = record[2];
+  s->rounds = static_cast<int>(record[3]), s->quiet = static_cast<int>(record[4]), s->done = record[5] != 0;
+  s->termination = static_cast<Termination>(static_cast<int>(record[6]));
+  s->work = {.evaluations = static_cast<std::size_t>(record[7]),
+             .replays = static_cast<std::size_t>(record[8]),
+             .steps = static_cast<std::size_t>(record[9])};
+  std::size_t at = 10;
+  for (double& y : s->point.y) y = record[at++];
+  for (auto& state : s->point.states) {
+    for (double& x : state) x = record[at++];
+  }
+}
+
+// A round, and what it means for the run.
+void Advance(FitProblem& problem, const SolveOptions& options, nlopt::algorithm algorithm, RoundState* s) {
+  Projected projected(problem, options, s->difference);
+  const auto end = [&](Termination termination) { s->done = true, s->termination = termination; };
+  if (!projected.Begin(s->point)) return end(Termination::kNotSimulated);
+  const Termination round = Round(problem, options, algorithm, s->damping, &projected);
+  s->work += projected.work();
+  ++s->rounds;
   const Known& best = projected.best();
-  const auto consider = [&](const FitPoint& point) {
-    const Evaluation evaluation = task.objective.Evaluate(point, Keep::kCost);
-    result.work += evaluation.work;
-    if (evaluation.cost < result.cost) result.cost = evaluation.cost, result.point = point;
-  };
-  consider(best.point);
-  if (best.at.valid) consider(Move(task.problem, best.point, best.at, Eigen::VectorXd::Zero(best.point.y.size())));
-  return result;
+  const double before = s->cost;
+  if (best.cost() < s->cost) s->cost = best.cost(), s->point = best.point;
+  if (round == Termination::kBudget) return end(round);
+  const bool coarse = s->difference > options.fine_step;
+  if (before - s->cost >= (coarse ? kPolicy.coarse_tolerance : 1) * options.tolerance * before) {
+    s->damping = std::max(s->damping * kPolicy.shrink, kPolicy.least_damping);
+    s->quiet = 0;
+    return;
+  }
+  // What a far step does not find a nearer one may.
+  if (++s->quiet < kPolicy.most_quiet) {
+    s->damping = std::max(s->damping, kPolicy.first_damping) * kPolicy.grow;
+    return;
+  }
+  s->quiet = 0;
+  s->damping = kPolicy.first_damping;
+  // Done with this finite difference: the finer one sees the bottom better.
+  if (!coarse) return end(Termination::kConverged);
+  s->difference = options.fine_step;
 }
 
 SolveResult Locally(const SolveTask& task, const FitPoint& start, const SolveOptions& options,
                     nlopt::algorithm algorithm) {
   const Evaluation first = task.objective.Evaluate(start, Keep::kCost);
-  SolveResult unsolved{.point = start, .cost = first.cost, .work = first.work};
-  unsolved.termination = std::isfinite(first.cost) ? Termination::kConverged : Termination::kNotSimulated;
-  if (!std::isfinite(first.cost) || start.y.size() == 0) return unsolved;
-  Projected projected(task, options);
-  projected.Start(start);
-  if (!IsLate(options.deadline)) (void)projected.Linearized(start.y);
-  Termination termination = Termination::kIterations;
-  for (int round = 0; round < kPolicy.most_rounds; ++round) {
+  RoundState s{.point = start,
+               .cost = first.cost,
+               .difference = options.coarse_step,
+               .damping = kPolicy.first_damping,
+               .work = first.work};
+  if (!std::isfinite(first.cost)) s.done = true, s.termination = Termination::kNotSimulated;
+  if (start.y.size() == 0) s.done = true, s.termination = Termination::kConverged;
+  while (!s.done && s.rounds < kPolicy.most_rounds) {
+    if (std::vector<double> record; task.journal && task.journal->Next(s.point, &record)) {
+      Unpack(record, &s);
+      continue;
+    }
     if (IsLate(options.deadline)) {
-      termination = Termination::kBudget;
+      s.termination = Termination::kBudget;
       break;
     }
-    if (!projected.LinearizeBest()) {
-      termination = Termination::kStalled;
-      break;
-    }
-    const double before = projected.best().cost;
-    termination = Round(task, options, algorithm, &projected);
-    if (termination == Termination::kBudget) break;
-    if (before - projected.best().cost < options.tolerance * before) {
-      termination = Termination::kConverged;
-      break;
-    }
+    const FitPoint before = s.point;
+    Advance(task.problem, options, algorithm, &s);
+    // A round that the deadline cut short is made anew.
+    if (task.journal && !IsLate(options.deadline)) task.journal->Append(before, Pack(s));
   }
-  SolveResult result = Finish(task, start, first.cost, termination, projected);
-  result.work += first.work;
-  return result;
+  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.rounds, .work = s.work};
 }
 
 }  // namespace
@@ -280,10 +328,14 @@ SolveResult SearchWithNlopt(const SolveTask& task, const FitPoint& start, const 
   if (n == 0 || !std::isfinite(first.cost)) return Locally(task, start, options, nlopt::LD_SLSQP);
   nlopt::srand(options.seed + 1);
   nlopt::opt opt(static_cast<nlopt::algorithm>(row.algorithm), n);
-  Projected projected(task, options);
-  projected.Start(start);
-  Callback callback{.projected = &projected, .whitened = nullptr, .problem = &task.problem, .scale = 1 / first.cost};
-  opt.set_min_objective(Callee, &callback);
+  SearchCall call{.task = &task,
+                  .options = &options,
+                  .start = start,
+                  .scale = 1 / first.cost,
+                  .best = start,
+                  .least = first.cost,
+                  .work = first.work};
+  opt.set_min_objective(CallSearch, &call);
   opt.set_lower_bounds(0.0);
   opt.set_upper_bounds(1.0);
   opt.set_ftol_rel(kPolicy.tolerance_share * options.tolerance);
@@ -297,13 +349,16 @@ SolveResult SearchWithNlopt(const SolveTask& task, const FitPoint& start, const 
   const FitLayout& layout = task.problem.layout();
   const Eigen::VectorXd share = (start.y - layout.low).cwiseQuotient(layout.high - layout.low);
   const Termination searched = Optimize(opt, std::vector<double>(share.begin(), share.end()));
-  SolveResult found = Finish(task, start, first.cost, searched, projected);
-  found.work += first.work;
-  if (searched == Termination::kBudget) return found;
-  SolveResult polished = Locally(task, found.point, options, nlopt::LD_SLSQP);
-  polished.work += found.work;
-  polished.iterations += found.iterations;
-  if (!(polished.cost <= found.cost)) polished.point = found.point, polished.cost = found.cost;
+  if (searched == Termination::kBudget) {
+    const Evaluation there = task.problem.Evaluate(call.best, Keep::kCost);
+    const bool better = there.cost < first.cost;
+    return {.point = better ? call.best : start,
+            .cost = better ? there.cost : first.cost,
+            .termination = searched,
+            .work = call.work};
+  }
+  SolveResult polished = Locally(task, call.best, options, nlopt::LD_SLSQP);
+  polished.work += call.work;
   return polished;
 }
 

@@ -2,11 +2,11 @@
 // https://nlopt.readthedocs.io). They see F(y) = min over the windows' states of cost(y, x), whose value and gradient
 // the normal equations give (variable projection).
 //
-// The local methods get coordinates z in which the Gauss-Newton Hessian at the best point so far is the identity:
-// y = y0 + L^-T z with hessian = L L', cost over the cost there. Parameters of a mechanism act nearly alike in pairs,
-// and a quasi-Newton method that must learn that from gradients takes many times as long. A coordinate that would leave
-// its bounds stays on them. Rounds of this, each with the Hessian of the last one's best point, end when one gains
-// nothing.
+// The local methods run in rounds. A round makes one Jacobian where it begins; an evaluation then is a replay or a few,
+// with Broyden's update of the Jacobian. Its coordinates make the damped Gauss-Newton Hessian there the identity,
+// bounds put into a smooth map: parameters of a mechanism act nearly alike in pairs, and a quasi-Newton method that
+// must learn that from gradients takes many times as long. The damping grows after a round that gains hardly anything;
+// several of them end the run.
 #ifndef GAPSCOPE_FIT_NLOPT_H_
 #define GAPSCOPE_FIT_NLOPT_H_
 

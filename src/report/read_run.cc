@@ -77,6 +77,7 @@ TuneRun TuneRunFrom(const ordered_json& json) {
       .termination = json.at("termination"),
       .starts_agree = json.at("starts_agree"),
       .starts = json.at("starts"),
+      .cost = json.contains("cost") ? NumberAt(json, "cost") : kNan,
       .evaluations = json.at("evaluations"),
       .replays = json.at("replays"),
       .wall_s = json.value("wall_s", kNan),

@@ -108,6 +108,7 @@ TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t 
               .termination = TerminationText(summary.termination),
               .starts_agree = summary.starts_agree,
               .starts = summary.start_costs.size(),
+              .cost = *std::min_element(summary.start_costs.begin(), summary.start_costs.end()),
               .evaluations = summary.evaluations,
               .replays = summary.replays,
               .wall_s = summary.wall_s,
@@ -159,8 +160,8 @@ ordered_json JsonErrors(const TuneRun& run) {
 ordered_json ToJson(const TuneRun& run, Timing timing) {
   ordered_json json = {{"schema", "gapscope.tune/1"},    {"optimizer", run.optimizer},
                        {"termination", run.termination}, {"starts_agree", run.starts_agree},
-                       {"starts", run.starts},           {"evaluations", run.evaluations},
-                       {"replays", run.replays}};
+                       {"starts", run.starts},           {"cost", run.cost},
+                       {"evaluations", run.evaluations}, {"replays", run.replays}};
   if (timing == Timing::kInclude) {
     json["wall_s"] = run.wall_s;
     json["solve_s"] = run.solve_s;

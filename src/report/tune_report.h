@@ -39,7 +39,9 @@ struct TuneRun {
   RunInfo info;
   std::string optimizer, termination;
   bool starts_agree = true;
-  std::size_t starts = 0, evaluations = 0, replays = 0;
+  std::size_t starts = 0;
+  double cost = 0;  // the least of all starts, of what the optimizer minimises
+  std::size_t evaluations = 0, replays = 0;
   double wall_s = 0, solve_s = 0;  // all; the optimiser alone
   std::vector<Parameter> parameters;
   std::vector<Flat> flat;

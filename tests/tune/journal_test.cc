@@ -39,6 +39,7 @@ class JournalTest : public ::testing::Test {
                         .resume = resume};
     options.solve.seed = seed;
     options.solve.max_iterations = 8;
+    options.solve.optimizer = optimizer_;
     return Tune(*rig_.model, SplitData(logs_, {}), rig_.model->Nominal(), options, pool);
   }
   // The whole result but the time that it took.
@@ -46,6 +47,7 @@ class JournalTest : public ::testing::Test {
     return ToJson(TuneRunOf(summary.value(), *rig_.model, 0), Timing::kLeaveOut).dump();
   }
 
+  std::string optimizer_ = "lm";
   std::filesystem::path folder_;
   Rig rig_;
   std::vector<Recording> logs_;
@@ -61,6 +63,17 @@ TEST_F(JournalTest, ResumedRunEndsInTheSameBytes) {
     ASSERT_TRUE(WriteFile(Path("cut"), bytes.substr(0, size)).ok());
     EXPECT_TRUE(whole == Bytes(Run(Path("cut"), true))) << "cut after " << size << " bytes";
     // What was lost has been written again.
+    EXPECT_TRUE(bytes == ReadFile(Path("cut")).value()) << "cut after " << size << " bytes";
+  }
+}
+
+TEST_F(JournalTest, RoundsOfNloptAreResumedToo) {
+  optimizer_ = "nlopt:slsqp";
+  const std::string whole = Bytes(Run(Path("journal"), false)), bytes = ReadFile(Path("journal")).value();
+  for (const double share : {0.3, 0.7, 1.0}) {
+    const auto size = static_cast<std::size_t>(share * static_cast<double>(bytes.size()));
+    ASSERT_TRUE(WriteFile(Path("cut"), bytes.substr(0, size)).ok());
+    EXPECT_TRUE(whole == Bytes(Run(Path("cut"), true))) << "cut after " << size << " bytes";
     EXPECT_TRUE(bytes == ReadFile(Path("cut")).value()) << "cut after " << size << " bytes";
   }
 }

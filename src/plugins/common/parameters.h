@@ -23,13 +23,36 @@ namespace gapscope::plugins {
 
 inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
+// What becomes of a parameter that two effects set.
+enum class Combine { kSum, kLower };
+// What a stage needs of the model beside its numbers.
+enum class Needs {
+  kNothing,
+  kHistory,     // room for past inputs: max_delay_s
+  kActivation,  // one of the first actuator's
+  kTurn,        // a computation after the drive's: an actuator of its own
+};
+
 // One parameter as its plugin's README lists it.
 struct ParameterSpec {
   const char* key;
   const char* unit;
   double neutral;  // the value at which its stage does nothing
   double min, max;
+  // For programs that build a model with it.
+  Combine combine = Combine::kSum;
+  Needs needs = Needs::kNothing;
+  const char* native = "";  // the joint's own field that does the same where nothing else is asked for; empty: none
+  bool remembers = false;   // a time over which the past acts on
 };
+
+// The spec of that key; null: there is none.
+inline const ParameterSpec* FindSpec(std::span<const ParameterSpec> specs, std::string_view key) {
+  for (const ParameterSpec& spec : specs) {
+    if (key == spec.key) return &spec;
+  }
+  return nullptr;
+}
 
 inline std::string InstanceName(const mjModel* m, int instance) {
   const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);

@@ -8,9 +8,6 @@
 namespace gapscope::plugins {
 namespace {
 
-constexpr double kInf = kUnlimited;
-constexpr const char* kName = "gapscope.friction";
-
 // The position of `dof` in row `row` of a sparse matrix, or -1.
 int FindColumn(const int* row_nonzeros, const int* row_address, const int* column, int row, int dof) {
   for (int i = row_address[row]; i < row_address[row] + row_nonzeros[row]; ++i) {
@@ -20,25 +17,6 @@ int FindColumn(const int* row_nonzeros, const int* row_address, const int* colum
 }
 
 }  // namespace
-
-const std::array<ParameterSpec, Friction::kKeyCount> Friction::kSpecs = {{
-    {"friction_n_m", "N m", 0, 0, kInf},
-    {"breakaway_n_m", "N m", 0, 0, kInf},
-    {"stribeck_speed_rad_per_s", "rad/s", 0.05, 0, kInf},
-    {"stribeck_exponent", "1", 2, 0.1, 20},
-    {"viscous_n_m_s_per_rad", "N m s/rad", 0, 0, kInf},
-    {"quadratic_n_m_s2_per_rad2", "N m s^2/rad^2", 0, 0, kInf},
-    {"load_coefficient", "1", 0, 0, kInf},
-    {"load_quadratic", "1/(N m)", 0, 0, kInf},
-    {"friction_positive_n_m", "N m", 0, 0, kInf},
-    {"friction_negative_n_m", "N m", 0, 0, kInf},
-    {"viscous_positive_n_m_s_per_rad", "N m s/rad", 0, 0, kInf},
-    {"viscous_negative_n_m_s_per_rad", "N m s/rad", 0, 0, kInf},
-    {"backdrive_factor", "1", 1, 0, kInf},
-    {"row_softness", "1", 1, 0.01, 1},
-    {"sigma0_n_m_per_rad", "N m/rad", 0, 0, kInf},
-    {"sigma1_n_m_s_per_rad", "N m s/rad", 0, 0, kInf},
-}};
 
 std::unique_ptr<Friction> Friction::Create(const mjModel* m, int instance) {
   auto friction = std::make_unique<Friction>();
@@ -296,7 +274,7 @@ void RegisterFriction() {
   }();
   mjpPlugin plugin;
   mjp_defaultPlugin(&plugin);
-  plugin.name = kName;
+  plugin.name = Friction::kName;
   plugin.nattribute = static_cast<int>(attributes.size());
   plugin.attributes = attributes.data();
   plugin.capabilityflags = mjPLUGIN_PASSIVE | mjPLUGIN_ACTUATOR;

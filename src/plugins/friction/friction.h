@@ -42,7 +42,25 @@ class Friction {
     kSigma1,
     kKeyCount
   };
-  static const std::array<ParameterSpec, kKeyCount> kSpecs;
+  static constexpr const char* kName = "gapscope.friction";
+  static constexpr std::array<ParameterSpec, kKeyCount> kSpecs = {{
+      {"friction_n_m", "N m", 0, 0, kUnlimited, Combine::kSum, Needs::kNothing, "frictionloss"},
+      {"breakaway_n_m", "N m", 0, 0, kUnlimited},
+      {"stribeck_speed_rad_per_s", "rad/s", 0.05, 0, kUnlimited},
+      {"stribeck_exponent", "1", 2, 0.1, 20},
+      {"viscous_n_m_s_per_rad", "N m s/rad", 0, 0, kUnlimited},
+      {"quadratic_n_m_s2_per_rad2", "N m s^2/rad^2", 0, 0, kUnlimited},
+      {"load_coefficient", "1", 0, 0, kUnlimited, Combine::kSum, Needs::kTurn},
+      {"load_quadratic", "1/(N m)", 0, 0, kUnlimited, Combine::kSum, Needs::kTurn},
+      {"friction_positive_n_m", "N m", 0, 0, kUnlimited},
+      {"friction_negative_n_m", "N m", 0, 0, kUnlimited},
+      {"viscous_positive_n_m_s_per_rad", "N m s/rad", 0, 0, kUnlimited},
+      {"viscous_negative_n_m_s_per_rad", "N m s/rad", 0, 0, kUnlimited},
+      {"backdrive_factor", "1", 1, 0, kUnlimited},
+      {"row_softness", "1", 1, 0.01, 1},
+      {"sigma0_n_m_per_rad", "N m/rad", 0, 0, kUnlimited},
+      {"sigma1_n_m_s_per_rad", "N m s/rad", 0, 0, kUnlimited},
+  }};
 
   // The torque that counts as transmitted: of the motor, or BAM's gearbox torque |motor - external|.
   enum class Load { kMotor, kGearbox };

@@ -251,10 +251,10 @@ void Motor::Advance(const mjModel*, mjData* d) const {
 void Motor::Register() {
   mjpPlugin plugin;
   mjp_defaultPlugin(&plugin);
-  plugin.name = "gapscope.motor";
+  plugin.name = kMotorName;
   plugin.capabilityflags = mjPLUGIN_ACTUATOR;
-  plugin.nattribute = kMotorAttributeCount;
-  plugin.attributes = kMotorAttributes;
+  plugin.nattribute = static_cast<int>(MotorAttributes().size());
+  plugin.attributes = MotorAttributes().data();
   plugin.nstate = +[](const mjModel* m, int instance) { return MotorStateSize(m, instance); };
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     std::string problem;

@@ -12,14 +12,6 @@ namespace {
 
 constexpr const char* kRoleNames[kRoles] = {"target",  "velocity",    "torque", "current",
                                             "voltage", "feedforward", "supply", "enable"};
-struct LawName {
-  const char* name;
-  MotorLaw law;
-  MotorRole command;
-};
-constexpr LawName kLaws[] = {{"position", MotorLaw::kPosition, kTarget}, {"torque", MotorLaw::kTorque, kTorque},
-                             {"current", MotorLaw::kCurrent, kCurrent},  {"voltage", MotorLaw::kVoltage, kVoltage},
-                             {"duty", MotorLaw::kDuty, kTarget},         {"affine", MotorLaw::kAffine, kTarget}};
 
 // The default of `max_delay_s`, and how much finer than the model's own a time step may be by default.
 constexpr double kDefaultMaxDelay_s = 0.05;
@@ -75,92 +67,22 @@ bool Numbers(std::string_view text, std::vector<double>* values) {
 
 }  // namespace
 
-const std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
-    {"kp", "N m/rad", 0, 0, 1e9},
-    {"kd", "N m s/rad", 0, 0, 1e9},
-    {"gain", "1", 1, -1e9, 1e9},
-    {"bias0", "N m", 0, -1e9, 1e9},
-    {"bias1", "N m/rad", 0, -1e9, 1e9},
-    {"bias2", "N m s/rad", 0, -1e9, 1e9},
-    {"kt", "N m/A", 0, 0, 1e6},
-    {"ke", "V s/rad", 0, 0, 1e6},
-    {"resistance", "ohm", 1, 1e-9, 1e9},
-    {"gear", "1", 1, -1e6, 1e6},
-    {"efficiency_drive", "1", 1, 0, 1},
-    {"efficiency_backdrive", "1", 1, 0, 10},
-    {"duty_gain", "1/rad", 0, 0, 1e9},
-    {"duty_damping", "s/rad", 0, 0, 1e9},
-    {"duty_limit", "1", 1, 0, 1e9},
-    {"supply_v", "V", 0, 0, 1e6},
-    {"command_delay_s", "s", 0, 0, 10},
-    {"torque_delay_s", "s", 0, 0, 10},
-    {"time_constant_s", "s", 0, 0, 1e6},
-    {"second_time_constant_s", "s", 0, 0, 1e6},
-    {"dead_zone", "command or N m", 0, 0, 1e9},
-    {"torque_limit_n_m", "N m", 0, 0, 1e9},
-    {"power_w", "W", 0, 0, 1e12},
-    {"generating_power_w", "W", 0, 0, 1e12},
-    {"peak_torque_n_m", "N m", 0, 0, 1e9},
-    {"rated_speed_rad_per_s", "rad/s", 0, 0, 1e9},
-    {"no_load_speed_rad_per_s", "rad/s", 0, 0, 1e9},
-    {"generating_factor", "1", 1, 0, 1e6},
-    {"sag_fraction", "1", 0, 0, 100},
-    {"sag_time_constant_s", "s", 0.3, 0, 1e6},
-    {"droop_at_peak", "1", 0, 0, 1},
-    {"droop_reference_n_m", "N m", 1, 1e-12, 1e9},
-    {"droop_exponent", "1", 1, 0.1, 10},
-    {"asymmetry", "1", 0, -1, 1},
-    {"command_asymmetry", "1", 0, -1, 1},
-    {"limit_softness", "1", 0, 0, 1},
-}};
-
-const char* const kMotorAttributes[] = {"law",
-                                        "inputs",
-                                        "dead_zone_on",
-                                        "max_delay_s",
-                                        "min_timestep_s",
-                                        "speed_table",
-                                        "torque_table",
-                                        "generating_torque_table",
-                                        "table_interpolation",
-                                        "kp",
-                                        "kd",
-                                        "gain",
-                                        "bias0",
-                                        "bias1",
-                                        "bias2",
-                                        "kt",
-                                        "ke",
-                                        "resistance",
-                                        "gear",
-                                        "efficiency_drive",
-                                        "efficiency_backdrive",
-                                        "duty_gain",
-                                        "duty_damping",
-                                        "duty_limit",
-                                        "supply_v",
-                                        "command_delay_s",
-                                        "torque_delay_s",
-                                        "time_constant_s",
-                                        "second_time_constant_s",
-                                        "dead_zone",
-                                        "torque_limit_n_m",
-                                        "power_w",
-                                        "generating_power_w",
-                                        "peak_torque_n_m",
-                                        "rated_speed_rad_per_s",
-                                        "no_load_speed_rad_per_s",
-                                        "generating_factor",
-                                        "sag_fraction",
-                                        "sag_time_constant_s",
-                                        "droop_at_peak",
-                                        "droop_reference_n_m",
-                                        "droop_exponent",
-                                        "asymmetry",
-                                        "command_asymmetry",
-                                        "limit_softness"};
-const int kMotorAttributeCount = static_cast<int>(std::size(kMotorAttributes));
-static_assert(std::size(kMotorAttributes) == kMotorParameters + 9);
+std::span<const char* const> MotorAttributes() {
+  static const std::vector<const char*> attributes = [] {
+    std::vector<const char*> all = {"law",
+                                    "inputs",
+                                    "dead_zone_on",
+                                    "max_delay_s",
+                                    "min_timestep_s",
+                                    "speed_table",
+                                    "torque_table",
+                                    "generating_torque_table",
+                                    "table_interpolation"};
+    for (const ParameterSpec& spec : kMotorSpecs) all.push_back(spec.key);
+    return all;
+  }();
+  return attributes;
+}
 
 int MotorStateSize(const mjModel* m, int instance) {
   const double max_delay = MaxDelay(m, instance);
@@ -178,10 +100,7 @@ int MotorStateSize(const mjModel* m, int instance) {
 std::string MotorConfig::Parse(const mjModel* m, int instance) {
   // Law and inputs.
   const std::string_view law_text = ConfigText(m, instance, "law");
-  const LawName* chosen = nullptr;
-  for (const LawName& candidate : kLaws) {
-    if (law_text == candidate.name || (law_text.empty() && candidate.law == law)) chosen = &candidate;
-  }
+  const LawTraits* chosen = FindLaw(law_text);
   if (!chosen) {
     return Bad(m, instance, "law", law_text, "position, torque, current, voltage, duty, affine");
   }

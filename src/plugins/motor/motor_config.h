@@ -5,17 +5,14 @@
 #include <mujoco/mujoco.h>
 
 #include <array>
+#include <span>
 #include <string>
 
 #include "src/plugins/common/parameters.h"
+#include "src/plugins/motor/law.h"
 #include "src/plugins/motor/stages.h"
 
 namespace gapscope::plugins {
-
-enum class MotorLaw { kPosition, kTorque, kCurrent, kVoltage, kDuty, kAffine };
-
-// What an actuator of the instance carries.
-enum MotorRole { kTarget, kVelocity, kTorque, kCurrent, kVoltage, kFeedforward, kSupply, kEnable, kRoles };
 
 // Live parameters; units, neutral values and ranges in kMotorSpecs, meaning in README.md.
 enum MotorParameter {
@@ -57,11 +54,47 @@ enum MotorParameter {
   kLimitSoftness,
   kMotorParameters
 };
-extern const std::array<ParameterSpec, kMotorParameters> kMotorSpecs;
+inline constexpr std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
+    {"kp", "N m/rad", 0, 0, 1e9},
+    {"kd", "N m s/rad", 0, 0, 1e9},
+    {"gain", "1", 1, -1e9, 1e9},
+    {"bias0", "N m", 0, -1e9, 1e9},
+    {"bias1", "N m/rad", 0, -1e9, 1e9},
+    {"bias2", "N m s/rad", 0, -1e9, 1e9},
+    {"kt", "N m/A", 0, 0, 1e6},
+    {"ke", "V s/rad", 0, 0, 1e6},
+    {"resistance", "ohm", 1, 1e-9, 1e9},
+    {"gear", "1", 1, -1e6, 1e6},
+    {"efficiency_drive", "1", 1, 0, 1},
+    {"efficiency_backdrive", "1", 1, 0, 10},
+    {"duty_gain", "1/rad", 0, 0, 1e9},
+    {"duty_damping", "s/rad", 0, 0, 1e9},
+    {"duty_limit", "1", 1, 0, 1e9},
+    {"supply_v", "V", 0, 0, 1e6},
+    {"command_delay_s", "s", 0, 0, 10, Combine::kSum, Needs::kHistory},
+    {"torque_delay_s", "s", 0, 0, 10, Combine::kSum, Needs::kHistory},
+    {"time_constant_s", "s", 0, 0, 1e6, Combine::kSum, Needs::kActivation, "", true},
+    {"second_time_constant_s", "s", 0, 0, 1e6, Combine::kSum, Needs::kActivation, "", true},
+    {"dead_zone", "command or N m", 0, 0, 1e9},
+    {"torque_limit_n_m", "N m", 0, 0, 1e9, Combine::kLower},
+    {"power_w", "W", 0, 0, 1e12, Combine::kLower},
+    {"generating_power_w", "W", 0, 0, 1e12, Combine::kLower},
+    {"peak_torque_n_m", "N m", 0, 0, 1e9, Combine::kLower},
+    {"rated_speed_rad_per_s", "rad/s", 0, 0, 1e9},
+    {"no_load_speed_rad_per_s", "rad/s", 0, 0, 1e9},
+    {"generating_factor", "1", 1, 0, 1e6},
+    {"sag_fraction", "1", 0, 0, 100, Combine::kSum, Needs::kActivation},
+    {"sag_time_constant_s", "s", 0.3, 0, 1e6, Combine::kSum, Needs::kNothing, "", true},
+    {"droop_at_peak", "1", 0, 0, 1},
+    {"droop_reference_n_m", "N m", 1, 1e-12, 1e9},
+    {"droop_exponent", "1", 1, 0.1, 10},
+    {"asymmetry", "1", 0, -1, 1},
+    {"command_asymmetry", "1", 0, -1, 1},
+    {"limit_softness", "1", 0, 0, 1},
+}};
 
-// All attributes that `<config>` may hold.
-extern const char* const kMotorAttributes[];
-extern const int kMotorAttributeCount;
+// All attributes that `<config>` may hold: structure, and the keys of kMotorSpecs.
+std::span<const char* const> MotorAttributes();
 
 struct MotorConfig {
   MotorLaw law = MotorLaw::kPosition;

@@ -7,26 +7,6 @@
 #include "src/plugins/common/refusal.h"
 
 namespace gapscope::plugins {
-namespace {
-constexpr double kInf = kUnlimited;
-}  // namespace
-
-const std::array<ParameterSpec, Spring::kKeyCount> Spring::kSpecs = {{
-    {"stiffness_n_m_per_rad", "N m/rad", 0, 0, kInf},
-    {"rest_rad", "rad", 0, -kInf, kInf},
-    {"hysteresis_n_m", "N m", 0, 0, kInf},
-    {"hysteresis_rad", "rad", 0.05, 0, kInf},
-    {"cubic_n_m_per_rad3", "N m/rad^3", 0, -kInf, kInf},
-    {"gravity_n_m", "N m", 0, -kInf, kInf},
-    {"gravity_rest_rad", "rad", 0, -kInf, kInf},
-    {"bias_n_m", "N m", 0, -kInf, kInf},
-    {"cogging_n_m", "N m", 0, -kInf, kInf},
-    {"cogging_periods_per_rev", "1", 12, 0, kInf},
-    {"cogging_phase_rad", "rad", 0, -kInf, kInf},
-    {"cogging_second_n_m", "N m", 0, -kInf, kInf},
-    {"cogging_second_phase_rad", "rad", 0, -kInf, kInf},
-}};
-
 std::unique_ptr<Spring> Spring::Create(const mjModel* m, int instance) {
   auto spring = std::make_unique<Spring>();
   const std::string structure = spring->ResolveStructure(m, instance);
@@ -101,7 +81,7 @@ void RegisterSpring() {
   }();
   mjpPlugin plugin;
   mjp_defaultPlugin(&plugin);
-  plugin.name = "gapscope.spring";
+  plugin.name = Spring::kName;
   plugin.nattribute = static_cast<int>(attributes.size());
   plugin.attributes = attributes.data();
   plugin.capabilityflags = mjPLUGIN_PASSIVE;

@@ -36,7 +36,22 @@ class Spring {
     kCoggingSecondPhase,
     kKeyCount
   };
-  static const std::array<ParameterSpec, kKeyCount> kSpecs;
+  static constexpr const char* kName = "gapscope.spring";
+  static constexpr std::array<ParameterSpec, kKeyCount> kSpecs = {{
+      {"stiffness_n_m_per_rad", "N m/rad", 0, 0, kUnlimited, Combine::kSum, Needs::kNothing, "stiffness"},
+      {"rest_rad", "rad", 0, -kUnlimited, kUnlimited, Combine::kSum, Needs::kNothing, "springref"},
+      {"hysteresis_n_m", "N m", 0, 0, kUnlimited},
+      {"hysteresis_rad", "rad", 0.05, 0, kUnlimited},
+      {"cubic_n_m_per_rad3", "N m/rad^3", 0, -kUnlimited, kUnlimited},
+      {"gravity_n_m", "N m", 0, -kUnlimited, kUnlimited},
+      {"gravity_rest_rad", "rad", 0, -kUnlimited, kUnlimited},
+      {"bias_n_m", "N m", 0, -kUnlimited, kUnlimited},
+      {"cogging_n_m", "N m", 0, -kUnlimited, kUnlimited},
+      {"cogging_periods_per_rev", "1", 12, 0, kUnlimited},
+      {"cogging_phase_rad", "rad", 0, -kUnlimited, kUnlimited},
+      {"cogging_second_n_m", "N m", 0, -kUnlimited, kUnlimited},
+      {"cogging_second_phase_rad", "rad", 0, -kUnlimited, kUnlimited},
+  }};
   static constexpr int kStateSize = sizeof(BristleState) / sizeof(mjtNum);
 
   // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model does nothing.

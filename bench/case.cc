@@ -46,7 +46,7 @@ Result<Case> MakeCase(const std::string& rig, double duration_s) {
   GS_ASSIGN(const Experiment experiment,
             LoadExperiment(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/experiment.yaml"));
   Case made{.rig = rig};
-  GS_ASSIGN(made.model, Model::Build(experiment));
+  GS_ASSIGN(made.model, Model::Load(experiment));
   made.time_step_s = made.model->compiled().opt.timestep;
   made.values = made.model->Nominal();
 

@@ -124,9 +124,6 @@ Simulator::Simulator(const Model& model, double max_step_s)
     mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
     if (solref[0] == -1) solref[1] = -0.9999 / max_step_s_;
   }
-  for (std::size_t i = 0; i < model.parameters().size(); ++i) {
-    if (model.parameters()[i].name.find("time_constant_s") != std::string::npos) time_constants_.push_back(i);
-  }
   // A motor's other inputs (supply, enable) are no commands to move: the first one is.
   for (const auto& command : model.experiment().commands) {
     const int actuator = mj_name2id(mujoco_.get(), mjOBJ_ACTUATOR, command.actuator.c_str()),
@@ -278,9 +275,9 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
 }
 
 double Simulator::Past() const {
-  double past_s = mujoco_->na > 0 && time_constants_.empty() ? kPreRoll_s : kHistory_s;
+  double past_s = mujoco_->na > 0 && model_.memories().empty() ? kPreRoll_s : kHistory_s;
   if (!apart_.empty()) past_s = std::max(past_s, kTransmission_s);
-  for (const std::size_t i : time_constants_)
+  for (const int i : model_.memories())
     past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
   return std::max(past_s, command_delay_s_);
 }

@@ -9,6 +9,7 @@
 #include "src/core/mujoco_handles.h"
 #include "src/experiment/recording.h"
 #include "src/model/model.h"
+#include "src/model/parameter_writer.h"
 
 namespace gapscope {
 
@@ -82,7 +83,6 @@ class Simulator {
   double max_step_s_;
   double shift_s_ = 0, command_delay_s_ = 0;
   bool reads_torque_ = false;
-  std::vector<std::size_t> time_constants_;  // parameters
   bool remembers_ = false;                   // has states beside position and speed
   std::vector<std::pair<double, double>>
       apart_;  // per mirrored joint: angle and speed beside its load at the start of a run

@@ -80,7 +80,7 @@ Result<Rig> LoadRig(const RigFlags& flags) {
   Rig rig;
   GS_ASSIGN(const Experiment experiment, LoadExperiment(flags.experiment));
   rig.experiment = WithLimitSignals(experiment);
-  GS_ASSIGN(rig.model, Model::Build(rig.experiment));
+  GS_ASSIGN(rig.model, Model::Load(rig.experiment));
   rig.values = rig.model->Nominal();
   std::vector<std::string> base;
   for (const auto& text : flags.set) {
@@ -186,10 +186,10 @@ Result<ScaleTable> ScalesOf(const Rig& rig, double duration_s) {
 // A rival: the base model and one effect, at --set's values or else at a typical size.
 Result<Hypothesis> MakeRival(const Rig& rig, const EffectUse& use, const ScaleTable& scales, const RigFlags& flags,
                              std::vector<std::string>* assumed) {
-  GS_ASSIGN(const auto model, Model::Build(rig.experiment, {use}, scales));
+  GS_ASSIGN(const auto model, Model::Build(rig.model->rig(), {use}, scales));
   std::vector<double> values = model->Nominal();
   std::copy(rig.values.begin(), rig.values.end(), values.begin());
-  GS_ASSIGN(const auto placed, rig.model->EffectParameters(use, scales));
+  const auto placed = PlacedParameters(use, *rig.model->rig(), scales);
   for (const auto& p : placed) {
     GS_ASSIGN(const int index, model->Find(p.name, use.Text()));
     values[index] = p.trials.empty() ? p.start : p.trials[p.trials.size() / 2];
@@ -266,7 +266,7 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
         rivals.push_back(base);
         continue;
       }
-      GS_ASSIGN(const auto uses, rig.model->ParseEffects({text}));
+      GS_ASSIGN(const auto uses, ParseEffects({text}, *rig.model->rig()));
       for (const auto& other : rivals) {
         if (other.name == uses.front().Text())
           return Error{.what = "the effect stands twice", .where = "--separate " + text};

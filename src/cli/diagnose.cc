@@ -24,7 +24,7 @@ struct DiagnoseFlags {
 Status WriteDiagnosis(const std::string& out, const Experiment& experiment, const DataSplit& data,
                       const std::map<std::string, double>& log_values, const DiagnoseRun& run, ThreadPool& pool) {
   const Diagnosis& diagnosis = run.diagnosis;
-  GS_ASSIGN(const auto base, Model::Build(experiment));
+  GS_ASSIGN(const auto base, Model::Build(diagnosis.model->rig()));
   RunFiles files;
   GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
   const ReportLogs logs{data.train, data.held_out};

@@ -39,7 +39,7 @@ Result<std::complex<double>> ParsePole(const std::string& text) {
 
 Result<int> RunFeedback(const FeedbackFlags& flags) {
   GS_ASSIGN(const Experiment experiment, LoadExperiment(flags.experiment));
-  GS_ASSIGN(const auto model, Model::Build(experiment));
+  GS_ASSIGN(const auto model, Model::Load(experiment));
   std::vector<double> values = model->Nominal();
   GS_RETURN_IF_ERROR(OverrideValues(*model, flags.params, flags.set, &values));
   std::map<std::string, double> at, log_values;

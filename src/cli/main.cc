@@ -8,7 +8,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
-#include "src/core/units.h"
+#include "src/core/names.h"
 #include "src/report/version.h"
 
 int main(int argc, char** argv) {

@@ -67,7 +67,7 @@ Result<std::vector<VideoModel>> ModelsOf(const RenderFlags& flags, const Session
   std::vector<VideoModel> models;
   for (const auto& text : flags.compare) {
     if (text == "nominal") {
-      GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
+      GS_ASSIGN(const auto nominal, Model::Build(session.model->rig()));
       models.push_back({"nominal", nominal, nominal->Nominal()});
       continue;
     }

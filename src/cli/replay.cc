@@ -50,7 +50,7 @@ double OtherError(const Session& session, ReplayOptions options, double time_ste
 // What the effects and values given here are worth: the nominal model's replay beside theirs. Empty: none are given.
 Result<std::vector<LogReplay>> ReplayNominal(const Session& session, ReplayOptions options,
                                              const std::optional<ControllerSpec>& controller) {
-  GS_ASSIGN(const auto nominal, Model::Build(session.experiment));
+  GS_ASSIGN(const auto nominal, Model::Build(session.model->rig()));
   options.values = nominal->Nominal();
   if (session.model->effects().empty() && session.values == options.values) return std::vector<LogReplay>{};
   GS_ASSIGN(ClosedLoopResult replayed, ReplayLogs(*nominal, session, options, controller));

@@ -13,9 +13,9 @@ Result<ResultModel> LoadResultModel(const Experiment& experiment, const std::str
   std::vector<std::string> texts;
   for (const auto& use : held.effects) texts.push_back(use.Text());
   ResultModel result;
-  GS_ASSIGN(result.model, Model::Build(experiment));
-  GS_ASSIGN(const auto uses, result.model->ParseEffects(texts));
-  GS_ASSIGN(result.model, Model::Build(experiment, uses, scales));
+  GS_ASSIGN(result.model, Model::Load(experiment));
+  GS_ASSIGN(const auto uses, ParseEffects(texts, *result.model->rig()));
+  GS_ASSIGN(result.model, Model::Build(result.model->rig(), uses, scales));
   result.values = result.model->Nominal();
   for (const auto& [name, value] : held.values) {
     if (!std::isfinite(value)) return Error{.what = "the value of '" + name + "' is no number", .where = path};

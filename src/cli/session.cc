@@ -11,6 +11,8 @@
 #include <optional>
 #include <set>
 
+#include "src/core/names.h"
+
 namespace gapscope::cli {
 
 namespace {
@@ -72,7 +74,8 @@ void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects) {
 
 void AddEffectFlags(CLI::App& command, ModelFlags& flags) {
   AddWhileFlag(command, flags);
-  command.add_option("--with", flags.with, "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL]")->allow_extra_args(false);
+  command.add_option("--with", flags.with, "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL], of " + Join(EffectNames()))
+      ->allow_extra_args(false);
   command.add_option("--set", flags.set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
   command.add_option("--params", flags.params, "YAML file of parameter values")->allow_extra_args(false);
 }
@@ -127,11 +130,11 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
   GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));
   if (!flags.while_column.empty()) session.experiment.replay.while_column = flags.while_column;
   GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
-  GS_ASSIGN(session.model, Model::Build(session.experiment));
+  GS_ASSIGN(session.model, Model::Load(session.experiment));
   if (!flags.with.empty()) {
     session.scales = EstimateScales(*session.model, session.recordings);
-    GS_ASSIGN(const std::vector<EffectUse> uses, session.model->ParseEffects(flags.with));
-    GS_ASSIGN(session.model, Model::Build(session.experiment, uses, session.scales));
+    GS_ASSIGN(const std::vector<EffectUse> uses, ParseEffects(flags.with, *session.model->rig()));
+    GS_ASSIGN(session.model, Model::Build(session.model->rig(), uses, session.scales));
   }
   session.values = session.model->Nominal();
   GS_RETURN_IF_ERROR(OverrideValues(*session.model, flags.params, flags.set, &session.values));

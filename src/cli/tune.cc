@@ -25,21 +25,10 @@ struct TuneFlags {
   bool resume = false, actuator = false;
 };
 
-// The stages that an actuator model is made of, where the model does not have them already.
-const std::vector<std::string> kActuatorEffects = {"command_delay", "actuator_lag", "torque_speed_curve",
-                                                   "load_friction"};
-
-// The model that --actuator asks for: with those stages, and with dry friction, where they make sense.
+// The model that --actuator asks for.
 Status AddActuatorEffects(const TuneFlags& flags, ModelFlags* model) {
   GS_ASSIGN(const Session base, LoadSession(*model, flags.common));
-  GS_ASSIGN(const auto possible, base.model->PossibleEffects());
-  std::vector<std::string> names = kActuatorEffects;
-  names.push_back("coulomb_friction");
-  for (const auto& name : names) {
-    const auto found =
-        std::find_if(possible.begin(), possible.end(), [&](const EffectUse& use) { return use.effect == name; });
-    if (found != possible.end()) model->with.push_back(found->Text());
-  }
+  for (const EffectUse& use : ActuatorModel(*base.model->rig())) model->with.push_back(use.Text());
   return Ok();
 }
 

@@ -1,12 +1,12 @@
 #include "src/core/units.h"
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <map>
 #include <numbers>
 #include <vector>
+
+#include "src/core/names.h"
 
 namespace gapscope {
 namespace {
@@ -33,23 +33,6 @@ const std::map<std::string, Unit, std::less<>>& Table() {
 
 }  // namespace
 
-std::size_t EditDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      const bool same =
-          std::tolower(static_cast<unsigned char>(a[i - 1])) == std::tolower(static_cast<unsigned char>(b[j - 1]));
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (same ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
-
 Result<Unit> ParseUnit(std::string_view text) {
   if (const auto found = Table().find(text); found != Table().end()) return found->second;
   // "counts/2048": an encoder of 2048 counts per revolution.
@@ -59,13 +42,9 @@ Result<Unit> ParseUnit(std::string_view text) {
   }
   std::vector<std::string> names;
   for (const auto& [name, unit] : Table()) names.push_back(name);
-  const std::string nearest = Nearest(text, names);
-  std::string allowed;
-  for (const auto& name : names) allowed += (allowed.empty() ? "" : ", ") + name;
-  return Error{.what = "unknown unit",
-               .actual = "'" + std::string(text) + "'",
-               .allowed = allowed + ", counts/<per revolution>",
-               .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+  Error error = NoSuch("unknown unit", std::string(text), names, "");
+  error.allowed += ", counts/<per revolution>";
+  return error;
 }
 
 }  // namespace gapscope

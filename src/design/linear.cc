@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/core/units.h"
+#include "src/core/names.h"
+#include "src/model/parameter_writer.h"
 
 namespace gapscope {
 namespace {
@@ -73,13 +74,7 @@ Result<LinearSystem> Linearize(const Model& model, const std::vector<double>& va
   }
   for (const auto& [name, value] : at) {
     const auto found = std::find(names.begin(), names.end(), name);
-    if (found == names.end()) {
-      const std::string nearest = Nearest(name, names);
-      return Error{.what = "no such joint",
-                   .where = "--at",
-                   .actual = "'" + name + "'",
-                   .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
-    }
+    if (found == names.end()) return NoSuch("no such joint", name, names, "--at");
     pose[static_cast<std::size_t>(m->jnt_qposadr[found - names.begin()])] = value;
   }
   const Eigen::Index n = m->nv;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "src/core/units.h"
+#include "src/core/names.h"
 
 namespace gapscope {
 namespace {
@@ -67,10 +67,7 @@ Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalO
   for (const auto& command : experiment.commands) names.push_back(command.actuator);
   for (const auto& [name, value] : options.hold) {
     if (std::find(names.begin(), names.end(), name) == names.end())
-      return Error{.what = "no command drives that actuator",
-                   .where = "--hold",
-                   .actual = "'" + name + "'",
-                   .cure = "did you mean '" + Nearest(name, names) + "'?"};
+      return NoSuch("no command drives that actuator", name, names, "--hold");
   }
   for (const auto& limit : experiment.limits) {
     if (!limit.actuator.empty() && std::find(names.begin(), names.end(), limit.actuator) == names.end()) {
@@ -83,10 +80,7 @@ Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalO
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == options.actuator) return i;
   }
-  return Error{.what = "no command drives that actuator",
-               .where = "--actuator",
-               .actual = "'" + options.actuator + "'",
-               .cure = "did you mean '" + Nearest(options.actuator, names) + "'?"};
+  return NoSuch("no command drives that actuator", options.actuator, names, "--actuator");
 }
 
 Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions& options,

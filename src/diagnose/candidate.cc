@@ -13,9 +13,8 @@ namespace {
 
 bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
   if (candidate.effects.empty()) return false;
-  const auto placed = candidate.model->EffectParameters(candidate.effects.back(), bench.scales);
-  if (!placed.ok()) return false;
-  return std::any_of(placed.value().begin(), placed.value().end(), [&](const PlacedParameter& p) {
+  const auto placed = PlacedParameters(candidate.effects.back(), *bench.rig, bench.scales);
+  return std::any_of(placed.begin(), placed.end(), [&](const PlacedParameter& p) {
     const bool shape = p.trials.empty();  // what was not screened, the logs hardly know
     return !shape && IsStretched(p, candidate.values[candidate.model->IndexOf(p.name)]);
   });
@@ -61,13 +60,13 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
 
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects) {
   Candidate candidate{.effects = effects};
-  GS_ASSIGN(candidate.model, Model::Build(bench.experiment, effects, bench.scales));
+  GS_ASSIGN(candidate.model, Model::Build(bench.rig, effects, bench.scales));
   candidate.values = candidate.model->Nominal();
   candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train,
                                                    bench.Options(*candidate.model, true), candidate.values, bench.pool);
   for (const auto& use : effects) {
-    GS_ASSIGN(const auto placed, candidate.model->EffectParameters(use, bench.scales));
-    for (const auto& p : placed) candidate.parameters += !p.shape;
+    for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales))
+      candidate.parameters += p.role != ParameterRole::kShape;
   }
   return candidate;
 }

@@ -34,7 +34,7 @@ struct Candidate {
 
 // What all candidates share.
 struct Workbench {
-  const Experiment& experiment;
+  std::shared_ptr<const Rig> rig;
   const DataSplit& data;
   const ScaleTable& scales;
   ThreadPool& pool;

@@ -112,16 +112,15 @@ Result<std::vector<FoundEffect>> DescribeEffects(const SearchResult& found, cons
   const double gap = base.held_out_error - chosen.held_out_error;
   for (std::size_t e = 0; e < chosen.effects.size(); ++e) {
     const EffectUse& use = chosen.effects[e];
-    GS_ASSIGN(const Effect* entry, chosen.model->EffectAt(use));
+    const Effect& entry = EffectOf(use, *chosen.model->rig());
     FoundEffect effect{.use = use,
-                       .meaning = entry->meaning,
-                       .signature = entry->signature,
+                       .meaning = entry.meaning,
+                       .signature = entry.signature,
                        .probability = probability(use),
                        .error_before = base.held_out_error,
                        .error_after = chosen.held_out_error,
                        .share_of_gap = 1};
-    GS_ASSIGN(const auto placed, chosen.model->EffectParameters(use, scales));
-    for (const auto& p : placed) {
+    for (const auto& p : PlacedParameters(use, *chosen.model->rig(), scales)) {
       for (const auto& tuned : uncertainty.tuned) {
         if (chosen.model->parameters()[tuned.index].name == p.name)
           effect.parameters.push_back({p.key, p.unit, tuned.value, tuned.low, tuned.high});
@@ -242,7 +241,7 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   }
   result.candidates = DescribeCandidates(found, judgement);
   result.seconds = DescribeSeconds(found);
-  SuggestNext(found, bench.experiment.path, &result);
+  SuggestNext(found, bench.rig->experiment().path, &result);
   result.where = Locate(base, bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);
   result.budget_spent = found.budget_spent;
@@ -283,10 +282,10 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   }
   if (data.train.empty() || data.held_out.empty())
     return Error{.what = "diagnosis needs logs to fit and logs to judge by", .where = experiment.path};
-  GS_ASSIGN(const auto model, Model::Build(experiment));
+  GS_ASSIGN(const auto model, Model::Load(experiment));
   const ScaleTable scales = EstimateScales(*model, fine.train);
   const std::vector<double> noise = SignalNoise(experiment, fine);
-  Workbench bench{.experiment = experiment,
+  Workbench bench{.rig = model->rig(),
                   .data = data,
                   .scales = scales,
                   .pool = pool,
@@ -315,7 +314,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
               [](const Recording& a, const Recording& b) { return a.log_path < b.log_path; });
     blocks.held_out = blocks.train;
     blocks.how = "every third window of each log: only some logs show the gap";
-    Workbench again{.experiment = experiment,
+    Workbench again{.rig = model->rig(),
                     .data = blocks,
                     .scales = scales,
                     .pool = pool,

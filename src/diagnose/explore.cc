@@ -127,10 +127,8 @@ void Refit(const Workbench& bench, const Candidate& parent, const Say& say, Laye
 void Explore(const Workbench& bench, const Candidate& base, Candidate& parent, std::size_t refits, double share,
              const Say& say, Layer* layer, const Candidates* singles) {
   const Workbench hurried = Hurried(bench, share);
-  const auto possible = parent.model->PossibleEffects();
-  if (!possible.ok()) return;
   std::vector<EffectUse> uses;
-  for (const auto& use : possible.value()) {
+  for (const auto& use : AllUses(*bench.rig)) {
     if (IsFinding(use, *base.model)) uses.push_back(use);
   }
   layer->screen = Screen(bench, parent, uses);

@@ -78,10 +78,8 @@ void FinishChild(const Workbench& bench, const Candidate& parent, const EffectUs
   if (!child->converged && !(child->train_cost > kFarBehind * best_cost))
     FitCandidate(bench, child, child->point, kFirstIterations, kFirstTolerance, FarBehind(best_cost));
   if (child->train_cost <= parent.train_cost * 1.0005 || bench.Late()) return;
-  const auto placed = child->model->EffectParameters(use, bench.scales);
-  if (!placed.ok()) return;
   std::vector<double> neutral = trial.values;
-  for (const auto& p : placed.value())
+  for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales))
     neutral[child->model->IndexOf(p.name)] = p.neutral + 0.02 * ((p.neutral == p.high ? p.low : p.high) - p.neutral);
   TryStart(bench, child, CarryOver(*parent.problem, parent.point, *child->problem, neutral), kFirstIterations,
            kFirstTolerance);
@@ -114,37 +112,10 @@ void ImitateLeader(const Workbench& bench, Candidate& parent, Layer* layer) {
   }
 }
 
-namespace {
-
-// A ceiling that falls starts from where a fixed one ended: a little higher, falling by a third, fast or slowly.
-void StartSagFromLimit(const Workbench& bench, const Candidate& limit, Layer* layer) {
-  constexpr double kHigher = 1.2, kFalls = 0.3;
-  const std::string on = limit.effects.back().on;
-  for (const auto& sag : layer->children) {
-    if (sag->effects.back() != EffectUse{"supply_sag", on}) continue;
-    for (const double time_constant_s : {0.15, 0.8}) {
-      if (bench.Late()) return;
-      std::vector<double> values = sag->model->Nominal();
-      const auto set = [&](const char* key, double value) {
-        values[sag->model->IndexOf("supply_sag@" + on + "." + key)] = value;
-      };
-      set("time_constant_s", time_constant_s);
-      set("sag_fraction", kFalls);
-      set("limit_n_m", kHigher * limit.values[limit.model->IndexOf("torque_limit@" + on + ".limit_n_m")]);
-      TryStart(bench, sag.get(), CarryOver(*limit.problem, limit.point, *sag->problem, values), kFirstIterations,
-               kFirstTolerance);
-    }
-    ScoreCandidate(bench, sag.get());
-  }
-}
-
-}  // namespace
-
 void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candidate) {
-  const auto placed = candidate->model->EffectParameters(candidate->effects.back(), bench.scales);
-  if (!placed.ok()) return;
+  const auto placed = PlacedParameters(candidate->effects.back(), *bench.rig, bench.scales);
   constexpr double kFar = 4;  // times the value found
-  for (const auto& p : placed.value()) {
+  for (const auto& p : placed) {
     if (!(p.low < p.high)) continue;
     const int index = candidate->model->IndexOf(p.name);
     std::vector<double> values = candidate->values;
@@ -155,14 +126,14 @@ void VaryShape(const Workbench& bench, const Candidate& parent, Candidate* candi
       values[index] = found > middle ? p.low + 0.4 * (middle - p.low) : middle + 0.4 * (p.high - middle);
       if (!bench.Late())
         TryStart(bench, candidate, candidate->problem->At(values, candidate->point), kFirstIterations, kFirstTolerance);
-    } else if (placed.value().front().name == p.name && p.trials.size() < kScan) {
+    } else if (placed.front().name == p.name && p.trials.size() < kScan) {
       // Of another order of size, from the parent: with this one the base parameters may have gone where no step leads
       // back.
       for (const double trial : p.trials) {
         const double ratio = trial / candidate->values[index];
         if (bench.Late() || (ratio > 1 / kFar && ratio < kFar)) continue;
         values = candidate->model->Nominal();
-        for (const auto& q : placed.value()) values[candidate->model->IndexOf(q.name)] = q.start;
+        for (const auto& q : placed) values[candidate->model->IndexOf(q.name)] = q.start;
         values[index] = trial;
         TryStart(bench, candidate, CarryOver(*parent.problem, parent.point, *candidate->problem, values),
                  kTasteIterations, kFirstTolerance);
@@ -183,29 +154,32 @@ void FinishRivals(const Workbench& bench, const Candidate& parent, Layer* layer)
 }
 
 void StartFromSimpler(const Workbench& bench, Layer* layer) {
-  constexpr double kSliding = 0.9, kHump = 1.5, kClearlyBetter = 0.9;
+  constexpr double kClearlyBetter = 0.9;
   for (const auto& simple : layer->children) {
     if (simple->held_out_floors < kRemains) continue;
-    if (simple->effects.back().effect == "torque_limit") StartSagFromLimit(bench, *simple, layer);
-    if (simple->effects.back().effect != "coulomb_friction") continue;
-    const std::string on = simple->effects.back().on;
-    const double level = simple->values[simple->model->IndexOf("coulomb_friction@" + on + ".friction_n_m")];
+    const EffectUse& from = simple->effects.back();
+    const double size =
+        simple->values[simple->model->IndexOf(PlacedParameters(from, *bench.rig, bench.scales).front().name)];
     for (const auto& rich : layer->children) {
-      if (rich->effects.back().on != on || !Contains(*rich, *simple) ||
-          rich->train_cost < kClearlyBetter * simple->train_cost || bench.Late())
-        continue;
-      const auto placed = rich->model->EffectParameters(rich->effects.back(), bench.scales);
-      if (!placed.ok()) continue;
-      const bool hump = rich->effects.back().effect == "stribeck_friction";
-      std::vector<double> values = rich->model->Nominal();
-      for (const auto& p : placed.value()) {
-        values[rich->model->IndexOf(p.name)] = p.unit != "N m"            ? p.start
-                                               : !hump                    ? level
-                                               : p.key == "breakaway_n_m" ? kHump * level
-                                                                          : kSliding * level;
+      const EffectUse& use = rich->effects.back();
+      const StartsFrom& known = EffectOf(use, *bench.rig).starts_from;
+      if (known.effect != from.effect || use.on != from.on) continue;
+      // One start is for what lags behind; several are for what has several valleys, wherever it is.
+      const bool ahead = known.starts.size() == 1 &&
+                         (!Contains(*rich, *simple) || rich->train_cost < kClearlyBetter * simple->train_cost);
+      if (ahead || bench.Late()) continue;
+      const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+      for (const auto& start : known.starts) {
+        if (bench.Late()) return;
+        std::vector<double> values = rich->model->Nominal();
+        for (std::size_t i = 0; i < placed.size(); ++i) {
+          const bool stated = start[i].of_simpler != 0 || start[i].value != 0;
+          values[rich->model->IndexOf(placed[i].name)] =
+              stated ? start[i].of_simpler * size + start[i].value : placed[i].start;
+        }
+        TryStart(bench, rich.get(), CarryOver(*simple->problem, simple->point, *rich->problem, values),
+                 kFirstIterations, kFirstTolerance);
       }
-      TryStart(bench, rich.get(), CarryOver(*simple->problem, simple->point, *rich->problem, values), kFirstIterations,
-               kFirstTolerance);
       ScoreCandidate(bench, rich.get());
     }
   }

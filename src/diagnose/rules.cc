@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <iterator>
-#include <string_view>
 
 namespace gapscope {
 namespace {
@@ -23,58 +20,31 @@ std::string JointOf(const std::string& on, const Model& model) {
   return on;
 }
 
-// Whether an actuator's own stiffness holds its joint: native, or a gapscope.motor of the duty or (with a gain) the
-// position law.
-bool HoldsPosition(const mjModel& m, int actuator) {
-  const int instance = m.actuator_plugin[actuator];
-  if (instance < 0) return m.actuator_biasprm[actuator * mjNBIAS + 1] != 0;
-  const char *law = mj_getPluginConfig(&m, instance, "law"), *name = mj_id2name(&m, mjOBJ_PLUGIN, instance);
-  if (law && std::string_view(law) == "duty") return true;
-  const int kp = name ? mj_name2id(&m, mjOBJ_NUMERIC, (std::string(name) + ".kp").c_str()) : -1;
-  const char* config = mj_getPluginConfig(&m, instance, "kp");
-  return (kp >= 0 ? m.numeric_data[m.numeric_adr[kp]] : config ? std::atof(config) : 0) != 0;
-}
-
 bool IsServoJoint(const std::string& joint, const Model& base) {
   const mjModel& m = base.compiled();
   for (int a = 0; a < m.nactuator; ++a) {
     const char* name =
         m.actuator_trntype[a] == mjTRN_JOINT ? mj_id2name(&m, mjOBJ_JOINT, m.actuator_trnid[2 * a]) : nullptr;
-    if (name && joint == name && HoldsPosition(m, a)) return true;
+    if (name && joint == name && FactsOf(m, a).holds_position) return true;
   }
   return false;
 }
 
-// richer -> simpler effects that it contains, on the same place. Exactly, or only as far as its bounds let it: a cable
-// whose rest angle lies far away is nearly a bias, and where the travel is small the logs cannot tell the two.
-struct Containment {
-  const char *richer, *simpler;
-  bool exact;
-};
-constexpr Containment kContainments[] = {
-    {"stribeck_friction", "coulomb_friction", true},
-    {"direction_asymmetry", "coulomb_friction", true},
-    {"direction_asymmetry", "torque_bias", true},
-    {"supply_sag", "torque_limit", true},
-    {"cogging", "gravity_offset", true},
-    {"cogging", "cable_spring", true},
-    {"cogging", "torque_bias", true},
-    {"cable_spring", "torque_bias", false},
-    {"gravity_offset", "torque_bias", false},
-};
+const Effect& Of(const EffectUse& use, const Model& model) { return EffectOf(use, *model.rig()); }
 
 }  // namespace
 
 bool IsFinding(const EffectUse& use, const Model& base) {
-  if (use.effect == "torque_bias" && IsServoJoint(JointOf(use.on, base), base)) return false;
+  if (Of(use, base).character == EffectCharacter::kConstantTorque && IsServoJoint(JointOf(use.on, base), base))
+    return false;
   // A column that is the only one measured of a system is late with everything else: tried all the same, the verdict
   // then says ambiguous.
   return true;
 }
 
 bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
-  if (JointOf(a.on, model) != JointOf(b.on, model) && a.effect != "sensor_delay" && b.effect != "sensor_delay")
-    return false;
+  const bool of_signal = Of(a, model).place == EffectPlace::kSignal || Of(b, model).place == EffectPlace::kSignal;
+  if (!of_signal && JointOf(a.on, model) != JointOf(b.on, model)) return false;
   for (const auto& [x, y] : {std::pair{&a, &b}, std::pair{&b, &a}}) {
     for (const Effect& effect : Catalogue()) {
       if (effect.name == x->effect &&
@@ -86,13 +56,8 @@ bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
 }
 
 bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model) {
-  if (mj_name2id(&model.compiled(), mjOBJ_ACTUATOR, first.on.c_str()) >= 0)
-    return false;  // a drive whose gain differs by direction does not stick
-  const auto any = [](const std::string& effect, std::initializer_list<const char*> names) {
-    return std::find(names.begin(), names.end(), effect) != names.end();
-  };
-  return any(first.effect, {"coulomb_friction", "stribeck_friction", "load_friction", "direction_asymmetry"}) &&
-         any(second.effect, {"joint_compliance", "backlash"});
+  return Of(first, model).character == EffectCharacter::kDryFriction &&
+         Of(second, model).character == EffectCharacter::kSecondMass;
 }
 
 bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
@@ -109,9 +74,9 @@ bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
   const EffectUse &a = of_richer.front(), &b = of_simpler.front();
   // On the same place: a motor's direction asymmetry is no joint's friction.
   if (a.on != b.on) return false;
-  return std::any_of(std::begin(kContainments), std::end(kContainments), [&](const Containment& c) {
-    return a.effect == c.richer && b.effect == c.simpler && (c.exact || !exactly);
-  });
+  const std::vector<Contained>& contains = Of(a, *richer.model).contains;
+  return std::any_of(contains.begin(), contains.end(),
+                     [&](const Contained& c) { return b.effect == c.effect && (c.exactly || !exactly); });
 }
 
 bool IsStretched(const PlacedParameter& p, double value) {
@@ -124,8 +89,9 @@ bool IsStretched(const PlacedParameter& p, double value) {
 namespace {
 
 std::size_t LateSensors(const Candidate& candidate) {
-  return static_cast<std::size_t>(std::count_if(candidate.effects.begin(), candidate.effects.end(),
-                                                [](const EffectUse& use) { return use.effect == "sensor_delay"; }));
+  return static_cast<std::size_t>(
+      std::count_if(candidate.effects.begin(), candidate.effects.end(),
+                    [&](const EffectUse& use) { return Of(use, *candidate.model).place == EffectPlace::kSignal; }));
 }
 
 }  // namespace
@@ -148,22 +114,21 @@ bool IsOneSignal(const std::vector<Recording>& recordings) {
   });
 }
 
-bool IsSameDelay(const EffectUse& a, const EffectUse& b) {
-  return (a.effect == "sensor_delay" && b.effect == "command_delay") ||
-         (a.effect == "command_delay" && b.effect == "sensor_delay");
+bool IsSameDelay(const EffectUse& a, const EffectUse& b, const Model& model) {
+  return Of(a, model).same_on_one_signal == b.effect || Of(b, model).same_on_one_signal == a.effect;
 }
 
-bool IsSameFriction(const EffectUse& a, const EffectUse& b) {
-  return a.on == b.on && ((a.effect == "coulomb_friction" && b.effect == "direction_asymmetry") ||
-                          (a.effect == "direction_asymmetry" && b.effect == "coulomb_friction"));
+bool IsSameFriction(const EffectUse& a, const EffectUse& b, const Model& model) {
+  return a.on == b.on && (Of(a, model).same_but_constant == b.effect || Of(b, model).same_but_constant == a.effect);
 }
 
 bool IsLessLikely(const Candidate& a, const Candidate& b) {
   if (LateSensors(a) == 2 && LateSensors(b) == 1 && b.effects.size() == 2 &&
-      (b.effects.front().effect == "command_delay" || b.effects.back().effect == "command_delay"))
+      IsSameDelay(b.effects.front(), b.effects.back(), *b.model))
     return true;
-  if (a.effects.empty() || b.effects.size() != a.effects.size() || a.effects.back().effect != "gravity_offset" ||
-      b.effects.back().effect != "cable_spring" || a.effects.back().on != b.effects.back().on)
+  if (a.effects.empty() || b.effects.size() != a.effects.size() ||
+      Of(a.effects.back(), *a.model).unlikely_beside != b.effects.back().effect ||
+      a.effects.back().on != b.effects.back().on)
     return false;
   const mjModel& m = a.model->compiled();
   const int joint = mj_name2id(&m, mjOBJ_JOINT, a.effects.back().on.c_str());

@@ -72,11 +72,11 @@ bool MayBeRivals(const Candidate& a, const Candidate& b);
 bool IsOneSignal(const std::vector<Recording>& recordings);
 // Whether the two are a late command and a late sensor: the same motion where that sensor is all that is measured,
 // whatever their fits cost.
-bool IsSameDelay(const EffectUse& a, const EffectUse& b);
+bool IsSameDelay(const EffectUse& a, const EffectUse& b, const Model& model);
 // Whether the two are Coulomb friction and friction that differs by direction on one joint: apart by a constant torque,
 // which moves the rest of a spring-held joint and nothing else. Where that is a zero offset to the sensor, they are the
 // same motion.
-bool IsSameFriction(const EffectUse& a, const EffectUse& b);
+bool IsSameFriction(const EffectUse& a, const EffectUse& b, const Model& model);
 
 // Whether `a` is the less likely of two that explain the logs equally well: gravity on a joint whose axis stands
 // upright, where only a tilted rig would feel it, beside a cable; two late sensors beside a late command and one.

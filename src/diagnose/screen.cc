@@ -27,9 +27,7 @@ std::vector<std::vector<double>> Trials(const std::vector<PlacedParameter>& para
 // trial value.
 double StepTo(const PlacedParameter& p, double trial, double scale) {
   constexpr double kLeastScale = 0.3, kMostScale = 2;
-  const bool place = p.key.find("rest") != std::string::npos || p.key.find("phase") != std::string::npos ||
-                     p.key.find("periods") != std::string::npos;
-  if (p.trials.empty() || place || p.neutral == p.high) return trial;
+  if (p.trials.empty() || p.role == ParameterRole::kPlace || p.neutral == p.high) return trial;
   return std::clamp(p.neutral + std::clamp(scale, kLeastScale, kMostScale) * (trial - p.neutral), p.low, p.high);
 }
 
@@ -98,21 +96,19 @@ void Test(Candidate& child, const std::vector<PlacedParameter>& placed, const st
 
 Trial TryEffect(const Workbench& bench, Candidate& child, const EffectUse& use, FitProblem& parent,
                 const FitPoint& point, const Snapshot& base) {
-  const auto placed = child.model->EffectParameters(use, bench.scales);
-  if (!placed.ok()) return {};
+  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
   constexpr std::size_t kFewWindows = 8, kThin = 4;
-  std::vector<std::vector<double>> trials = Trials(placed.value());
+  std::vector<std::vector<double>> trials = Trials(placed);
   Tests tests;
-  if (std::any_of(placed.value().begin(), placed.value().end(),
-                  [](const PlacedParameter& p) { return p.trials.size() >= kScan; })) {
-    Test(child, placed.value(), trials, parent, point,
+  if (std::any_of(placed.begin(), placed.end(), [](const PlacedParameter& p) { return p.trials.size() >= kScan; })) {
+    Test(child, placed, trials, parent, point,
          Thin(parent, base, point, std::max(kFewWindows, parent.windows().size() / kThin)), &tests);
     if (tests.best.empty()) return {};
     const Trial best = BestOfScan(std::move(tests.best), tests.scan);
     trials = {best.trial};
     for (const Trial& other : best.others) trials.push_back(other.trial);
   }
-  Test(child, placed.value(), trials, parent, point, base, &tests);
+  Test(child, placed, trials, parent, point, base, &tests);
   if (tests.best.empty()) return {};
   Trial result = tests.scan < 0 ? std::move(tests.best.front()) : BestOfScan(std::move(tests.best), tests.scan);
   result.visible = tests.visible;

@@ -194,7 +194,7 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   const FitPoint start = base.problem->Start();
   if (!std::isfinite(base.problem->Evaluate(start, Keep::kCost).cost)) {
     return Error{.what = "the base model cannot be simulated along these logs, even in windows",
-                 .where = bench.experiment.path,
+                 .where = bench.rig->experiment().path,
                  .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
   }
   nominal.point = start;

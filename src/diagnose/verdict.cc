@@ -24,10 +24,14 @@ const Candidate* NearestRival(const Candidates& field, const Candidate& chosen) 
 // Whether a constant torque on the joint shows in nothing but the zero of its sensor, which nobody knows.
 bool IsZeroOffset(const SearchResult& found, const std::string& joint) {
   constexpr double kImitated = 0.9999;
-  const EffectUse bias{"torque_bias", joint};
-  if (!IsFinding(bias, *found.base->model)) return !found.torque;
-  return std::any_of(found.first.screen.begin(), found.first.screen.end(),
-                     [&](const Screened& s) { return s.use == bias && s.trial.valid && s.trial.absorbed > kImitated; });
+  for (const EffectUse& use : AllUses(*found.base->model->rig())) {
+    const bool constant = EffectOf(use, *found.base->model->rig()).character == EffectCharacter::kConstantTorque;
+    if (constant && use.on == joint && !IsFinding(use, *found.base->model)) return !found.torque;
+  }
+  return std::any_of(found.first.screen.begin(), found.first.screen.end(), [&](const Screened& s) {
+    const bool constant = EffectOf(s.use, *found.base->model->rig()).character == EffectCharacter::kConstantTorque;
+    return constant && s.use.on == joint && s.trial.valid && s.trial.absorbed > kImitated;
+  });
 }
 
 // What could stand in the place of `use`, one of the chosen effects: rivals among `field`, and what is the same motion
@@ -44,8 +48,8 @@ void AddGroup(const SearchResult& found, const Candidates& field, const EffectUs
   }
   for (const auto& other : found.first.screen) {
     const bool known = std::find(group.begin(), group.end(), other.use) != group.end();
-    const bool same = (found.one_signal && IsSameDelay(use, other.use)) ||
-                      (IsSameFriction(use, other.use) && IsZeroOffset(found, use.on));
+    const bool same = (found.one_signal && IsSameDelay(use, other.use, *found.base->model)) ||
+                      (IsSameFriction(use, other.use, *found.base->model) && IsZeroOffset(found, use.on));
     if (!known && same) group.push_back(other.use);
   }
   if (group.size() > 1) groups->push_back(std::move(group));

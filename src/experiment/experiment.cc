@@ -91,6 +91,14 @@ std::vector<std::string> ReadColumns(YamlMap& map, const YAML::Node& node, bool 
   return columns;
 }
 
+CommandKind KindOfUnit(const std::string& si) {
+  return si == "V"     ? CommandKind::kVoltage
+         : si == "A"   ? CommandKind::kCurrent
+         : si == "N m" ? CommandKind::kTorque
+         : si == "rad" ? CommandKind::kAngle
+                       : CommandKind::kOther;
+}
+
 Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment) {
   for (const YAML::Node& item : items) {
     YamlMap map(item, path, "a command");
@@ -101,6 +109,7 @@ Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& pat
     command.columns = ReadColumns(map, item, !map.Has("default"));
     if (command.columns.empty()) command.optional = true;
     command.unit = ReadScaling(map, item, &command.factor, &command.offset);
+    command.kind = KindOfUnit(command.unit);
     for (const auto& other : experiment->commands) {
       if (other.actuator == command.actuator)
         map.Fail(item, {.what = "two commands drive the actuator '" + command.actuator + "'", .cure = "delete one"});

@@ -22,14 +22,19 @@ struct LogValue {
   std::optional<double> fallback;  // when the log has neither
 };
 
+// What a command asks for, as its unit tells.
+enum class CommandKind { kVoltage, kCurrent, kTorque, kAngle, kOther };
+inline bool IsElectric(CommandKind kind) { return kind == CommandKind::kVoltage || kind == CommandKind::kCurrent; }
+
 // A column that drives an actuator, held from its row to the next.
 struct CommandSpec {
   std::string actuator;
   std::vector<std::string> columns;  // the first one that the log has
   std::string unit;                  // SI unit of the command: "V", "A", "N m", "rad" ...
-  double factor = 1, offset = 0;     // command in SI = factor * column + offset
-  bool optional = false;             // without the column: `fallback`
-  std::string fallback = "0";        // expression of log values
+  CommandKind kind = CommandKind::kOther;
+  double factor = 1, offset = 0;  // command in SI = factor * column + offset
+  bool optional = false;          // without the column: `fallback`
+  std::string fallback = "0";     // expression of log values
 };
 
 enum class SignalKind { kPosition, kVelocity, kTorque };

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <optional>
 
-#include "src/core/units.h"
+#include "src/core/names.h"
 #include "src/log/text.h"
 
 namespace gapscope {
@@ -84,11 +84,10 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
     if (impl->parser->GetNumResults() != 1)
       return Error{.what = "bad expression " + Quoted(text) + ": several values", .where = where, .allowed = "one"};
   } catch (const mu::Parser::exception_type& e) {
-    const std::string nearest = e.GetCode() == mu::ecUNASSIGNABLE_TOKEN ? Nearest(e.GetToken(), names) : "";
     const std::string message = Quoted(e.GetMsg(), 200);
     return Error{.what = "bad expression " + Quoted(text, 120) + ": " + message.substr(1, message.size() - 2),
                  .where = where,
-                 .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+                 .cure = e.GetCode() == mu::ecUNASSIGNABLE_TOKEN ? DidYouMean(e.GetToken(), names) : ""};
   }
   return Expression(std::move(impl));
 }
@@ -101,6 +100,16 @@ double Expression::Evaluate() const {
   } catch (const mu::Parser::exception_type&) {
     return std::numeric_limits<double>::quiet_NaN();
   }
+}
+
+bool Mentions(const std::string& expression, const std::string& name) {
+  const auto of_name = [](char c) { return std::string_view(kNameChars).find(c) != std::string_view::npos; };
+  for (std::size_t at = expression.find(name); at != std::string::npos; at = expression.find(name, at + 1)) {
+    const std::size_t end = at + name.size();
+    if ((at == 0 || !of_name(expression[at - 1])) && (end == expression.size() || !of_name(expression[end])))
+      return true;
+  }
+  return false;
 }
 
 Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values,

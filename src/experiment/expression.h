@@ -32,6 +32,8 @@ class Expression {
   std::unique_ptr<Impl> impl_;
 };
 
+// Whether the expression reads the variable of that name.
+bool Mentions(const std::string& expression, const std::string& name);
 // The value of an expression of `values`. Errors as Parse, and a result that is not finite.
 Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values,
                             const std::string& where);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "src/core/units.h"
+#include "src/core/names.h"
 #include "src/experiment/expression.h"
 
 namespace gapscope {
@@ -19,14 +19,10 @@ const Column* FindFirst(const Log& log, const std::vector<std::string>& names) {
 }
 
 Error MissingColumn(const Log& log, const std::vector<std::string>& names, const std::string& purpose) {
-  std::string all;
-  for (const auto& name : log.ColumnNames()) all += (all.empty() ? "" : ", ") + name;
-  const std::string nearest = Nearest(names.front(), log.ColumnNames());
-  return Error{
-      .what = "no column '" + names.front() + "' for " + purpose,
-      .where = log.path + ":1",
-      .actual = "columns " + all,
-      .cure = nearest.empty() ? "name the right column in the experiment file" : "did you mean '" + nearest + "'?"};
+  return Error{.what = "no column '" + names.front() + "' for " + purpose,
+               .where = log.path + ":1",
+               .actual = "columns " + Join(log.ColumnNames()),
+               .cure = DidYouMean(names.front(), log.ColumnNames(), "name the right column in the experiment file")};
 }
 
 // Leaves out what the experiment does not want: the first seconds, and what follows after the `while` column falls to

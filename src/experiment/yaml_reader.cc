@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "src/core/file.h"
-#include "src/core/units.h"
+#include "src/core/names.h"
 #include "src/log/text.h"
 
 namespace gapscope {
@@ -13,12 +13,6 @@ namespace {
 
 constexpr std::size_t kMaxBytes = 1 << 20;
 constexpr int kMaxNesting = 64;
-
-std::string Join(const std::vector<std::string>& items) {
-  std::string text;
-  for (const auto& item : items) text += (text.empty() ? "" : ", ") + item;
-  return text;
-}
 
 // Whatever a hostile file holds, a message is one readable line.
 std::string OneLine(const std::string& text) {
@@ -187,11 +181,7 @@ std::size_t YamlMap::Choice(const char* key, const std::vector<std::string>& all
   const std::string text = node.IsScalar() ? node.Scalar() : "";
   const auto found = std::find(allowed.begin(), allowed.end(), text);
   if (found == allowed.end()) {
-    const std::string nearest = Nearest(text, allowed);
-    Fail(node, {.what = std::string("'") + key + "' of " + what_,
-                .actual = "'" + text + "'",
-                .allowed = Join(allowed),
-                .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"});
+    Fail(node, NoSuch(std::string("'") + key + "' of " + what_, text, allowed, ""));
     return fallback;
   }
   return static_cast<std::size_t>(found - allowed.begin());
@@ -268,11 +258,7 @@ Status YamlMap::Finish() {
   if (!error_) {
     for (const auto& pair : node_) {
       if (std::find(known_.begin(), known_.end(), pair.first.Scalar()) != known_.end()) continue;
-      const std::string nearest = Nearest(pair.first.Scalar(), known_);
-      Fail(pair.first, {.what = "unknown key in " + what_,
-                        .actual = "'" + pair.first.Scalar() + "'",
-                        .allowed = Join(known_),
-                        .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"});
+      Fail(pair.first, NoSuch("unknown key in " + what_, pair.first.Scalar(), known_, ""));
       break;
     }
   }

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "src/compare/noise.h"
+#include "src/core/names.h"
 #include "src/core/units.h"
 
 namespace gapscope {
@@ -183,11 +184,7 @@ Result<int> DrivenJoint(const Model& model, const std::string& name) {
     if (joint >= 0) return joint;
     std::vector<std::string> names;
     for (int j = 0; j < m.njnt; ++j) names.push_back(JointName(model, j));
-    const std::string nearest = Nearest(name, names);
-    return Error{.what = "no such joint",
-                 .where = "--joint",
-                 .actual = "'" + name + "'",
-                 .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+    return NoSuch("no such joint", name, names, "--joint");
   }
   for (const auto& command : model.experiment().commands) {
     const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
@@ -203,10 +200,9 @@ Result<std::vector<double>> ExtraColumn(const Model& model, const Recording& rec
   GS_ASSIGN(const Log log, ReadLog(recording.log_path, experiment.read));
   const Column* found = log.Find(column);
   if (!found) {
-    const std::string nearest = Nearest(column, log.ColumnNames());
     return Error{.what = "no column '" + column + "'",
                  .where = recording.log_path,
-                 .cure = nearest.empty() ? "name it by --current-column" : "did you mean '" + nearest + "'?"};
+                 .cure = DidYouMean(column, log.ColumnNames(), "name it by --current-column")};
   }
   return ExtractColumn(log, recording.timeline, *found,
                        {.factor = parsed.factor, .offset = 0, .missing = MissingRepair::kHold}, nullptr);

@@ -14,6 +14,7 @@
 #include "src/identify/plateaus.h"
 #include "src/identify/regression.h"
 #include "src/identify/torque.h"
+#include "src/model/parameter_writer.h"
 
 namespace gapscope {
 namespace {

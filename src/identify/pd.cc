@@ -123,9 +123,9 @@ Result<Servo> LoadServo(const IdentifyInput& input, const IdentifyOptions& optio
       if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint)
         continue;
       const auto& command = recording.commands[c];
-      if (experiment.commands[c].unit == "rad" && !target) target = &command.values;
+      if (experiment.commands[c].kind == CommandKind::kAngle && !target) target = &command.values;
       const auto [low, high] = std::minmax_element(command.values.begin(), command.values.end());
-      if (experiment.commands[c].unit == "N m" && *low < *high) forward = &command.values;
+      if (experiment.commands[c].kind == CommandKind::kTorque && *low < *high) forward = &command.values;
     }
     if (!target)
       return Error{.what = "no command of a target angle drives the joint",

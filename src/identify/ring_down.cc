@@ -15,6 +15,7 @@
 
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
+#include "src/model/parameter_writer.h"
 
 namespace gapscope {
 namespace {

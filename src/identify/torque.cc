@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "src/model/parameter_writer.h"
+
 namespace gapscope {
 namespace {
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "src/core/names.h"
 #include "src/core/units.h"
 #include "src/log/text.h"
 
@@ -180,13 +181,11 @@ Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted) 
   if (!wanted.empty()) {
     found = log.Find(wanted);
     if (!found) {
-      const std::string nearest = Nearest(wanted, log.ColumnNames());
-      return Error{
-          .what = "no column '" + wanted + "' for the time",
-          .where = log.WhereHeader(),
-          .actual = "columns " + Joined(log.ColumnNames()),
-          .allowed = "",
-          .cure = nearest.empty() ? "name the time column in the experiment file" : "did you mean '" + nearest + "'?"};
+      return Error{.what = "no column '" + wanted + "' for the time",
+                   .where = log.WhereHeader(),
+                   .actual = "columns " + Joined(log.ColumnNames()),
+                   .allowed = "",
+                   .cure = DidYouMean(wanted, log.ColumnNames(), "name the time column in the experiment file")};
     }
   }
   for (const auto& column : log.columns) {

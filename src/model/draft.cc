@@ -9,6 +9,7 @@
 
 #include "src/core/mujoco_handles.h"
 #include "src/core/units.h"
+#include "src/model/drive_facts.h"
 
 namespace gapscope {
 namespace {
@@ -344,7 +345,7 @@ class Drafter {
       const char* name = mj_id2name(&m_, mjOBJ_ACTUATOR, a);
       if (!name) continue;
       const int joint = m_.actuator_trntype[a] == mjTRN_JOINT ? m_.actuator_trnid[2 * a] : -1;
-      const bool servo = m_.actuator_biasprm[a * mjNBIAS + 1] != 0;
+      const bool servo = FactsOf(m_, a).feeds_back_position;
       bool certain = false;
       Guess* found = BestByName(Role::kCommand, name, &certain);
       if (!certain && joint >= 0) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "src/core/units.h"
+#include "src/core/names.h"
 #include "src/model/effects/catalogue.h"
 
 namespace gapscope {
@@ -10,13 +10,33 @@ namespace gapscope {
 // One line per file in effects/, made by CMake.
 #include "effects_table.inc"
 
+namespace {
+
+std::vector<Effect>& OwnEffects() {
+  static std::vector<Effect> effects;
+  return effects;
+}
+
+}  // namespace
+
+void AddToCatalogue(Effect effect) { OwnEffects().push_back(std::move(effect)); }
+
 const std::vector<Effect>& Catalogue() {
   static const std::vector<Effect> catalogue = [] {
     std::vector<Effect> all = MakeCatalogue();
+    for (Effect& own : OwnEffects()) all.push_back(std::move(own));
     std::stable_sort(all.begin(), all.end(), [](const Effect& a, const Effect& b) { return a.name < b.name; });
     return all;
   }();
   return catalogue;
+}
+
+std::vector<std::string> EffectNames() {
+  std::vector<std::string> names;
+  for (const Effect& effect : Catalogue()) {
+    if (names.empty() || names.back() != effect.name) names.push_back(effect.name);
+  }
+  return names;
 }
 
 double ScaleOf(ScaleKind kind, const Scales& s) {
@@ -49,68 +69,55 @@ std::string ScaleName(const std::string& on, RigSize size) {
 
 namespace {
 
-// Where an effect makes sense in this structure.
-std::vector<std::string> Places(const Effect& effect, const Structure& structure) {
+// Where an effect makes sense in this rig.
+std::vector<std::string> Places(const Effect& effect, const Rig& rig) {
   std::vector<std::string> places;
   switch (effect.place) {
     case EffectPlace::kMotor:
     case EffectPlace::kServo:
-      for (const auto& name : structure.Actuators()) {
-        if (structure.JointOf(name).empty()) continue;
-        if (effect.place == EffectPlace::kMotor || structure.IsServo(name)) places.push_back(name);
+      for (const auto& name : rig.Actuators()) {
+        if (rig.JointOf(name).empty()) continue;
+        if (effect.place == EffectPlace::kMotor || rig.FactsOf(name).feeds_back_position) places.push_back(name);
       }
       break;
     case EffectPlace::kJoint:
     case EffectPlace::kDrivenJoint:
     case EffectPlace::kSpringJoint:
-      for (const auto& name : structure.Joints()) {
-        if (effect.place == EffectPlace::kDrivenJoint && structure.ActuatorOf(name).empty()) continue;
-        if (effect.place == EffectPlace::kSpringJoint && !structure.HasSpring(name)) continue;
+      for (const auto& name : rig.Joints()) {
+        if (effect.place == EffectPlace::kDrivenJoint && rig.ActuatorOf(name).empty()) continue;
+        if (effect.place == EffectPlace::kSpringJoint && !rig.HasSpring(name)) continue;
         // What the base model already has is a parameter, not an effect.
-        if (effect.name == "coulomb_friction" && structure.HasFriction(name)) continue;
-        if (effect.name == "cable_spring" && structure.HasSpring(name)) continue;
+        if (effect.base_term == BaseTerm::kDryFriction && rig.HasFriction(name)) continue;
+        if (effect.base_term == BaseTerm::kSpring && rig.HasSpring(name)) continue;
         places.push_back(name);
       }
       break;
     case EffectPlace::kSignal:
-      for (const auto& signal : structure.Signals()) places.push_back(signal);
+      for (const auto& signal : rig.Signals()) places.push_back(signal);
       break;
   }
   return places;
 }
 
-std::string Join(const std::vector<std::string>& items) {
-  std::string text;
-  for (const auto& item : items) text += (text.empty() ? "" : ", ") + item;
-  return text;
-}
-
 // The scales at a place; a motor's and its joint's are one.
-Scales ScalesAt(const std::string& on, const Structure& structure, const ScaleTable& table) {
-  for (const std::string& name : {on, structure.JointOf(on), structure.JointOfSignal(on)}) {
+Scales ScalesAt(const std::string& on, const Rig& rig, const ScaleTable& table) {
+  for (const std::string& name : {on, rig.JointOf(on), rig.JointOfSignal(on)}) {
     if (const auto found = table.find(name); !name.empty() && found != table.end()) return found->second;
   }
   return {};
 }
 
-}  // namespace
-
-Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& structure) {
+Result<EffectUse> ParseEffectUse(const std::string& text, const Rig& rig) {
   const std::size_t at = text.find('@');
   const std::string name = text.substr(0, at), on = at == std::string::npos ? "" : text.substr(at + 1);
-  std::vector<std::string> names, places;
+  const std::vector<std::string> names = EffectNames();
+  std::vector<std::string> places;
   for (const Effect& effect : Catalogue()) {
-    if (names.empty() || names.back() != effect.name) names.push_back(effect.name);
     if (effect.name != name) continue;
-    for (const auto& place : Places(effect, structure)) places.push_back(place);
+    for (const auto& place : Places(effect, rig)) places.push_back(place);
   }
   if (std::find(names.begin(), names.end(), name) == names.end()) {
-    const std::string nearest = Nearest(name, names);
-    return Error{.what = "unknown effect",
-                 .where = "--with " + text,
-                 .actual = "'" + name + "'",
-                 .allowed = Join(names),
-                 .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
+    return NoSuch("unknown effect", name, names, "--with " + text);
   }
   if (places.empty()) {
     return Error{.what = "the effect '" + name + "' makes no sense in this model", .where = "--with " + text};
@@ -125,48 +132,71 @@ Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& struc
   return EffectUse{name, on};
 }
 
-std::vector<EffectUse> AllUses(const Structure& structure) {
+}  // namespace
+
+Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& texts, const Rig& rig) {
   std::vector<EffectUse> uses;
-  for (const Effect& effect : Catalogue()) {
-    for (const auto& place : Places(effect, structure)) uses.push_back({effect.name, place});
+  for (const auto& text : texts) {
+    GS_ASSIGN(EffectUse use, ParseEffectUse(text, rig));
+    if (std::find(uses.begin(), uses.end(), use) != uses.end())
+      return Error{.what = "the effect stands twice", .where = "--with " + text};
+    uses.push_back(std::move(use));
   }
   return uses;
 }
 
-const Effect& EffectOf(const EffectUse& use, const Structure& structure) {
+std::vector<EffectUse> AllUses(const Rig& rig) {
+  std::vector<EffectUse> uses;
+  for (const Effect& effect : Catalogue()) {
+    for (const auto& place : Places(effect, rig)) uses.push_back({effect.name, place});
+  }
+  return uses;
+}
+
+std::vector<EffectUse> ActuatorModel(const Rig& rig) {
+  std::map<int, EffectUse> stages;
+  for (const EffectUse& use : AllUses(rig)) {
+    if (const int stage = EffectOf(use, rig).actuator_stage; stage > 0) stages.emplace(stage, use);
+  }
+  std::vector<EffectUse> uses;
+  for (const auto& [stage, use] : stages) uses.push_back(use);
+  return uses;
+}
+
+const Effect& EffectOf(const EffectUse& use, const Rig& rig) {
   for (const Effect& effect : Catalogue()) {
     if (effect.name != use.effect) continue;
-    const auto places = Places(effect, structure);
+    const auto places = Places(effect, rig);
     if (std::find(places.begin(), places.end(), use.on) != places.end()) return effect;
   }
   GS_CHECK(!"a valid effect use");
   return Catalogue().front();
 }
 
-std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure,
-                                              const ScaleTable& table) {
-  const Effect& effect = EffectOf(use, structure);
-  const Scales scales = ScalesAt(use.on, structure, table);
+std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& rig, const ScaleTable& table) {
+  const Effect& effect = EffectOf(use, rig);
+  const Scales scales = ScalesAt(use.on, rig, table);
   std::vector<PlacedParameter> placed;
   for (const EffectParameter& p : effect.parameters) {
     double scale = ScaleOf(p.scale, scales);
     std::string key = p.key, unit = p.unit;
     if (p.scale == ScaleKind::kCommand) {
-      const std::string command = structure.CommandUnit(use.on);
-      const bool electric = command == "V" || command == "A";
-      key += command == "V" ? "_v" : command == "A" ? "_a" : "_n_m";
-      unit = electric ? command : "N m";
-      if (!electric) scale = scales.torque_n_m;
+      const CommandKind command = rig.KindOfCommand(use.on);
+      const bool volts = command == CommandKind::kVoltage;
+      key += volts ? "_v" : IsElectric(command) ? "_a" : "_n_m";
+      unit = volts ? "V" : IsElectric(command) ? "A" : "N m";
+      if (!IsElectric(command)) scale = scales.torque_n_m;
     }
     PlacedParameter out{.name = use.Text() + "." + key,
                         .key = key,
                         .unit = unit,
+                        .role = p.role,
                         .neutral = p.neutral * scale,
                         .low = p.low * scale,
                         .high = p.high * scale,
-                        .start = p.start * scale,
-                        .shape = p.shape};
-    if (p.voltage_only && structure.CommandUnit(use.on) != "V") out.low = out.high = out.start = out.neutral;
+                        .start = p.start * scale};
+    if (p.voltage_only && rig.KindOfCommand(use.on) != CommandKind::kVoltage)
+      out.low = out.high = out.start = out.neutral;
     for (const double trial : p.trials) out.trials.push_back(trial * scale);
     placed.push_back(std::move(out));
   }
@@ -174,10 +204,10 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Struct
 }
 
 Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable& table) {
-  const Effect& effect = EffectOf(use, structure);
-  const Scales scales = ScalesAt(use.on, structure, table);
+  const Effect& effect = EffectOf(use, structure.rig());
+  const Scales scales = ScalesAt(use.on, structure.rig(), table);
   std::vector<std::string> names;
-  for (const auto& p : PlacedParameters(use, structure, table)) {
+  for (const auto& p : PlacedParameters(use, structure.rig(), table)) {
     names.push_back(p.name);
     const Parameter::With with = effect.parameters[names.size() - 1].with;
     structure.AddParameter({.name = p.name,

@@ -13,6 +13,7 @@
 
 namespace gapscope {
 
+class Rig;
 class Structure;
 
 // What an effect acts on: `on` in results and in `--with EFFECT@ON`.
@@ -40,16 +41,50 @@ struct Scales {
 enum class ScaleKind { kOne, kTorque, kAngle, kSpeed, kStiffness, kDrag, kPower, kCommand, kCubic };
 double ScaleOf(ScaleKind kind, const Scales& scales);
 
+// What a parameter of an effect says.
+enum class ParameterRole {
+  kSize,   // how strong it is
+  kPlace,  // where it lies: a rest angle, a phase, a number of periods
+  kShape,  // how its curve bends: simpler models have a fixed value for it, so it does not count as a parameter
+  kTime,   // how late it is
+};
+
 struct EffectParameter {
   std::string key, unit;  // "stiffness_n_m_per_rad", "N m/rad"
+  ParameterRole role = ParameterRole::kSize;
   ScaleKind scale = ScaleKind::kOne;
   double neutral = 0;  // the effect does nothing here; in multiples of the scale, like all below
   double low = 0, high = 0;
-  std::vector<double> trials;  // values to screen with; empty: a shape parameter that stays at `start`
-  double start = 0;            // where a fit starts when nothing better is known
-  bool shape = false;          // simpler models have a fixed value for it: does not count as a parameter
-  bool voltage_only = false;   // acts on a voltage drive; else fixed at neutral
+  std::vector<double> trials;                     // values to screen with; empty: it stays at `start`
+  double start = 0;                               // where a fit starts when nothing better is known
+  bool voltage_only = false;                      // acts on a voltage drive; else fixed at neutral
   Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
+};
+
+// What an effect makes of the motion, whatever its formula.
+enum class EffectCharacter {
+  kOther,
+  kConstantTorque,  // what shifts the rest of a joint that a servo or a spring holds, and nothing else
+  kDryFriction,     // a joint that sticks
+  kSecondMass,      // a motor side that moves beside the load
+};
+// A term of the base model that an effect would double: there it is a parameter, no effect.
+enum class BaseTerm { kNone, kDryFriction, kSpring };
+
+// A simpler effect that this one holds, on the same place: exactly, or only as far as its bounds let it (a cable whose
+// rest angle lies far away is nearly a bias).
+struct Contained {
+  std::string effect;
+  bool exactly = true;
+};
+// Where a fit of this effect starts from a simpler one that is fitted already: each start gives every parameter
+// `of_simpler` times the simpler one's first, plus `value` (SI); both 0: its own `start`.
+struct StartValue {
+  double of_simpler = 0, value = 0;
+};
+struct StartsFrom {
+  std::string effect;
+  std::vector<std::vector<StartValue>> starts;
 };
 
 struct Effect {
@@ -60,12 +95,22 @@ struct Effect {
   std::string signature;   // how it shows in a log
   std::string told_apart;  // what separates it from its partners
   std::vector<std::string> partners;
+  EffectCharacter character = EffectCharacter::kOther;
+  BaseTerm base_term = BaseTerm::kNone;
+  int actuator_stage = 0;  // of a drive's own model (tune --actuator), in the order of its parameters; 0: none of it
+  // Other effects by their names.
+  std::vector<Contained> contains = {};
+  StartsFrom starts_from = {};
+  std::string same_on_one_signal = "";  // the same motion where one command and one signal are all that is logged
+  std::string same_but_constant = "";   // on one joint apart from this one by a constant torque alone
+  std::string unlikely_beside = "";     // on an upright axis, which does not feel gravity, this one is the likely one
   // Enters the effect in the structure; parameter i has the name `names[i]`.
   Status (*apply)(Structure& structure, const std::string& on, const std::vector<std::string>& names);
 };
 
 // All effects, sorted by name; a name that acts differently on motors and joints stands twice.
 const std::vector<Effect>& Catalogue();
+std::vector<std::string> EffectNames();  // each once
 
 // The rig's own size at a place, a parameter that expressions of effects there may use.
 enum class RigSize { kTorque, kInertia };  // Scales::torque_n_m, Scales::inertia_kg_m2
@@ -81,23 +126,28 @@ struct EffectUse {
 // Scales by joint and by actuator.
 using ScaleTable = std::map<std::string, Scales>;
 
+// A program's own effect, beside the files of effects/: before the catalogue is first read.
+void AddToCatalogue(Effect effect);
+
 // "cable_spring@arm" or "cable_spring" (then on the first place where it makes sense). Errors: unknown effect, unknown
-// place, with what is allowed.
-Result<EffectUse> ParseEffectUse(const std::string& text, const Structure& structure);
+// place, with what is allowed; one that stands twice.
+Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& texts, const Rig& rig);
 // Every effect on every place where it makes sense.
-std::vector<EffectUse> AllUses(const Structure& structure);
+std::vector<EffectUse> AllUses(const Rig& rig);
+// The stages that a drive's own model is made of, each on the first place where it makes sense.
+std::vector<EffectUse> ActuatorModel(const Rig& rig);
 // Enters an effect: its parameters are named EFFECT@ON.KEY, bounds and nominal (neutral) in SI by the scales.
 Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable& scales);
-// The catalogue's entry of a use (which must be valid), and its parameters with names and values in SI.
-const Effect& EffectOf(const EffectUse& use, const Structure& structure);
+// The catalogue's entry of a use (which must be valid): one name may act differently on motors and joints; and its
+// parameters with names and values in SI.
+const Effect& EffectOf(const EffectUse& use, const Rig& rig);
 struct PlacedParameter {
   std::string name, key, unit;  // name in the model, key in results
+  ParameterRole role = ParameterRole::kSize;
   double neutral, low, high, start;
-  bool shape = false;
   std::vector<double> trials;
 };
-std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Structure& structure,
-                                              const ScaleTable& scales);
+std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& rig, const ScaleTable& scales);
 
 }  // namespace gapscope
 

@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "src/core/units.h"
+#include "src/core/names.h"
 
 namespace gapscope {
 namespace {
@@ -76,18 +76,6 @@ std::vector<std::string> NamesOf(const mjModel& model, mjtObj type, int count) {
   return names;
 }
 
-Error Unknown(const std::string& what, const std::string& name, const std::vector<std::string>& names,
-              const std::string& where) {
-  std::string all;
-  for (const auto& n : names) all += (all.empty() ? "" : ", ") + n;
-  const std::string nearest = Nearest(name, names);
-  return Error{.what = what,
-               .where = where,
-               .actual = "'" + name + "'",
-               .allowed = all,
-               .cure = nearest.empty() ? "" : "did you mean '" + nearest + "'?"};
-}
-
 template <class Map>
 std::vector<std::string> Keys(const Map& map) {
   std::vector<std::string> keys;
@@ -137,8 +125,8 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
   if (field == "bias0" || field == "bias1" || field == "bias2") return Single(m, {{bias + (field[4] - '0'), 1}});
   if (field == "gear") return Single(m, {{m.actuator_gear + m.actuator_outadr[id] * 6, 1}});
   if (field == "delay") return Single(m, {{m.actuator_delay + id, 1}});
-  return Unknown("unknown field of an actuator", field,
-                 {"kp", "kv", "gain", "bias0", "bias1", "bias2", "gear", "delay", "forcerange", "ctrlrange"}, where);
+  return NoSuch("unknown field of an actuator", field,
+                {"kp", "kv", "gain", "bias0", "bias1", "bias2", "gear", "delay", "forcerange", "ctrlrange"}, where);
 }
 
 }  // namespace
@@ -165,8 +153,8 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
   if (kind == "numeric") {
     const int id = mj_name2id(&m, mjOBJ_NUMERIC, name.c_str());
     if (id < 0 || !field.empty())
-      return Unknown("no such numeric in the MJCF", text.substr(first + 1),
-                     NamesOf(m, mjOBJ_NUMERIC, static_cast<int>(m.nnumeric)), where);
+      return NoSuch("no such numeric in the MJCF", text.substr(first + 1),
+                    NamesOf(m, mjOBJ_NUMERIC, static_cast<int>(m.nnumeric)), where);
     Field result;
     for (int i = 0; i < m.numeric_size[id]; ++i)
       result.components.push_back({{.offset = OffsetOf(m, m.numeric_data + m.numeric_adr[id] + i)}});
@@ -175,7 +163,7 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
   if (kind == "joint") {
     const int id = mj_name2id(&m, mjOBJ_JOINT, name.c_str());
     if (id < 0)
-      return Unknown("no such joint in the MJCF", name, NamesOf(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), where);
+      return NoSuch("no such joint in the MJCF", name, NamesOf(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), where);
     if (m.jnt_type[id] != mjJNT_HINGE && m.jnt_type[id] != mjJNT_SLIDE) {
       return Error{.what = "the joint '" + name + "' is neither hinge nor slide", .where = where};
     }
@@ -186,31 +174,31 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
       return ArrayAt(m, found->second, m.jnt_dofadr[id]);
     std::vector<std::string> names = Keys(DofFields());
     names.insert(names.end(), {"stiffness", "springref"});
-    return Unknown("unknown field of a joint", field, names, where);
+    return NoSuch("unknown field of a joint", field, names, where);
   }
   if (kind == "body") {
     const int id = mj_name2id(&m, mjOBJ_BODY, name.c_str());
     if (id < 0)
-      return Unknown("no such body in the MJCF", name, NamesOf(m, mjOBJ_BODY, static_cast<int>(m.nbody)), where);
+      return NoSuch("no such body in the MJCF", name, NamesOf(m, mjOBJ_BODY, static_cast<int>(m.nbody)), where);
     if (const auto found = BodyFields().find(field); found != BodyFields().end()) return ArrayAt(m, found->second, id);
-    return Unknown("unknown field of a body", field, Keys(BodyFields()), where);
+    return NoSuch("unknown field of a body", field, Keys(BodyFields()), where);
   }
   if (kind == "tendon") {
     const int id = mj_name2id(&m, mjOBJ_TENDON, name.c_str());
     if (id < 0)
-      return Unknown("no such tendon in the MJCF", name, NamesOf(m, mjOBJ_TENDON, static_cast<int>(m.ntendon)), where);
+      return NoSuch("no such tendon in the MJCF", name, NamesOf(m, mjOBJ_TENDON, static_cast<int>(m.ntendon)), where);
     if (const auto found = TendonFields().find(field); found != TendonFields().end())
       return ArrayAt(m, found->second, id);
-    return Unknown("unknown field of a tendon", field, Keys(TendonFields()), where);
+    return NoSuch("unknown field of a tendon", field, Keys(TendonFields()), where);
   }
   if (kind == "actuator") {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, name.c_str());
     if (id < 0)
-      return Unknown("no such actuator in the MJCF", name, NamesOf(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)),
-                     where);
+      return NoSuch("no such actuator in the MJCF", name, NamesOf(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)),
+                    where);
     return ActuatorField(m, id, field, where);
   }
-  return Unknown("unknown kind of field", kind, {"joint", "body", "actuator", "tendon", "numeric", "option"}, where);
+  return NoSuch("unknown kind of field", kind, {"joint", "body", "actuator", "tendon", "numeric", "option"}, where);
 }
 
 }  // namespace gapscope

@@ -1,5 +1,5 @@
-// A compiled model whose parameters have names. Compiled once per structure (the base MJCF and a set of effects),
-// shared and const; each worker copies it and writes parameters into its copy through a ParameterWriter.
+// A compiled model whose parameters have names. Compiled once per structure (a rig and a set of effects), shared and
+// const; each worker copies it and writes parameters into its copy through a ParameterWriter (parameter_writer.h).
 #ifndef GAPSCOPE_MODEL_MODEL_H_
 #define GAPSCOPE_MODEL_MODEL_H_
 
@@ -11,9 +11,9 @@
 
 #include "src/core/mujoco_handles.h"
 #include "src/experiment/experiment.h"
-#include "src/experiment/expression.h"
 #include "src/model/effect.h"
 #include "src/model/fields.h"
+#include "src/model/rig.h"
 
 namespace gapscope {
 
@@ -28,22 +28,19 @@ struct SignalSource {
   int cutoff = -1, damping_ratio = -1;  // parameters of the low-pass between mechanism and log
 };
 
-// A joint split in a motor side and a load side (backlash, compliance).
-struct SplitJoint {
-  int load_joint = -1, motor_joint = -1;
-  Expression share;
-};
-
 class Model {
  public:
-  // Errors: the MJCF does not load or compile (with its own message), a name in the experiment that the MJCF lacks
-  // (file:line and the nearest), an effect that makes no sense here, an expression that does not parse.
-  static Result<std::shared_ptr<const Model>> Build(const Experiment& experiment,
+  // The rig with effects added. Errors: a name in the experiment that the MJCF lacks (file:line and the nearest),
+  // effects that do not go together, an expression that does not parse, a model that does not compile.
+  static Result<std::shared_ptr<const Model>> Build(std::shared_ptr<const Rig> rig,
                                                     const std::vector<EffectUse>& effects = {},
                                                     const ScaleTable& scales = {});
+  // The experiment's model as it stands: of a rig of its own. Errors: as Rig::Load and Build.
+  static Result<std::shared_ptr<const Model>> Load(const Experiment& experiment);
 
   const mjModel& compiled() const { return *compiled_; }
-  const Experiment& experiment() const { return experiment_; }
+  const std::shared_ptr<const Rig>& rig() const { return rig_; }
+  const Experiment& experiment() const { return rig_->experiment(); }
   const std::vector<Parameter>& parameters() const { return parameters_; }
   const std::vector<EffectUse>& effects() const { return effects_; }
   // Index of a parameter; -1: none of that name.
@@ -58,16 +55,10 @@ class Model {
   }  // by index in experiment.measured
   const std::vector<SignalSource>& sources() const { return sources_; }
   int command_delay() const { return command_delay_; }  // parameter, or -1
+  // Parameters that are times, s, over which the past acts on: of lags and of a supply that sags.
+  const std::vector<int>& memories() const { return memories_; }
   // {joint, joint that it starts with}: unmeasured joints that an effect added.
   const std::vector<std::pair<int, int>>& mirrored_joints() const { return mirrored_; }
-
-  // "cable_spring@arm" ... as uses in this experiment's structure (see ParseEffectUse); all uses that make sense in it.
-  Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& texts) const;
-  Result<std::vector<EffectUse>> PossibleEffects() const;
-  // The catalogue's entry of an effect there: one name may act differently on motors and joints.
-  Result<const Effect*> EffectAt(const EffectUse& use) const;
-  // The parameters that an effect would add.
-  Result<std::vector<PlacedParameter>> EffectParameters(const EffectUse& use, const ScaleTable& scales) const;
 
   // The tuned MJCF with its plugin elements: loads in any MuJoCo with the plugin library. `values` as Nominal(),
   // `log_values` of one log.
@@ -82,7 +73,7 @@ class Model {
  private:
   friend class ParameterWriter;
   struct Setting {
-    std::string where;
+    std::string name, where;  // "joint/arm/damping"; file and line
     std::vector<std::string> expressions;
     Field field;
   };
@@ -92,48 +83,22 @@ class Model {
   };
 
   Model() = default;
+  // Compiles a finished structure and resolves its settings in the result; they leave the structure.
+  Status Compile(Structure* structure);
   Status ResolveNames();
+  void FindMemories();
 
-  Experiment experiment_;
+  std::shared_ptr<const Rig> rig_;
   std::vector<EffectUse> effects_;
   std::vector<Parameter> parameters_;
   ModelPtr compiled_;
-  SpecPtr spec_;
   std::vector<Setting> settings_;
   std::vector<SplitSetting> splits_;
   std::vector<int> command_ctrl_;
   std::vector<SignalSource> sources_;
   std::vector<std::pair<int, int>> mirrored_;
   int command_delay_ = -1;
-};
-
-// Writes parameter values into one copy of a model. Not thread-safe: one per worker.
-class ParameterWriter {
- public:
-  // `target` must be a copy of model.compiled() and outlive the writer, as must `model`; `data` is scratch for MuJoCo's
-  // derived constants.
-  ParameterWriter(const Model& model, mjModel* target, mjData* data);
-  ParameterWriter(const ParameterWriter&) = delete;
-  ParameterWriter& operator=(const ParameterWriter&) = delete;
-
-  // Writes all settings. Returns false, having written what it could, when an expression is not finite or a mass or
-  // inertia is negative.
-  bool Write(std::span<const double> values, const std::map<std::string, double>& log_values);
-
- private:
-  struct Bound {
-    std::vector<Expression> expressions;
-    const Field* field;
-  };
-  void WriteSplits();
-
-  const Model& model_;
-  mjModel* target_;
-  mjData* data_;
-  std::vector<double> variables_;
-  std::vector<std::string> log_names_;
-  std::vector<Bound> bound_;
-  std::vector<SplitJoint> splits_;
+  std::vector<int> memories_;
 };
 
 // Inertia of the joint's own body (without its children) about the joint's axis, with the armature of the joint; kg

@@ -1,16 +1,18 @@
-// A model's structure while effects are added to it: the MJCF as a spec, parameters, settings of fields, and what the
-// host does itself (delays of logged columns). Effects state terms; Finish() turns them into plugin instances, native
-// elements and extra joints.
+// A model's structure while effects are added to it: a copy of the rig's MJCF as a spec, parameters, settings of
+// fields, and what the host does itself (delays of logged columns). Effects state terms; Finish() turns them into
+// plugin instances, native elements and extra joints.
 #ifndef GAPSCOPE_MODEL_STRUCTURE_H_
 #define GAPSCOPE_MODEL_STRUCTURE_H_
 
 #include <map>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "src/core/mujoco_handles.h"
-#include "src/experiment/experiment.h"
 #include "src/model/effect.h"
+#include "src/model/rig.h"
+#include "src/plugins/common/parameters.h"
 
 namespace gapscope {
 
@@ -19,9 +21,12 @@ class Structure {
   // key of a plugin's live parameter -> expression of parameters
   using Terms = std::map<std::string, std::string>;
 
-  static Result<Structure> Load(const Experiment& experiment);
+  // `rig` must outlive the structure.
+  explicit Structure(const Rig& rig);
+  const Rig& rig() const { return rig_; }
 
-  // Terms that effects add, by joint.
+  // Terms that effects add to the drive, the friction and the springs of a joint, by the keys of the plugins'
+  // parameters (src/plugins). A drive is named by its actuator.
   Status AddMotorTerm(const std::string& actuator, const std::string& key, const std::string& expression);
   Status AddFrictionTerm(const std::string& joint, const std::string& key, const std::string& expression);
   Status AddSpringTerm(const std::string& joint, const std::string& key, const std::string& expression);
@@ -33,18 +38,6 @@ class Structure {
   Status AddSplit(Split split);
   void Set(const std::string& field, std::vector<std::string> expressions);
   void AddParameter(Parameter parameter) { parameters.push_back(std::move(parameter)); }
-
-  // What there is.
-  std::vector<std::string> Joints() const;                 // named hinge and slide joints
-  std::vector<std::string> Actuators() const;              // named actuators that are not a sibling input of another
-  std::string JointOf(const std::string& actuator) const;  // empty: not on a joint
-  std::string ActuatorOf(const std::string& joint) const;  // first actuator on the joint; empty: none
-  bool IsServo(const std::string& actuator) const;         // feeds back the position
-  bool HasSpring(const std::string& joint) const;
-  bool HasFriction(const std::string& joint) const;
-  std::vector<std::string> Signals() const;                    // measured signals of the experiment
-  std::string JointOfSignal(const std::string& signal) const;  // empty: no such signal
-  std::string CommandUnit(const std::string& actuator) const;  // SI unit of its command: "V", "A", "rad" ...
 
   // Turns the terms into elements of the spec. Call once, after all effects.
   Status Finish();
@@ -59,18 +52,26 @@ class Structure {
   std::vector<Split> splits;
 
  private:
+  // Joins a term with one that another effect set on the same stage.
+  static void AddTerm(std::span<const plugins::ParameterSpec> specs, Terms* terms, const std::string& key,
+                      const std::string& expression);
   mjsJoint* FindJoint(const std::string& name) const;
-  mjsActuator* FindActuator(const std::string& name) const;
+  std::vector<mjsActuator*> ActuatorsOn(const std::string& joint) const;
   std::string MotorSide(const std::string& joint) const;
-  Status FinishSplits();
-  Status FinishMotors();
-  Status FinishFriction();
-  Status FinishSprings();
-  double NominalOf(const std::string& expression) const;
+  void FinishSplit(const Split& split);
+  void Link(const Split& split, const std::string& motor);
+  void Stiffen(mjsJoint* joint);
+  Status FinishMotor(const std::string& joint, const Terms& terms);
+  // The plugin instance that the drive's inputs are turned into; its name.
+  Result<std::string> ConvertDrive(const std::vector<mjsActuator*>& inputs);
+  Status FinishFriction(const std::string& name, Terms terms);
+  void FinishSpring(const std::string& joint, const Terms& terms);
   void AddNumeric(const std::string& name, double value);
+  // The live parameters of an instance, set by the terms.
+  void AddLive(const std::string& instance, const Terms& terms);
+  double NominalOf(const std::string& expression) const;
 
-  const Experiment* experiment_ = nullptr;
-  ModelPtr base_;                                           // compiled, without effects
+  const Rig& rig_;
   std::map<std::string, Terms> motor_, friction_, spring_;  // by joint
 };
 

@@ -22,7 +22,7 @@ Rig Load(const std::string& name) {
   const auto experiment = LoadExperiment(kModels + name + "/experiment.yaml");
   EXPECT_TRUE(experiment.ok()) << experiment.error().Text();
   Rig rig{.experiment = WithLimitSignals(experiment.value())};
-  const auto model = Model::Build(rig.experiment);
+  const auto model = Model::Load(rig.experiment);
   EXPECT_TRUE(model.ok()) << model.error().Text();
   rig.model = model.value();
   return rig;
@@ -137,8 +137,8 @@ TEST(OptimalTest, SeparatingInputMovesWhereTheRivalsDiffer) {
   ThreadPool pool(2);
   const ScaleTable scales;
   const auto rival = [&](const std::string& effect, const std::map<std::string, double>& set) {
-    const auto uses = rig.model->ParseEffects({effect});
-    const auto model = Model::Build(rig.experiment, uses.value(), scales);
+    const auto uses = ParseEffects({effect}, *rig.model->rig());
+    const auto model = Model::Build(rig.model->rig(), uses.value(), scales);
     EXPECT_TRUE(model.ok());
     std::vector<double> values = model.value()->Nominal();
     for (const auto& [name, value] : set) values[model.value()->Find(name, "").value()] = value;

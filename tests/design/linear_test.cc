@@ -115,7 +115,7 @@ TEST(ObserverTest, DualsOfTheFeedbacks) {
 TEST(LinearizeTest, QubeIsItsTextbookMatrices) {
   const auto experiment = LoadExperiment(std::string(GAPSCOPE_SOURCE_DIR) + "/models/qube/experiment.yaml");
   ASSERT_TRUE(experiment.ok());
-  const auto model = Model::Build(experiment.value());
+  const auto model = Model::Load(experiment.value());
   ASSERT_TRUE(model.ok()) << model.error().Text();
   const double mp = 0.024, l = 0.0645, L = 0.085, J = mp * 4 * l * l / 3, I = 4.6e-6 + 0.095 * L * L / 3 + mp * L * L,
                kt = 0.042, R = 8.4, ba = 1.5e-4 + kt * kt / R, bp = 3e-5, g = 9.81;

@@ -24,7 +24,7 @@ inline Bench LoadBench(const std::string& rig, const std::vector<std::string>& l
   Bench bench;
   const auto experiment = LoadExperiment(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/" + file);
   EXPECT_TRUE(experiment.ok()) << experiment.error().Text();
-  const auto model = Model::Build(experiment.value());
+  const auto model = Model::Load(experiment.value());
   EXPECT_TRUE(model.ok()) << model.error().Text();
   bench.model = model.value();
   bench.values = bench.model->Nominal();

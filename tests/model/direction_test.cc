@@ -33,7 +33,7 @@ class DirectionTest : public ::testing::Test {
     model_ = MakeModel(experiment_);
     use_ = use;
     if (use.empty()) return;
-    const auto uses = model_->ParseEffects({use});
+    const auto uses = ParseEffects({use}, *model_->rig());
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     use_ = uses.value()[0].Text();
     const Scales scales{.torque_n_m = 1,

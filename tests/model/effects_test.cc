@@ -61,10 +61,9 @@ class EffectsTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(EffectsTest, EachIsNeutralAtNeutralAndActsElsewhere) {
   const Rig rig(GetParam());
-  const auto uses = rig.model->PossibleEffects();
-  ASSERT_TRUE(uses.ok()) << uses.error().Text();
+  const auto uses = AllUses(*rig.model->rig());
   std::set<std::string> names;
-  for (const EffectUse& use : uses.value()) {
+  for (const EffectUse& use : uses) {
     SCOPED_TRACE(use.Text());
     names.insert(use.effect);
     const auto model = MakeModel(rig.experiment, {use}, rig.scales);
@@ -75,10 +74,9 @@ TEST_P(EffectsTest, EachIsNeutralAtNeutralAndActsElsewhere) {
     const double neutral = Change(rig, Predict(*model, rig.recording, {}, nullptr, step_s));
     if (std::getenv("GAPSCOPE_PRINT")) std::printf("%-10s %-40s neutral %.3g", GetParam(), use.Text().c_str(), neutral);
     EXPECT_LT(neutral, split ? kNearNeutral : IsFriction(use, *model) ? kNeutralFriction : kNeutral);
-    const auto placed = model->EffectParameters(use, rig.scales);
-    ASSERT_TRUE(placed.ok());
+    const auto placed = PlacedParameters(use, *model->rig(), rig.scales);
     std::map<std::string, double> strong;
-    for (const auto& p : placed.value()) {
+    for (const auto& p : placed) {
       EXPECT_LE(p.low, p.neutral) << p.name;
       EXPECT_GE(p.high, p.neutral) << p.name;
       EXPECT_LE(p.low, p.start) << p.name;
@@ -110,8 +108,6 @@ class PairsTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(PairsTest, CompileAndRun) {
   const Rig rig(GetParam());
-  const auto all = rig.model->PossibleEffects();
-  ASSERT_TRUE(all.ok());
   const std::string motor = rig.experiment.commands.front().actuator;
   const std::string joint = mj_id2name(&rig.model->compiled(), mjOBJ_JOINT, rig.model->compiled().actuator_trnid[0]);
   struct Candidate {
@@ -119,11 +115,9 @@ TEST_P(PairsTest, CompileAndRun) {
     std::vector<PlacedParameter> parameters;
   };
   std::vector<Candidate> candidates;
-  for (const EffectUse& use : all.value()) {
+  for (const EffectUse& use : AllUses(*rig.model->rig())) {
     if (use.on != motor && use.on != joint) continue;
-    const auto placed = rig.model->EffectParameters(use, rig.scales);
-    ASSERT_TRUE(placed.ok());
-    candidates.push_back({use, placed.value()});
+    candidates.push_back({use, PlacedParameters(use, *rig.model->rig(), rig.scales)});
   }
   Recording shorter = rig.recording;
   shorter.time_s.resize(21);
@@ -133,7 +127,7 @@ TEST_P(PairsTest, CompileAndRun) {
     for (std::size_t j = i + 1; j < candidates.size(); ++j) {
       const std::string both = candidates[i].use.Text() + " + " + candidates[j].use.Text();
       SCOPED_TRACE(both);
-      const auto model = Model::Build(rig.experiment, {candidates[i].use, candidates[j].use}, rig.scales);
+      const auto model = Model::Build(rig.model->rig(), {candidates[i].use, candidates[j].use}, rig.scales);
       if (!model.ok()) {
         EXPECT_NE(model.error().Text().find("is split twice"), std::string::npos) << model.error().Text();
         refused.insert(both);
@@ -172,26 +166,23 @@ TEST(DirectionAsymmetryTest, OfTheVoltageIsTheBaseModelOnScaledVoltages) {
   const auto of_torque = Predict(*model, rig.recording, {{use.Text() + ".asymmetry", 0.25}});
   EXPECT_GT(LargestDifference(of_torque[0], expected[0]), 1e-3 * Largest(expected[0]));
   const Rig servo("xl330");
-  const auto placed = MakeModel(servo.experiment, {use}, servo.scales)->EffectParameters(use, servo.scales);
-  ASSERT_TRUE(placed.ok());
-  EXPECT_EQ(placed.value()[1].low, placed.value()[1].high);
+  const auto placed = PlacedParameters(use, *MakeModel(servo.experiment, {use}, servo.scales)->rig(), servo.scales);
+  EXPECT_EQ(placed[1].low, placed[1].high);
 }
 
 // One name, two effects: what is told of it depends on the place.
 TEST(CatalogueTest, AsymmetryOfAJointIsFrictionAndOfAMotorItsGain) {
   const auto model = MakeModel(ShippedExperiment("qube"));
-  const auto of_joint = model->EffectAt({"direction_asymmetry", "arm"}),
-             of_motor = model->EffectAt({"direction_asymmetry", "motor"});
-  ASSERT_TRUE(of_joint.ok() && of_motor.ok());
-  EXPECT_NE(of_joint.value()->meaning.find("friction"), std::string::npos);
-  EXPECT_NE(of_motor.value()->meaning.find("gain"), std::string::npos);
+  const Effect &of_joint = EffectOf({"direction_asymmetry", "arm"}, *model->rig()),
+               &of_motor = EffectOf({"direction_asymmetry", "motor"}, *model->rig());
+  EXPECT_NE(of_joint.meaning.find("friction"), std::string::npos);
+  EXPECT_NE(of_motor.meaning.find("gain"), std::string::npos);
 }
 
 TEST(CatalogueTest, EveryEffectFindsAPlaceSomewhere) {
   std::set<std::string> placed, all;
   for (const char* rig : {"joint", "qube", "flexjoint", "flexlink", "xl330"}) {
-    const auto uses = MakeModel(ShippedExperiment(rig))->PossibleEffects();
-    for (const auto& use : uses.value()) placed.insert(use.effect);
+    for (const auto& use : AllUses(*MakeModel(ShippedExperiment(rig))->rig())) placed.insert(use.effect);
   }
   for (const Effect& effect : Catalogue()) {
     all.insert(effect.name);

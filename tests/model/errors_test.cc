@@ -1,6 +1,7 @@
 // What does not build says why, and where in which file.
 #include <gtest/gtest.h>
 
+#include "src/model/parameter_writer.h"
 #include "tests/model/synthetic.h"
 
 namespace gapscope::testing {
@@ -27,7 +28,7 @@ set:
 std::string MessageOf(const std::string& mjcf, const std::string& yaml) {
   const Scratch scratch;
   const Experiment experiment = MakeExperiment(scratch, mjcf, yaml);
-  const auto built = Model::Build(experiment);
+  const auto built = Model::Load(experiment);
   return built.ok() ? "" : built.error().Text();
 }
 
@@ -102,7 +103,7 @@ TEST(BuildErrorsTest, TheMjcf) {
   const Scratch scratch;
   Experiment experiment = MakeExperiment(scratch, kRobot, kYaml);
   experiment.model_path = scratch.Path("none.xml");
-  const auto built = Model::Build(experiment);
+  const auto built = Model::Load(experiment);
   ASSERT_FALSE(built.ok());
   EXPECT_NE(built.error().Text().find("none.xml"), std::string::npos);
 }
@@ -111,10 +112,10 @@ TEST(BuildErrorsTest, EffectUses) {
   const Scratch scratch;
   const auto model = MakeModel(MakeExperiment(scratch, kRobot, kYaml));
   const auto message = [&](std::vector<std::string> texts) {
-    const auto uses = model->ParseEffects(texts);
+    const auto uses = ParseEffects(texts, *model->rig());
     return uses.ok() ? "" : uses.error().Text();
   };
-  const auto uses = model->ParseEffects({"coulomb_friction", "torque_limit@motor", "sensor_delay@q"});
+  const auto uses = ParseEffects({"coulomb_friction", "torque_limit@motor", "sensor_delay@q"}, *model->rig());
   ASSERT_TRUE(uses.ok()) << uses.error().Text();
   EXPECT_EQ(uses.value()[0], (EffectUse{"coulomb_friction", "hinge"}));
   EXPECT_EQ(uses.value()[1].Text(), "torque_limit@motor");
@@ -141,10 +142,8 @@ TEST(EffectPlacesTest, AMotorWithoutALawIsAServo) {
     const auto model = MakeModel(MakeExperiment(scratch, mjcf,
                                                 "commands:\n  - {actuator: motor, column: u}\nmeasured:\n  - {signal: "
                                                 "q, column: q, joint: hinge, unit: rad}\n"));
-    const auto uses = model->PossibleEffects();
-    EXPECT_TRUE(uses.ok());
-    return std::find(uses.value().begin(), uses.value().end(), EffectUse{"torque_delay", "motor"}) !=
-           uses.value().end();
+    const auto uses = AllUses(*model->rig());
+    return std::find(uses.begin(), uses.end(), EffectUse{"torque_delay", "motor"}) != uses.end();
   };
   const std::string kp = "<config key=\"kp\" value=\"2\"/>", law = "<config key=\"law\" value=";
   EXPECT_TRUE(possible(kp)) << "position is the default";

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "src/model/fields.h"
+#include "src/model/parameter_writer.h"
 #include "tests/model/synthetic.h"
 
 namespace gapscope::testing {
@@ -80,11 +81,10 @@ TEST_P(ShippedTest, MovesAsItsMjcfWhenDrivenByMuJoCoAlone) {
 TEST_P(ShippedTest, EveryPossibleEffectCanBeAdded) {
   const Experiment experiment = ShippedExperiment(GetParam());
   const auto model = MakeModel(experiment);
-  const auto uses = model->PossibleEffects();
-  ASSERT_TRUE(uses.ok());
-  EXPECT_FALSE(uses.value().empty());
-  for (const auto& use : uses.value()) {
-    const auto with = Model::Build(experiment, {use});
+  const auto uses = AllUses(*model->rig());
+  EXPECT_FALSE(uses.empty());
+  for (const auto& use : uses) {
+    const auto with = Model::Build(model->rig(), {use});
     EXPECT_TRUE(with.ok()) << use.Text() << ": " << with.error().Text();
   }
 }

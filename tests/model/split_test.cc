@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/model/parameter_writer.h"
 #include "tests/model/synthetic.h"
 
 namespace gapscope::testing {

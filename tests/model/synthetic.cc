@@ -53,7 +53,10 @@ Recording MakeRecording(const Experiment& experiment, int rows, double step_s,
 
 std::shared_ptr<const Model> MakeModel(const Experiment& experiment, const std::vector<EffectUse>& effects,
                                        const ScaleTable& scales) {
-  const auto built = Model::Build(experiment, effects, scales);
+  const auto rig = Rig::Load(experiment);
+  EXPECT_TRUE(rig.ok()) << rig.error().Text();
+  if (!rig.ok()) return nullptr;
+  const auto built = Model::Build(rig.value(), effects, scales);
   EXPECT_TRUE(built.ok()) << built.error().Text();
   return built.ok() ? built.value() : nullptr;
 }

@@ -45,7 +45,7 @@ TEST_P(ToXmlTest, ReplaysLikeTheModelItWasMadeFrom) {
   const auto& [rig, texts] = GetParam();
   const Experiment experiment = ShippedExperiment(rig);
   const auto base = MakeModel(experiment);
-  const auto uses = base->ParseEffects({texts.begin(), texts.end()});
+  const auto uses = ParseEffects({texts.begin(), texts.end()}, *base->rig());
   ASSERT_TRUE(uses.ok()) << uses.error().Text();
   const Recording recording = MakeRecording(
       experiment, 301, base->compiled().opt.timestep,
@@ -62,9 +62,7 @@ TEST_P(ToXmlTest, ReplaysLikeTheModelItWasMadeFrom) {
   ASSERT_NE(model, nullptr);
   std::map<std::string, double> set;
   for (const EffectUse& use : uses.value()) {
-    const auto placed = model->EffectParameters(use, scales);
-    ASSERT_TRUE(placed.ok());
-    for (const auto& p : placed.value()) set[p.name] = p.start;
+    for (const auto& p : PlacedParameters(use, *model->rig(), scales)) set[p.name] = p.start;
   }
   const auto xml = model->ToXml(ValuesWith(*model, set), recording.values, scales);
   ASSERT_TRUE(xml.ok()) << xml.error().Text();

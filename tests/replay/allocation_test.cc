@@ -17,7 +17,7 @@ TEST(AllocationTest, RunAllocatesNothing) {
     std::vector<std::string> texts = {"command_delay", "coulomb_friction", "stribeck_friction", "actuator_lag",
                                       "sensor_delay"};
     if (std::string(rig) == "xl330") texts = {"load_friction", "torque_delay", "sensor_delay"};
-    const auto uses = base->ParseEffects(texts);
+    const auto uses = ParseEffects(texts, *base->rig());
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     const auto model = MakeModel(experiment, uses.value());
     const Recording recording = MakeRecording(

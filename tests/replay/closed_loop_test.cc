@@ -32,7 +32,7 @@ class ClosedLoopTest : public ::testing::Test {
     auto experiment = LoadExperiment(path);
     ASSERT_TRUE(experiment.ok()) << experiment.error().Text();
     experiment_ = std::move(experiment).value();
-    auto model = Model::Build(experiment_);
+    auto model = Model::Load(experiment_);
     ASSERT_TRUE(model.ok()) << model.error().Text();
     model_ = model.value();
     auto recording = LoadRecording(experiment_, scratch_.Write("log.csv", log));
@@ -146,7 +146,7 @@ TEST_F(ClosedLoopTest, ObserverFollowsTheLinearSystemExactly) {
 
 TEST_F(ClosedLoopTest, ALateSensorIsRefused) {
   Load(kBalance, kPi, 0.02);
-  const auto late = Model::Build(experiment_, {{"sensor_delay", "arm_rad"}});
+  const auto late = Model::Build(model_->rig(), {{"sensor_delay", "arm_rad"}});
   ASSERT_TRUE(late.ok()) << late.error().Text();
   model_ = late.value();
   const auto result = Run();
@@ -303,9 +303,9 @@ controller:
 // 12 ms of dead time are more than the loop's phase margin at its 17 rad/s allows.
 TEST_F(ClosedLoopTest, ALateCommandLosesThePendulum) {
   Load(kBalance, kPi - 0.05, 6);
-  const auto uses = model_->ParseEffects({"command_delay@motor"});
+  const auto uses = ParseEffects({"command_delay@motor"}, *model_->rig());
   ASSERT_TRUE(uses.ok());
-  model_ = Model::Build(experiment_, uses.value(), {}).value();
+  model_ = Model::Build(model_->rig(), uses.value(), {}).value();
   const auto farthest = [&](double delay_s) {
     ReplayOptions options = LightArm();
     options.values[model_->Find("command_delay@motor.delay_s", "").value()] = delay_s;
@@ -362,7 +362,7 @@ TEST(RealClosedLoopTest, KoopmansLawIsReproduced) {
   whole.replay.start_s = 0;  // from the program's start: its filters begin at zero
   const auto spec = LoadController(whole);
   ASSERT_TRUE(spec.ok()) << spec.error().Text();
-  const auto model = Model::Build(experiment.value());
+  const auto model = Model::Load(experiment.value());
   ASSERT_TRUE(model.ok());
   std::size_t logs = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {

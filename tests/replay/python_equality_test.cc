@@ -45,8 +45,9 @@ void ExpectEqualStates(const std::string& which) {
   if (which == "joint_with_plugins") {
     // gapscope.motor and gapscope.friction, as the program exports them.
     const auto base = MakeModel(rig);
-    const auto uses = base->ParseEffects(
-        {"stribeck_friction@joint", "actuator_lag@motor", "torque_delay@motor", "torque_constant_droop@motor"});
+    const auto uses = ParseEffects(
+        {"stribeck_friction@joint", "actuator_lag@motor", "torque_delay@motor", "torque_constant_droop@motor"},
+        *base->rig());
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     const ScaleTable scales = {{"joint",
                                 {.torque_n_m = 60,
@@ -59,7 +60,7 @@ void ExpectEqualStates(const std::string& which) {
     ASSERT_NE(model, nullptr);
     std::map<std::string, double> set;
     for (const auto& use : uses.value()) {
-      const auto placed = model->EffectParameters(use, scales);
+      const auto placed = PlacedParameters(use, *model->rig(), scales);
       for (const auto& p : placed.value()) set[p.name] = p.start;
     }
     const auto xml = model->ToXml(ValuesWith(*model, set), {}, scales);

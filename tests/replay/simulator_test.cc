@@ -206,7 +206,7 @@ class DelayTest : public SimulatorTest {
  protected:
   std::vector<std::vector<double>> Delayed(const Recording& recording, const char* effect, double delay_s,
                                            double step_s = 0) {
-    const auto uses = model_->ParseEffects({effect});
+    const auto uses = ParseEffects({effect}, *model_->rig());
     EXPECT_TRUE(uses.ok());
     const auto model = MakeModel(experiment_, uses.value());
     return Predict(*model, recording, {{uses.value()[0].Text() + ".delay_s", delay_s}}, nullptr, step_s);
@@ -257,7 +257,7 @@ TEST_F(DelayTest, ALogThatBeginsAtRestBeganWithoutACommand) {
 TEST_F(SimulatorTest, ALaggingDriveStartsFromRestWithTheLog) {
   // J w' + b w = u (1 - exp(-t / T)).
   const double u = 0.7, time_constant_s = 0.03, rate = kDamping / kInertia, lag = 1 / time_constant_s;
-  const auto uses = model_->ParseEffects({"actuator_lag@motor"});
+  const auto uses = ParseEffects({"actuator_lag@motor"}, *model_->rig());
   ASSERT_TRUE(uses.ok());
   const auto model = MakeModel(experiment_, uses.value());
   const Recording recording = MakeRecording(experiment_, 300, 0.002, [&](int, double) { return u; });
@@ -303,7 +303,7 @@ TEST(EarlierCommandsTest, WhatHoldsAWeightHeldItBeforeTheLog) {
   const Scratch scratch;
   const Experiment experiment =
       MakeExperiment(scratch, Mjcf("damping=\"0.05\" stiffness=\"2\" springref=\"0.4\""), kYaml);
-  const auto uses = MakeModel(experiment)->ParseEffects({"actuator_lag@motor"});
+  const auto uses = ParseEffects({"actuator_lag@motor"}, *MakeModel(experiment)->rig());
   ASSERT_TRUE(uses.ok());
   const auto model = MakeModel(experiment, uses.value());
   const Recording recording = MakeRecording(experiment, 300, 0.002, [](int, double) { return -0.8; });
@@ -369,7 +369,7 @@ TEST_F(SimulatorTest, TheDrivesOwnEstimateIsReadWhereThereIsOne) {
   const Recording recording =
       MakeRecording(joint, 300, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.5) : 0; });
   const ScaleTable scales = EstimateScales(*base, {recording});
-  const auto uses = base->ParseEffects({"torque_constant_droop"});
+  const auto uses = ParseEffects({"torque_constant_droop"}, *base->rig());
   const auto model = MakeModel(joint, uses.value(), scales);
   const auto plain = Predict(*base, recording), neutral = Predict(*model, recording);
   EXPECT_LT(LargestDifference(plain[2], neutral[2]), 1e-9 * Largest(plain[2]));

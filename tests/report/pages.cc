@@ -26,7 +26,7 @@ std::unique_ptr<Page> BarePage() {
   const std::string root = GAPSCOPE_SOURCE_DIR;
   auto experiment = LoadExperiment(root + "/models/qube/experiment.yaml");
   GS_CHECK(experiment.ok());
-  page->model = Model::Build(experiment.value(), {kSpring}).value();
+  page->model = Model::Build(Rig::Load(experiment.value()).value(), {kSpring}).value();
   page->recordings = {LoadRecording(experiment.value(), root + "/demo/qube.csv").value()};
   page->source.command_line = "gapscope diagnose models/qube/experiment.yaml demo/qube.csv";
   page->source.experiment = &page->model->experiment();

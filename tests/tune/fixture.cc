@@ -23,10 +23,10 @@ const char kCartXml[] = R"(<mujoco>
 Rig Build(const std::string& path, const std::vector<std::string>& effects) {
   auto experiment = LoadExperiment(path);
   Rig rig{.experiment = std::move(experiment).value()};
-  rig.model = Model::Build(rig.experiment).value();
+  rig.model = Model::Load(rig.experiment).value();
   if (!effects.empty()) {
-    const auto uses = rig.model->ParseEffects(effects);
-    rig.model = Model::Build(rig.experiment, uses.value(), {}).value();
+    const auto uses = ParseEffects(effects, *rig.model->rig());
+    rig.model = Model::Build(rig.model->rig(), uses.value(), {}).value();
   }
   return rig;
 }

@@ -157,7 +157,7 @@ TEST(TuneTest, NothingFreeIsAnError) {
   const Rig rig = LoadCart(1.5, 1.5 + 1e-9);
   Experiment experiment = rig.experiment;
   for (auto& p : experiment.parameters) p.frozen = true;
-  const auto model = Model::Build(experiment).value();
+  const auto model = Model::Load(experiment).value();
   ThreadPool pool(1);
   const auto found = Tune(*model,
                           SplitData({MakeRecording(rig, std::vector<double>(100, 1.0),

@@ -26,17 +26,18 @@ Effect Effect_backlash() {
               // Of the flanks: how much of a blow comes back. 1: nothing.
               {.key = "flank_damping_ratio",
                .unit = "1",
+               .role = ParameterRole::kShape,
                .scale = ScaleKind::kOne,
                .neutral = 1,
                .low = 0.15,
                .high = 1,
-               .start = 0.5,
-               .shape = true},
+               .start = 0.5},
           },
       .meaning = "a gap between motor and load",
       .signature = "gap at reversal, any speed",
       .told_apart = "small amplitude",
       .partners = {"joint_compliance", "coulomb_friction"},
+      .character = EffectCharacter::kSecondMass,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         return structure.AddSplit(
             {.joint = on, .share = names[1], .stiffness = "", .damping = names[2], .gap = names[0]});

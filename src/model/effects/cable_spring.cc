@@ -18,6 +18,7 @@ Effect Effect_cable_spring() {
                .start = 0.1},
               {.key = "rest_rad",
                .unit = "rad",
+               .role = ParameterRole::kPlace,
                .scale = ScaleKind::kAngle,
                .neutral = 0,
                .low = -4,
@@ -30,6 +31,8 @@ Effect Effect_cable_spring() {
       .signature = "linear in angle about a rest angle",
       .told_apart = "slow sweep of the range",
       .partners = {"gravity_offset", "torque_bias", "cogging"},
+      .base_term = BaseTerm::kSpring,
+      .contains = {{.effect = "torque_bias", .exactly = false}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "stiffness_n_m_per_rad", names[0]));
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "rest_rad", names[1]));

@@ -18,6 +18,7 @@ Effect Effect_cogging() {
                .start = 0.03},
               {.key = "periods_per_rev",
                .unit = "1",
+               .role = ParameterRole::kPlace,
                .scale = ScaleKind::kOne,
                .neutral = 12,
                .low = 1,
@@ -27,6 +28,7 @@ Effect Effect_cogging() {
                .start = 12},
               {.key = "phase_rad",
                .unit = "rad",
+               .role = ParameterRole::kPlace,
                .scale = ScaleKind::kOne,
                .neutral = 0,
                .low = -3.2,
@@ -39,6 +41,7 @@ Effect Effect_cogging() {
       .signature = "periodic in angle",
       .told_apart = "constant slow speed",
       .partners = {"cable_spring"},
+      .contains = {{.effect = "gravity_offset"}, {.effect = "cable_spring"}, {.effect = "torque_bias"}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cogging_n_m", names[0]));
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cogging_periods_per_rev", names[1]));

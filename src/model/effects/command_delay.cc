@@ -10,6 +10,7 @@ Effect Effect_command_delay() {
           {
               {.key = "delay_s",
                .unit = "s",
+               .role = ParameterRole::kTime,
                .scale = ScaleKind::kOne,
                .neutral = 0,
                .low = 0,
@@ -21,6 +22,8 @@ Effect Effect_command_delay() {
       .signature = "phase grows with frequency, flat gain",
       .told_apart = "steps, high frequency",
       .partners = {"actuator_lag", "sensor_delay"},
+      .actuator_stage = 1,
+      .same_on_one_signal = "sensor_delay",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         // A late command is a shift of the log, which the host does exactly; an exported model needs the motor's own
         // delay.

@@ -21,6 +21,9 @@ Effect Effect_coulomb_friction() {
       .signature = "sign of speed, amplitude-dependent",
       .told_apart = "slow triangle, coasting",
       .partners = {"dead_zone", "stribeck_friction", "load_friction"},
+      .character = EffectCharacter::kDryFriction,
+      .base_term = BaseTerm::kDryFriction,
+      .actuator_stage = 5,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "friction_n_m", names[0]));
         return Ok();

@@ -30,6 +30,10 @@ Effect Effect_direction_friction() {
       .signature = "friction differs by direction",
       .told_apart = "both directions",
       .partners = {"torque_bias", "coulomb_friction"},
+      .character = EffectCharacter::kDryFriction,
+      .contains = {{.effect = "coulomb_friction"}, {.effect = "torque_bias"}},
+      .starts_from = {.effect = "coulomb_friction", .starts = {{{.of_simpler = 1}, {.of_simpler = 1}}}},
+      .same_but_constant = "coulomb_friction",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "friction_positive_n_m", names[0]));
         return structure.AddFrictionTerm(on, "friction_negative_n_m", names[1]);

@@ -18,6 +18,7 @@ Effect Effect_gravity_offset() {
                .start = 0.1},
               {.key = "rest_rad",
                .unit = "rad",
+               .role = ParameterRole::kPlace,
                .scale = ScaleKind::kOne,
                .neutral = 0,
                .low = -3.2,
@@ -30,6 +31,8 @@ Effect Effect_gravity_offset() {
       .signature = "sine of the angle",
       .told_apart = "tilt the rig",
       .partners = {"cable_spring", "torque_bias"},
+      .contains = {{.effect = "torque_bias", .exactly = false}},
+      .unlikely_beside = "cable_spring",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "gravity_n_m", names[0]));
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "gravity_rest_rad", names[1]));

@@ -35,6 +35,7 @@ Effect Effect_joint_compliance() {
       .signature = "resonance, anti-resonance",
       .told_apart = "chirp past it",
       .partners = {"command_delay", "backlash"},
+      .character = EffectCharacter::kSecondMass,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         // Damping in proportion to the stiffness, by the ratio at the rig's own inertia.
         const std::string inertia = ScaleName(on, RigSize::kInertia);

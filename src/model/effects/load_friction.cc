@@ -21,6 +21,8 @@ Effect Effect_load_friction() {
       .signature = "friction grows with torque",
       .told_apart = "two loads",
       .partners = {"coulomb_friction", "quadratic_drag"},
+      .character = EffectCharacter::kDryFriction,
+      .actuator_stage = 4,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "load_coefficient", names[0]));
         return Ok();

@@ -37,6 +37,10 @@ Effect Effect_stribeck_friction() {
       .signature = "hump at low speed, stick-slip",
       .told_apart = "creep",
       .partners = {"coulomb_friction"},
+      .character = EffectCharacter::kDryFriction,
+      .contains = {{.effect = "coulomb_friction"}},
+      // A hump over what slides.
+      .starts_from = {.effect = "coulomb_friction", .starts = {{{.of_simpler = 0.9}, {.of_simpler = 1.5}, {}}}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "friction_n_m", names[0]));
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "breakaway_n_m", names[1]));

@@ -10,6 +10,7 @@ Effect Effect_supply_sag() {
           {
               {.key = "time_constant_s",
                .unit = "s",
+               .role = ParameterRole::kTime,
                .scale = ScaleKind::kOne,
                .neutral = 0.3,
                .low = 0.05,
@@ -37,6 +38,11 @@ Effect Effect_supply_sag() {
       .signature = "the limit falls with load and time",
       .told_apart = "logged voltage",
       .partners = {"torque_limit", "torque_speed_curve"},
+      .contains = {{.effect = "torque_limit"}},
+      // A little higher, falling by a third, fast or slowly.
+      .starts_from = {.effect = "torque_limit",
+                      .starts = {{{.value = 0.15}, {.value = 0.3}, {.of_simpler = 1.2}},
+                                 {{.value = 0.8}, {.value = 0.3}, {.of_simpler = 1.2}}}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "sag_time_constant_s", names[0]));
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "sag_fraction", names[1]));

@@ -10,6 +10,7 @@ Effect Effect_torque_delay() {
           {
               {.key = "delay_s",
                .unit = "s",
+               .role = ParameterRole::kTime,
                .scale = ScaleKind::kOne,
                .neutral = 0,
                .low = 0,

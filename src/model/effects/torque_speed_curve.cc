@@ -21,6 +21,7 @@ Effect Effect_torque_speed_curve() {
       .signature = "limit falls with speed",
       .told_apart = "high speed and torque together",
       .partners = {"torque_limit", "quadratic_drag"},
+      .actuator_stage = 3,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "power_w", names[0]));
         return Ok();

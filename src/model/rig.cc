@@ -1,0 +1,123 @@
+#include "src/model/rig.h"
+
+#include <algorithm>
+
+namespace gapscope {
+namespace {
+
+// MuJoCo reports what it cannot refuse otherwise through mju_error, which by default ends the process.
+[[noreturn]] void ThrowMujocoError(const char* message) { throw std::runtime_error(message); }
+// What MuJoCo warns about (a state that blows up) is an outcome of a replay; by default it would write MUJOCO_LOG.TXT
+// into the user's folder.
+void DropMujocoWarning(const char*) {}
+
+std::string NameOf(const mjModel& m, mjtObj type, int id) {
+  const char* name = id < 0 ? nullptr : mj_id2name(&m, type, id);
+  return name ? name : "";
+}
+
+}  // namespace
+
+std::string OneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
+  mju_user_error = ThrowMujocoError;
+  mju_user_warning = DropMujocoWarning;
+  std::shared_ptr<Rig> rig(new Rig);
+  rig->experiment_ = experiment;
+  char message[1024] = "";
+  rig->spec_.reset(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
+  if (!rig->spec_) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
+  const SpecPtr copy = rig->CopySpec();
+  try {
+    rig->compiled_.reset(mj_compile(copy.get(), nullptr));
+  } catch (const std::exception& e) {
+    return Error{.what = "MuJoCo refuses the model: " + OneLine(e.what()), .where = experiment.model_path};
+  }
+  if (!rig->compiled_) {
+    return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(copy.get())),
+                 .where = experiment.model_path};
+  }
+  return std::shared_ptr<const Rig>(std::move(rig));
+}
+
+SpecPtr Rig::CopySpec() const {
+  const std::lock_guard lock(copying_);
+  return SpecPtr(mj_copySpec(spec_.get()));
+}
+
+std::vector<std::string> Rig::Joints() const {
+  std::vector<std::string> names;
+  for (mjsElement* e = mjs_firstElement(spec_.get(), mjOBJ_JOINT); e; e = mjs_nextElement(spec_.get(), e)) {
+    const mjsJoint* joint = mjs_asJoint(e);
+    const std::string name = mjs_getString(mjs_getName(e));
+    if ((joint->type == mjJNT_HINGE || joint->type == mjJNT_SLIDE) && !name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+std::vector<std::string> Rig::Actuators() const {
+  std::vector<std::string> names, joints;
+  for (mjsElement* e = mjs_firstElement(spec_.get(), mjOBJ_ACTUATOR); e; e = mjs_nextElement(spec_.get(), e)) {
+    const mjsActuator* actuator = mjs_asActuator(e);
+    const std::string target = mjs_getString(actuator->target), name = mjs_getString(mjs_getName(e));
+    // Further actuators on the same joint are inputs of the first one's drive.
+    if (actuator->trntype == mjTRN_JOINT && std::find(joints.begin(), joints.end(), target) != joints.end()) continue;
+    joints.push_back(target);
+    if (!name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+std::string Rig::JointOf(const std::string& actuator) const {
+  const int id = mj_name2id(compiled_.get(), mjOBJ_ACTUATOR, actuator.c_str());
+  const bool on_joint = id >= 0 && compiled_->actuator_trntype[id] == mjTRN_JOINT;
+  return on_joint ? NameOf(*compiled_, mjOBJ_JOINT, compiled_->actuator_trnid[2 * id]) : "";
+}
+
+std::string Rig::ActuatorOf(const std::string& joint) const {
+  for (const auto& name : Actuators()) {
+    if (JointOf(name) == joint) return name;
+  }
+  return "";
+}
+
+DriveFacts Rig::FactsOf(const std::string& actuator) const {
+  const int id = mj_name2id(compiled_.get(), mjOBJ_ACTUATOR, actuator.c_str());
+  return id < 0 ? DriveFacts{} : gapscope::FactsOf(*compiled_, id);
+}
+
+bool Rig::HasSpring(const std::string& joint) const {
+  const int id = mj_name2id(compiled_.get(), mjOBJ_JOINT, joint.c_str());
+  return id >= 0 && compiled_->jnt_stiffness[id] != 0;
+}
+
+bool Rig::HasFriction(const std::string& joint) const {
+  const int id = mj_name2id(compiled_.get(), mjOBJ_JOINT, joint.c_str());
+  return id >= 0 && compiled_->dof_frictionloss[compiled_->jnt_dofadr[id]] > 0;
+}
+
+std::vector<std::string> Rig::Signals() const {
+  std::vector<std::string> names;
+  for (const auto& measured : experiment_.measured) names.push_back(measured.signal);
+  return names;
+}
+
+std::string Rig::JointOfSignal(const std::string& signal) const {
+  for (const auto& measured : experiment_.measured) {
+    if (measured.signal == signal) return measured.kind == SignalKind::kTorque ? JointOf(measured.on) : measured.on;
+  }
+  return "";
+}
+
+CommandKind Rig::KindOfCommand(const std::string& actuator) const {
+  for (const auto& command : experiment_.commands) {
+    if (command.actuator == actuator) return command.kind;
+  }
+  return CommandKind::kOther;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,52 @@
+// An experiment's mechanism: its MJCF, read and compiled once, and what there is in it to act on. Shared and const;
+// each model with effects starts from a copy.
+#ifndef GAPSCOPE_MODEL_RIG_H_
+#define GAPSCOPE_MODEL_RIG_H_
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "src/core/mujoco_handles.h"
+#include "src/experiment/experiment.h"
+#include "src/model/drive_facts.h"
+
+namespace gapscope {
+
+// A message of MuJoCo's for an error of ours.
+std::string OneLine(std::string text);
+
+class Rig {
+ public:
+  // Errors: the MJCF does not load or compile (with MuJoCo's own message).
+  static Result<std::shared_ptr<const Rig>> Load(const Experiment& experiment);
+
+  const Experiment& experiment() const { return experiment_; }
+  const mjModel& compiled() const { return *compiled_; }
+  // The MJCF to be changed: this one stays as it was read.
+  SpecPtr CopySpec() const;
+
+  std::vector<std::string> Joints() const;                 // named hinge and slide joints
+  std::vector<std::string> Actuators() const;              // named actuators that are not a sibling input of another
+  std::string JointOf(const std::string& actuator) const;  // empty: not on a joint
+  std::string ActuatorOf(const std::string& joint) const;  // first actuator on the joint; empty: none
+  DriveFacts FactsOf(const std::string& actuator) const;   // of no actuator: nothing
+  bool HasSpring(const std::string& joint) const;
+  bool HasFriction(const std::string& joint) const;
+  std::vector<std::string> Signals() const;                    // measured signals of the experiment
+  std::string JointOfSignal(const std::string& signal) const;  // empty: no such signal
+  CommandKind KindOfCommand(const std::string& actuator) const;
+
+ private:
+  Rig() = default;
+
+  Experiment experiment_;
+  SpecPtr spec_;
+  mutable std::mutex copying_;  // MuJoCo does not say that one spec may be copied twice at a time
+  ModelPtr compiled_;
+};
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_MODEL_RIG_H_

@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "src/plugins/common/refusal.h"
+#include "src/plugins/common/register.h"
 
 namespace gapscope::plugins {
 namespace {
 
-constexpr const char* kAttributes[] = {"resolution_rad", "offset_rad",  "delay_s",       "time_constant_s",
-                                       "velocity",       "max_delay_s", "min_timestep_s"};
 constexpr double kDefaultMaxDelay_s = 0.05;
 
 bool Flag(std::string_view text, bool* value) {
@@ -18,13 +17,6 @@ bool Flag(std::string_view text, bool* value) {
 }
 
 }  // namespace
-
-const std::array<ParameterSpec, Encoder::kParameters> Encoder::kSpecs = {{
-    {"resolution_rad", "rad", 0, 0, 10},
-    {"offset_rad", "rad", 0, -1e6, 1e6},
-    {"delay_s", "s", 0, 0, 10},
-    {"time_constant_s", "s", 0, 0, 1e3},
-}};
 
 double Encoder::MaxDelay(const mjModel* m, int instance) {
   double value = 0;
@@ -42,66 +34,61 @@ int Encoder::StateSize(const mjModel* m, int instance) {
   return kSlots + History::Size(static_cast<int>(std::min(std::ceil(max_delay / step) + 2, 1e6)), 0);
 }
 
-std::unique_ptr<Encoder> Encoder::Create(const mjModel* m, int instance, std::string* problem) {
+std::unique_ptr<Encoder> Encoder::Create(const mjModel* m, int instance) {
   auto encoder = std::make_unique<Encoder>();
-  encoder->inert_ = true;
-  encoder->state_ = m->plugin_stateadr[instance];
+  const std::string problem = encoder->Resolve(m, instance);
+  encoder->inert_ = !problem.empty();
+  return encoder->inert_ && Refuse(m, problem) ? nullptr : std::move(encoder);
+}
+
+std::string Encoder::Resolve(const mjModel* m, int instance) {
+  state_ = m->plugin_stateadr[instance];
   const std::string who = "gapscope.encoder instance '" + InstanceName(m, instance) + "': ";
 
-  if (*problem = encoder->live_.Resolve(m, instance, kSpecs); !problem->empty()) {
-    *problem = "gapscope.encoder " + *problem;
-    return encoder;
-  }
+  if (const std::string fault = live_.Resolve(m, instance, kSpecs); !fault.empty()) return "gapscope.encoder " + fault;
   const std::string_view velocity_text = ConfigText(m, instance, "velocity");
-  if (!Flag(velocity_text, &encoder->velocity_)) {
-    *problem = who + "attribute 'velocity' is '" + std::string(velocity_text) + "', allowed true, false";
-    return encoder;
+  if (!Flag(velocity_text, &velocity_)) {
+    return who + "attribute 'velocity' is '" + std::string(velocity_text) + "', allowed true, false";
   }
   for (const char* key : {"max_delay_s", "min_timestep_s"}) {
     const std::string_view text = ConfigText(m, instance, key);
     double value = 0;
     if (!text.empty() && (!ParseNumber(text, &value) || value < 0 || value > 10)) {
-      *problem = who + "attribute '" + key + "' is '" + std::string(text) + "', allowed 0 to 10 s; leave it out";
-      return encoder;
+      return who + "attribute '" + key + "' is '" + std::string(text) + "', allowed 0 to 10 s; leave it out";
     }
   }
-  encoder->max_delay_s_ = MaxDelay(m, instance);
-  if (const double delay = encoder->live_(m, kDelay); delay > encoder->max_delay_s_) {
-    *problem = who + "attribute 'delay_s' is " + std::to_string(delay) +
-               " s, allowed 0 to max_delay_s = " + std::to_string(encoder->max_delay_s_) + " s; raise max_delay_s";
-    return encoder;
+  max_delay_s_ = MaxDelay(m, instance);
+  if (const double delay = live_(m, kDelay); delay > max_delay_s_) {
+    return who + "attribute 'delay_s' is " + std::to_string(delay) +
+           " s, allowed 0 to max_delay_s = " + std::to_string(max_delay_s_) + " s; raise max_delay_s";
   }
 
   int sensor = -1;
   for (int i = 0; i < m->nsensor; ++i) {
     if (m->sensor_plugin[i] != instance) continue;
     if (sensor >= 0) {
-      *problem = who + "two sensors name it, allowed one per instance; make another instance";
-      return encoder;
+      return who + "two sensors name it, allowed one per instance; make another instance";
     }
     sensor = i;
   }
   if (sensor < 0) {
-    *problem = who + "no sensor names it, allowed one; add <sensor><plugin objtype=\"joint\" .../>";
-    return encoder;
+    return who + "no sensor names it, allowed one; add <sensor><plugin objtype=\"joint\" .../>";
   }
   const int joint = m->sensor_objid[sensor];
   if (m->sensor_objtype[sensor] != mjOBJ_JOINT ||
       (m->jnt_type[joint] != mjJNT_HINGE && m->jnt_type[joint] != mjJNT_SLIDE)) {
-    *problem = who + "its sensor is not on a hinge or slide joint; write objtype=\"joint\" objname=\"...\"";
-    return encoder;
+    return who + "its sensor is not on a hinge or slide joint; write objtype=\"joint\" objname=\"...\"";
   }
-  encoder->output_ = m->sensor_adr[sensor];
-  encoder->qpos_ = m->jnt_qposadr[joint];
-  encoder->dof_ = m->jnt_dofadr[joint];
-  if (!encoder->live_.IsNeutral(kDelay, 0)) {
-    encoder->capacity_ = History::Capacity(m->plugin_statenum[instance] - kSlots, 0);
+  output_ = m->sensor_adr[sensor];
+  qpos_ = m->jnt_qposadr[joint];
+  dof_ = m->jnt_dofadr[joint];
+  if (!live_.IsNeutral(kDelay, 0)) {
+    capacity_ = History::Capacity(m->plugin_statenum[instance] - kSlots, 0);
   }
-  encoder->inert_ = false;
-  return encoder;
+  return {};
 }
 
-void Encoder::Compute(const mjModel* m, mjData* d) const {
+void Encoder::Compute(const mjModel* m, mjData* d, int) const {
   if (inert_) return;
   double* slots = d->plugin_state + state_;
   Motion motion{d->qpos[qpos_], d->qvel[dof_]};
@@ -130,7 +117,7 @@ void Encoder::Compute(const mjModel* m, mjData* d) const {
   if (velocity_) d->sensordata[output_ + 1] = speed;
 }
 
-void Encoder::Advance(mjData* d) const {
+void Encoder::Advance(const mjModel*, mjData* d) const {
   double* slots = d->plugin_state + state_;
   if (inert_ || slots[kOpen] == 0) return;
   slots[kOpen] = 0;
@@ -141,43 +128,17 @@ void Encoder::Advance(mjData* d) const {
   if (capacity_ > 0) History(slots + kSlots, capacity_, 0).Close();
 }
 
-void Encoder::Register() {
-  mjpPlugin plugin;
-  mjp_defaultPlugin(&plugin);
-  plugin.name = "gapscope.encoder";
-  plugin.capabilityflags = mjPLUGIN_SENSOR;
+void RegisterEncoder() {
+  static const std::vector<const char*> attributes =
+      AttributesOf(Encoder::kSpecs, {"velocity", "max_delay_s", "min_timestep_s"});
+  mjpPlugin plugin = PluginOf<Encoder>("gapscope.encoder", mjPLUGIN_SENSOR, attributes, Encoder::StateSize);
   plugin.needstage = mjSTAGE_VEL;
-  plugin.nattribute = static_cast<int>(std::size(kAttributes));
-  plugin.attributes = kAttributes;
-  plugin.nstate = +[](const mjModel* m, int instance) { return StateSize(m, instance); };
   plugin.nsensordata = +[](const mjModel* m, int instance, int) {
     bool velocity = false;
     Flag(ConfigText(m, instance, "velocity"), &velocity);
     return velocity ? 2 : 1;
   };
-  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
-    std::string problem;
-    std::unique_ptr<Encoder> encoder = Encoder::Create(m, instance, &problem);
-    if (!problem.empty() && Refuse(m, problem)) return -1;
-    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(encoder.release());
-    return 0;
-  };
-  plugin.destroy = +[](mjData* d, int instance) {
-    delete reinterpret_cast<Encoder*>(d->plugin_data[instance]);
-    d->plugin_data[instance] = 0;
-  };
-  plugin.reset = +[](const mjModel* m, mjtNum* plugin_state, void*, int instance) {
-    mju_zero(plugin_state, m->plugin_statenum[instance]);
-  };
-  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
-    reinterpret_cast<const Encoder*>(d->plugin_data[instance])->Compute(m, d);
-  };
-  plugin.advance = +[](const mjModel*, mjData* d, int instance) {
-    reinterpret_cast<const Encoder*>(d->plugin_data[instance])->Advance(d);
-  };
   mjp_registerPlugin(&plugin);
 }
-
-void RegisterEncoder() { Encoder::Register(); }
 
 }  // namespace gapscope::plugins

@@ -18,20 +18,27 @@ namespace gapscope::plugins {
 // Resolved once per mjData; all that changes is in plugin_state.
 class Encoder {
  public:
-  // `problem` is empty or says why the instance cannot work; it is then inert and reads zero.
-  static std::unique_ptr<Encoder> Create(const mjModel* m, int instance, std::string* problem);
+  enum Parameter { kResolution, kOffset, kDelay, kTimeConstant, kParameters };
+  static constexpr std::array<ParameterSpec, kParameters> kSpecs = {{
+      {"resolution_rad", "rad", 0, 0, 10},
+      {"offset_rad", "rad", 0, -1e6, 1e6},
+      {"delay_s", "s", 0, 0, 10},
+      {"time_constant_s", "s", 0, 0, 1e3},
+  }};
+
+  // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model is inert: it reads
+  // zero.
+  static std::unique_ptr<Encoder> Create(const mjModel* m, int instance);
   static int StateSize(const mjModel* m, int instance);
 
   // Writes the reading(s) at d->time.
-  void Compute(const mjModel* m, mjData* d) const;
+  void Compute(const mjModel* m, mjData* d, int capability) const;
   // The step is over: its reading is the last one.
-  void Advance(mjData* d) const;
-
-  static void Register();
+  void Advance(const mjModel* m, mjData* d) const;
 
  private:
-  enum Parameter { kResolution, kOffset, kDelay, kTimeConstant, kParameters };
-  static const std::array<ParameterSpec, kParameters> kSpecs;
+  // Reads what the MJCF says; why the instance cannot work, or an empty text.
+  std::string Resolve(const mjModel* m, int instance);
   // State before the history: the last reading and the one of the step that is open.
   enum Slot { kOpen, kHasLast, kLastTime, kLastAngle, kLastSpeed, kTime, kAngle, kSpeed, kSlots };
   static double MaxDelay(const mjModel* m, int instance);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "src/plugins/common/refusal.h"
+#include "src/plugins/common/register.h"
 
 namespace gapscope::plugins {
 namespace {
@@ -214,6 +215,11 @@ void Friction::WriteRow(const mjModel* m, mjData* d, double level, bool soften) 
   }
 }
 
+void Friction::Compute(const mjModel* m, mjData* d, int capability) const {
+  if (capability & mjPLUGIN_PASSIVE) ComputePassive(m, d);
+  if (capability & mjPLUGIN_ACTUATOR) ComputeActuator(m, d);
+}
+
 void Friction::ComputePassive(const mjModel* m, mjData* d) const {
   if (inert_) return;
   State& state = StateOf(d);
@@ -263,41 +269,10 @@ void Friction::Advance(const mjModel* m, mjData* d) const {
 }
 
 void RegisterFriction() {
-  static const auto attributes = [] {
-    std::array<const char*, Friction::kKeyCount + 3> names{};
-    std::transform(Friction::kSpecs.begin(), Friction::kSpecs.end(), names.begin(),
-                   [](const ParameterSpec& spec) { return spec.key; });
-    names[Friction::kKeyCount] = "joint";
-    names[Friction::kKeyCount + 1] = "load";
-    names[Friction::kKeyCount + 2] = "model";
-    return names;
-  }();
-  mjpPlugin plugin;
-  mjp_defaultPlugin(&plugin);
-  plugin.name = Friction::kName;
-  plugin.nattribute = static_cast<int>(attributes.size());
-  plugin.attributes = attributes.data();
-  plugin.capabilityflags = mjPLUGIN_PASSIVE | mjPLUGIN_ACTUATOR;
-  plugin.nstate = +[](const mjModel*, int) { return Friction::kStateSize; };
-  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
-    auto friction = Friction::Create(m, instance);
-    if (!friction) return -1;
-    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(friction.release());
-    return 0;
-  };
-  plugin.destroy = +[](mjData* d, int instance) {
-    delete reinterpret_cast<Friction*>(d->plugin_data[instance]);
-    d->plugin_data[instance] = 0;
-  };
-  plugin.reset = +[](const mjModel*, mjtNum* state, void*, int) { std::fill_n(state, Friction::kStateSize, 0.0); };
-  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int capability) {
-    const auto* friction = reinterpret_cast<Friction*>(d->plugin_data[instance]);
-    if (capability & mjPLUGIN_PASSIVE) friction->ComputePassive(m, d);
-    if (capability & mjPLUGIN_ACTUATOR) friction->ComputeActuator(m, d);
-  };
-  plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
-    reinterpret_cast<Friction*>(d->plugin_data[instance])->Advance(m, d);
-  };
+  static const std::vector<const char*> attributes = AttributesOf(Friction::kSpecs, {"joint", "load", "model"});
+  const mjpPlugin plugin = PluginOf<Friction>(
+      Friction::kName, mjPLUGIN_PASSIVE | mjPLUGIN_ACTUATOR, attributes,
+      +[](const mjModel*, int) { return Friction::kStateSize; });
   mjp_registerPlugin(&plugin);
 }
 

@@ -79,14 +79,15 @@ class Friction {
   // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model does nothing.
   static std::unique_ptr<Friction> Create(const mjModel* m, int instance);
 
-  // Rewrites the joint's row with what PASSIVE knows and adds viscous and quadratic drag, or LuGre's torque.
-  void ComputePassive(const mjModel* m, mjData* d) const;
-  // Rewrites it again, with this step's actuator torque.
-  void ComputeActuator(const mjModel* m, mjData* d) const;
+  void Compute(const mjModel* m, mjData* d, int capability) const;
   // Remembers the step's torques and settles the bristle.
   void Advance(const mjModel* m, mjData* d) const;
 
  private:
+  // Rewrites the joint's row with what PASSIVE knows and adds viscous and quadratic drag, or LuGre's torque.
+  void ComputePassive(const mjModel* m, mjData* d) const;
+  // Rewrites it again, with this step's actuator torque.
+  void ComputeActuator(const mjModel* m, mjData* d) const;
   // The faults of what stands in <config> and the model, and of numbers; empty when there is none.
   std::string ResolveStructure(const mjModel* m, int instance);
   std::string ResolveValues(const mjModel* m, int instance);

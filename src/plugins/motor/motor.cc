@@ -6,6 +6,7 @@
 #include <string>
 
 #include "src/plugins/common/refusal.h"
+#include "src/plugins/common/register.h"
 
 namespace gapscope::plugins {
 namespace {
@@ -20,12 +21,13 @@ bool Disabled(const mjModel* m, int actuator) {
 
 }  // namespace
 
-std::unique_ptr<Motor> Motor::Create(const mjModel* m, int instance, std::string* problem) {
+std::unique_ptr<Motor> Motor::Create(const mjModel* m, int instance) {
   auto motor = std::make_unique<Motor>();
   MotorConfig& config = motor->config_;
-  *problem = config.Parse(m, instance);
+  const std::string problem = config.Parse(m, instance);
   motor->state_ = m->plugin_stateadr[instance];
-  if (!problem->empty()) {
+  if (!problem.empty()) {
+    if (Refuse(m, problem)) return nullptr;
     motor->inert_ = true;
     return motor;
   }
@@ -149,7 +151,7 @@ double Motor::Load(const mjModel* m, double torque, const Limits& limits, double
   return ceiling > 0 ? std::min(1.0, std::abs(torque) / ceiling) : 0;
 }
 
-void Motor::Compute(const mjModel* m, mjData* d) const {
+void Motor::Compute(const mjModel* m, mjData* d, int) const {
   if (inert_ || Disabled(m, first_)) return;
   double* slots = d->plugin_state + state_;
   const double step = m->opt.timestep, now = d->time;
@@ -248,37 +250,12 @@ void Motor::Advance(const mjModel*, mjData* d) const {
   if (history_) History(slots + MotorState::kSlots, capacity_, config_.inputs).Close();
 }
 
-void Motor::Register() {
-  mjpPlugin plugin;
-  mjp_defaultPlugin(&plugin);
-  plugin.name = kMotorName;
-  plugin.capabilityflags = mjPLUGIN_ACTUATOR;
-  plugin.nattribute = static_cast<int>(MotorAttributes().size());
-  plugin.attributes = MotorAttributes().data();
-  plugin.nstate = +[](const mjModel* m, int instance) { return MotorStateSize(m, instance); };
-  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
-    std::string problem;
-    std::unique_ptr<Motor> motor = Motor::Create(m, instance, &problem);
-    if (!problem.empty() && Refuse(m, problem)) return -1;
-    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(motor.release());
-    return 0;
-  };
-  plugin.destroy = +[](mjData* d, int instance) {
-    delete reinterpret_cast<Motor*>(d->plugin_data[instance]);
-    d->plugin_data[instance] = 0;
-  };
-  plugin.reset = +[](const mjModel* m, mjtNum* plugin_state, void*, int instance) {
-    mju_zero(plugin_state, m->plugin_statenum[instance]);
-  };
-  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
-    reinterpret_cast<const Motor*>(d->plugin_data[instance])->Compute(m, d);
-  };
-  plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
-    reinterpret_cast<const Motor*>(d->plugin_data[instance])->Advance(m, d);
-  };
+void RegisterMotor() {
+  static const std::vector<const char*> attributes =
+      AttributesOf(kMotorSpecs, {"law", "inputs", "dead_zone_on", "max_delay_s", "min_timestep_s", "speed_table",
+                                 "torque_table", "generating_torque_table", "table_interpolation"});
+  const mjpPlugin plugin = PluginOf<Motor>(kMotorName, mjPLUGIN_ACTUATOR, attributes, MotorStateSize);
   mjp_registerPlugin(&plugin);
 }
-
-void RegisterMotor() { Motor::Register(); }
 
 }  // namespace gapscope::plugins

@@ -21,15 +21,13 @@ namespace gapscope::plugins {
 // What one instance keeps beside its state: resolved once, the same for all steps, no state of its own.
 class Motor {
  public:
-  // `problem` is empty or says why the instance cannot work; it is then inert: no torque.
-  static std::unique_ptr<Motor> Create(const mjModel* m, int instance, std::string* problem);
+  // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model is inert: no torque.
+  static std::unique_ptr<Motor> Create(const mjModel* m, int instance);
 
   // Writes the first actuator's force and its activations' derivatives. Once a step, RK4: four times.
-  void Compute(const mjModel* m, mjData* d) const;
+  void Compute(const mjModel* m, mjData* d, int capability) const;
   // The step is over: its start joins the history.
   void Advance(const mjModel* m, mjData* d) const;
-
-  static void Register();
 
  private:
   // Limits on the torque at the present speed, before sag.

@@ -67,23 +67,6 @@ bool Numbers(std::string_view text, std::vector<double>* values) {
 
 }  // namespace
 
-std::span<const char* const> MotorAttributes() {
-  static const std::vector<const char*> attributes = [] {
-    std::vector<const char*> all = {"law",
-                                    "inputs",
-                                    "dead_zone_on",
-                                    "max_delay_s",
-                                    "min_timestep_s",
-                                    "speed_table",
-                                    "torque_table",
-                                    "generating_torque_table",
-                                    "table_interpolation"};
-    for (const ParameterSpec& spec : kMotorSpecs) all.push_back(spec.key);
-    return all;
-  }();
-  return attributes;
-}
-
 int MotorStateSize(const mjModel* m, int instance) {
   const double max_delay = MaxDelay(m, instance);
   if (!(max_delay > 0) || max_delay > 10) return MotorState::kSlots;

@@ -93,9 +93,6 @@ inline constexpr std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"limit_softness", "1", 0, 0, 1},
 }};
 
-// All attributes that `<config>` may hold: structure, and the keys of kMotorSpecs.
-std::span<const char* const> MotorAttributes();
-
 struct MotorConfig {
   MotorLaw law = MotorLaw::kPosition;
   int inputs = 1;                      // actuators of the instance, in order of id

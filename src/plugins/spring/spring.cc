@@ -5,6 +5,7 @@
 #include <string>
 
 #include "src/plugins/common/refusal.h"
+#include "src/plugins/common/register.h"
 
 namespace gapscope::plugins {
 std::unique_ptr<Spring> Spring::Create(const mjModel* m, int instance) {
@@ -50,7 +51,7 @@ double Spring::Torque(const mjModel* m, double q) const {
   return torque;
 }
 
-void Spring::ComputePassive(const mjModel* m, mjData* d) const {
+void Spring::Compute(const mjModel* m, mjData* d, int) const {
   if (dof_ < 0) return;
   const double q = d->qpos[angle_address_];
   double torque = Torque(m, q);
@@ -72,37 +73,9 @@ void Spring::Advance(const mjModel* m, mjData* d) const {
 }
 
 void RegisterSpring() {
-  static const auto attributes = [] {
-    std::array<const char*, Spring::kKeyCount + 1> names{};
-    std::transform(Spring::kSpecs.begin(), Spring::kSpecs.end(), names.begin(),
-                   [](const ParameterSpec& spec) { return spec.key; });
-    names[Spring::kKeyCount] = "joint";
-    return names;
-  }();
-  mjpPlugin plugin;
-  mjp_defaultPlugin(&plugin);
-  plugin.name = Spring::kName;
-  plugin.nattribute = static_cast<int>(attributes.size());
-  plugin.attributes = attributes.data();
-  plugin.capabilityflags = mjPLUGIN_PASSIVE;
-  plugin.nstate = +[](const mjModel*, int) { return Spring::kStateSize; };
-  plugin.init = +[](const mjModel* m, mjData* d, int instance) {
-    auto spring = Spring::Create(m, instance);
-    if (!spring) return -1;
-    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(spring.release());
-    return 0;
-  };
-  plugin.destroy = +[](mjData* d, int instance) {
-    delete reinterpret_cast<Spring*>(d->plugin_data[instance]);
-    d->plugin_data[instance] = 0;
-  };
-  plugin.reset = +[](const mjModel*, mjtNum* state, void*, int) { std::fill_n(state, Spring::kStateSize, 0.0); };
-  plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {
-    reinterpret_cast<Spring*>(d->plugin_data[instance])->ComputePassive(m, d);
-  };
-  plugin.advance = +[](const mjModel* m, mjData* d, int instance) {
-    reinterpret_cast<Spring*>(d->plugin_data[instance])->Advance(m, d);
-  };
+  static const std::vector<const char*> attributes = AttributesOf(Spring::kSpecs, {"joint"});
+  const mjpPlugin plugin = PluginOf<Spring>(
+      Spring::kName, mjPLUGIN_PASSIVE, attributes, +[](const mjModel*, int) { return Spring::kStateSize; });
   mjp_registerPlugin(&plugin);
 }
 

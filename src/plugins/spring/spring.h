@@ -57,7 +57,7 @@ class Spring {
   // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model does nothing.
   static std::unique_ptr<Spring> Create(const mjModel* m, int instance);
 
-  void ComputePassive(const mjModel* m, mjData* d) const;
+  void Compute(const mjModel* m, mjData* d, int capability) const;
   // Settles the bristle once per step, whatever the integrator.
   void Advance(const mjModel* m, mjData* d) const;
 

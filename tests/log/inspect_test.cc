@@ -168,7 +168,28 @@ TEST(InspectTest, SurvivesNaNHugeAndTinyValues) {
                           c % 2 ? ChannelRole::kMeasured : ChannelRole::kCommand, std::move(values)});
     }
     const InspectReport report = Inspect(timeline, channels, {}, 60);
-    EXPECT_FALSE(ToJson(report, "log.csv").dump().empty());
+    // As it is printed: what is no number, or no finite one, is null.
+    const auto json = nlohmann::ordered_json::parse(ToJson(report, "log.csv").dump());
+    EXPECT_EQ(json["time"]["rows"], 60);
+    ASSERT_EQ(json["channels"].size(), channels.size());
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      SCOPED_TRACE(c);
+      const auto& x = channels[c].values;
+      double least = INFINITY, most = -INFINITY, missing = 0;
+      for (const double value : x) {
+        std::isnan(value) ? ++missing : (least = std::min(least, value), most = std::max(most, value));
+      }
+      EXPECT_EQ(report.channels[c].name, channels[c].name);
+      EXPECT_NEAR(report.channels[c].missing_share, missing / 60, 1e-12);
+      if (missing == 60) {
+        EXPECT_TRUE(std::isnan(report.channels[c].minimum));
+        EXPECT_TRUE(json["channels"][c]["minimum"].is_null()) << json["channels"][c];
+      } else {
+        EXPECT_EQ(report.channels[c].minimum, least);
+        EXPECT_EQ(report.channels[c].maximum, most);
+        EXPECT_EQ(json["channels"][c]["maximum"], most);
+      }
+    }
   }
 }
 

@@ -134,8 +134,14 @@ TEST_F(DirectionTest, ATorqueBiasPushesAndAGravityOffsetPullsDown) {
 TEST_F(DirectionTest, CoggingRepeatsOverTheTurn) {
   Build("cogging");
   Run(Zero, 0, 1e-3, {{"amplitude_n_m", 0.1}, {"periods_per_rev", 12}});
-  // A stiffness of +-12 times the amplitude near 0: oscillation or growth, either way not a straight line.
-  EXPECT_GT(std::abs(q_.back() - 1e-3 * 0.5), 1e-5);
+  // J q'' = A sin(P q): near 0, where the torque pushes away, it grows as sinh; all along it keeps J w^2 / 2 + A cos(P
+  // q) / P.
+  const double rate = std::sqrt(0.1 * 12 / kInertia);
+  EXPECT_NEAR(q_[125], 1e-3 / rate * std::sinh(rate * t_[125]), 1e-7);
+  for (std::size_t k = 0; k < t_.size(); k += 25) {
+    const double energy = 0.5 * kInertia * w_[k] * w_[k] + 0.1 / 12 * std::cos(12 * q_[k]);
+    EXPECT_NEAR(energy, 0.5 * kInertia * 1e-6 + 0.1 / 12, 1e-10) << t_[k];
+  }
   Run(Zero, 2 * std::numbers::pi / 12, 1e-3, {{"amplitude_n_m", 0.1}, {"periods_per_rev", 12}});
   const std::vector<double> shifted = q_;
   Run(Zero, 0, 1e-3, {{"amplitude_n_m", 0.1}, {"periods_per_rev", 12}});
@@ -144,14 +150,21 @@ TEST_F(DirectionTest, CoggingRepeatsOverTheTurn) {
 
 TEST_F(DirectionTest, SpringHardeningRaisesTheFrequency) {
   Build("spring_hardening", kMotor, "stiffness=\"0.5\"");
-  Run(Zero, 0.5, 0, {{"cubic_n_m_per_rad3", 0}});
-  const auto first_crossing = [&] {
-    return t_[static_cast<std::size_t>(std::find_if(q_.begin(), q_.end(), [](double q) { return q < 0; }) -
-                                       q_.begin())];
-  };
-  const double soft = first_crossing();
-  Run(Zero, 0.5, 0, {{"cubic_n_m_per_rad3", 2}});
-  EXPECT_LT(first_crossing(), 0.9 * soft);
+  // Duffing's equation J q'' = -k q - c q^3 from rest at a: q = a cn(W t | m), W^2 = (k + c a^2) / J,
+  // m = c a^2 / 2 (k + c a^2); zero after a quarter period K(m) / W.
+  constexpr double kStiffness = 0.5, kStart = 0.5;
+  for (const double cubic : {0.0, 2.0}) {
+    Run(Zero, kStart, 0, {{"cubic_n_m_per_rad3", cubic}});
+    const double total = kStiffness + cubic * kStart * kStart, m = 0.5 * cubic * kStart * kStart / total;
+    const double quarter_s = std::comp_ellint_1(std::sqrt(m)) / std::sqrt(total / kInertia);
+    const auto after =
+        static_cast<std::size_t>(std::find_if(q_.begin(), q_.end(), [](double q) { return q < 0; }) - q_.begin());
+    ASSERT_GT(after, 0u);
+    ASSERT_LT(after, q_.size());
+    // Where it crosses zero it hardly accelerates: a straight line between two rows.
+    const double crossing_s = t_[after] + (t_[after - 1] - t_[after]) * q_[after] / (q_[after] - q_[after - 1]);
+    EXPECT_NEAR(crossing_s, quarter_s, 1e-6) << cubic;
+  }
 }
 
 TEST_F(DirectionTest, LimitsCapTheTorque) {

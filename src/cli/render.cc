@@ -73,7 +73,7 @@ Result<std::vector<VideoModel>> ModelsOf(const RenderFlags& flags, const Session
     }
     const auto [label, path] = LabelAndPath(text);
     const ScaleTable scales = EstimateScales(*session.model, session.recordings);
-    GS_ASSIGN(ResultModel result, LoadResultModel(session.experiment, path, scales));
+    GS_ASSIGN(ResultModel result, LoadResultModel(session.model->rig(), path, scales));
     models.push_back({label, std::move(result.model), std::move(result.values)});
   }
   const bool changed = !flags.model.with.empty() || !flags.model.set.empty() || !flags.model.params.empty();

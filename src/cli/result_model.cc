@@ -7,15 +7,14 @@
 
 namespace gapscope::cli {
 
-Result<ResultModel> LoadResultModel(const Experiment& experiment, const std::string& path, const ScaleTable& scales) {
+Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales) {
   GS_ASSIGN(const auto json, ReadJson(path));
   GS_ASSIGN(const RunModel held, ReadRunModel(json, path));
   std::vector<std::string> texts;
   for (const auto& use : held.effects) texts.push_back(use.Text());
   ResultModel result;
-  GS_ASSIGN(result.model, Model::Load(experiment));
-  GS_ASSIGN(const auto uses, ParseEffects(texts, *result.model->rig()));
-  GS_ASSIGN(result.model, Model::Build(result.model->rig(), uses, scales));
+  GS_ASSIGN(const auto uses, ParseEffects(texts, *rig));
+  GS_ASSIGN(result.model, Model::Build(std::move(rig), uses, scales));
   result.values = result.model->Nominal();
   for (const auto& [name, value] : held.values) {
     if (!std::isfinite(value)) return Error{.what = "the value of '" + name + "' is no number", .where = path};

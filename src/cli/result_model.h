@@ -15,9 +15,9 @@ struct ResultModel {
   std::vector<double> values;
 };
 
-// `path`: the folder or its result.json. Errors: not such a file; an effect or a parameter that this experiment does
-// not have.
-Result<ResultModel> LoadResultModel(const Experiment& experiment, const std::string& path, const ScaleTable& scales);
+// `path`: the folder or its result.json. Errors: not such a file; an effect or a parameter that this rig does not
+// have.
+Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales);
 
 }  // namespace gapscope::cli
 

@@ -51,7 +51,7 @@ TEST(RulesTest, ABiasIsNoFindingOnAPositionServo) {
                                              {"ak80", "joint", true}}) {
     const Rig rig = LoadRig(name);
     EXPECT_EQ(IsFinding({"torque_bias", joint}, *rig.model), finding) << name;
-    EXPECT_TRUE(IsFinding({"coulomb_friction", joint}, *rig.model)) << name;
+    EXPECT_TRUE(IsFinding({"quadratic_drag", joint}, *rig.model)) << name;
   }
 }
 

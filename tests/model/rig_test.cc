@@ -168,5 +168,25 @@ TEST_F(RigTest, MemoriesAreTheTimesThatADriveRemembers) {
   EXPECT_EQ(names, (std::vector<std::string>{"actuator_lag@servo.time_constant_s", "supply_sag@duty.time_constant_s"}));
 }
 
+// A copy of the MJCF finds the files beside it, whatever folder the program runs in.
+TEST(RigFilesTest, ACopyKeepsWhatIsDrawn) {
+  const Scratch scratch;
+  scratch.Write("tetra.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  const auto model = MakeModel(MakeExperiment(scratch, R"(<mujoco>
+    <asset><mesh name="tetra" file="tetra.obj"/></asset>
+    <worldbody><body><joint name="hinge"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <geom type="mesh" mesh="tetra" contype="0" conaffinity="0"/></body></worldbody></mujoco>)",
+                                              "measured:\n  - {signal: q, column: q, joint: hinge, unit: rad}\n"),
+                               {{"torque_bias", "hinge"}});
+  ASSERT_NE(model, nullptr);
+  EXPECT_EQ(model->compiled().nmesh, 0) << "a replay draws nothing";
+  for (int time = 0; time < 2; ++time) {
+    const auto drawn = model->CompileForDrawing(model->Nominal(), {});
+    ASSERT_TRUE(drawn.ok()) << drawn.error().Text();
+    EXPECT_EQ(drawn.value()->nmesh, 1);
+    EXPECT_EQ(drawn.value()->nmeshface, 4);
+  }
+}
+
 }  // namespace
 }  // namespace gapscope::testing

@@ -29,16 +29,17 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
   std::shared_ptr<Rig> rig(new Rig);
   rig->experiment_ = experiment;
   char message[1024] = "";
-  rig->spec_.reset(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
-  if (!rig->spec_) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
-  const SpecPtr copy = rig->CopySpec();
+  const SpecPtr read(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
+  if (!read) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
+  rig->spec_.reset(mj_copySpec(read.get()));
   try {
-    rig->compiled_.reset(mj_compile(copy.get(), nullptr));
+    // What was read is compiled, not a copy: copying leaves out what refers to nothing, which is an error here.
+    rig->compiled_.reset(mj_compile(read.get(), nullptr));
   } catch (const std::exception& e) {
     return Error{.what = "MuJoCo refuses the model: " + OneLine(e.what()), .where = experiment.model_path};
   }
   if (!rig->compiled_) {
-    return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(copy.get())),
+    return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(read.get())),
                  .where = experiment.model_path};
   }
   return std::shared_ptr<const Rig>(std::move(rig));

@@ -46,7 +46,7 @@ measured:
   - {signal: angle, column: q, joint: sprung, unit: rad}
   - {signal: torque, column: t, kind: torque, actuator: duty}
 parameters:
-  rough.friction: {unit: N m, nominal: 0.2}
+  rough.friction: {unit: N m, nominal: 0.2, frozen: true}
 set:
   joint/rough/frictionloss: rough.friction
 )";

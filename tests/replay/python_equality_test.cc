@@ -60,8 +60,7 @@ void ExpectEqualStates(const std::string& which) {
     ASSERT_NE(model, nullptr);
     std::map<std::string, double> set;
     for (const auto& use : uses.value()) {
-      const auto placed = PlacedParameters(use, *model->rig(), scales);
-      for (const auto& p : placed.value()) set[p.name] = p.start;
+      for (const auto& p : PlacedParameters(use, *model->rig(), scales)) set[p.name] = p.start;
     }
     const auto xml = model->ToXml(ValuesWith(*model, set), {}, scales);
     ASSERT_TRUE(xml.ok()) << xml.error().Text();

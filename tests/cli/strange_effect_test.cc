@@ -46,7 +46,7 @@ TEST_F(StrangeEffectTest, IsReplayedReportedAndExported) {
   EXPECT_EQ(result["parameters"]["creaking_hinge@arm.loop_n_m"], 0.0009765625);
   EXPECT_NE(ReadAll(out + "/report.html").find("a hinge that creaks"), std::string::npos);
   const std::string xml = ReadAll(out + "/model.xml");
-  EXPECT_NE(xml.find("name=\"arm.spring.hysteresis_n_m\" data=\"0.000976562\""), std::string::npos) << xml;
+  EXPECT_NE(xml.find("name=\"arm.spring.hysteresis_n_m\" size=\"1\" data=\"0.000976562\""), std::string::npos) << xml;
 }
 
 TEST_F(StrangeEffectTest, IsACandidateOfADiagnosis) {

@@ -7,12 +7,16 @@
 #include <numeric>
 
 #include "src/diagnose/rules.h"
+#include "tests/tune/fixture.h"
 
 namespace gapscope {
 namespace {
 
 std::unique_ptr<Candidate> WithBlocks(const char* effect, std::size_t parameters, std::vector<double> blocks) {
+  // What effects are to each other depends on where they act.
+  static const std::shared_ptr<const Model> model = testing::LoadRig("joint").model;
   auto candidate = std::make_unique<Candidate>();
+  candidate->model = model;
   if (*effect) candidate->effects = {{effect, "joint"}};
   candidate->parameters = parameters;
   candidate->block_floor = 1;

@@ -122,11 +122,11 @@ TEST_F(JournalTest, ChangedModelIsAnotherJob) {
   refused("a bound");
   rig_.experiment = before.experiment;
   rig_.experiment.settings.push_back({"option/gravity", {"0", "0", "-1"}, "test"});
-  rig_.model = Model::Build(rig_.experiment).value();
+  rig_.model = Model::Load(rig_.experiment).value();
   refused("a setting");
   rig_ = before;
   rig_.experiment.measured[0].resolution = 1e-3;
-  rig_.model = Model::Build(rig_.experiment).value();
+  rig_.model = Model::Load(rig_.experiment).value();
   refused("a sensor's resolution");
   rig_ = before;
   const auto logs = logs_;

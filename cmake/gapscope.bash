@@ -7,9 +7,9 @@ _gapscope() {
     return
   fi
   help=$("$program" "${COMP_WORDS[1]}" --help 2>/dev/null) || return
-  # An option that takes one of a set: "--mode TEXT:{free_run,windows}".
+  # An option that takes one of a set: "--mode {free_run,windows}".
   local choices
-  choices=$(sed -n "s/^  ${previous} [A-Z]*:{\([^}]*\)}.*/\1/p" <<<"$help")
+  choices=$(sed -n "s/^  ${previous} [A-Z:]*{\([^}]*\)}.*/\1/p" <<<"$help")
   if [ -n "$choices" ]; then
     mapfile -t COMPREPLY < <(compgen -W "${choices//,/ }" -- "$current")
   elif [[ $current == -* ]]; then

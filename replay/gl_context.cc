@@ -53,7 +53,7 @@ Status Open(GlBackend backend) {
     return Ok();
   }
   return Error{.what = "cannot render: no OpenGL library",
-               .where = "--gl " + GlBackendName(backend),
+               .where = "--gl " + NameOf(backend),
                .actual = reason,
                .cure = kInstall};
 }
@@ -166,8 +166,11 @@ class EglContext : public GlContext {
 
 }  // namespace
 
-std::string GlBackendName(GlBackend backend) {
-  return backend == GlBackend::kEgl ? "egl" : backend == GlBackend::kOsmesa ? "osmesa" : "auto";
+template <>
+std::span<const EnumName<GlBackend>> EnumNames<GlBackend>() {
+  static constexpr EnumName<GlBackend> kNames[] = {
+      {GlBackend::kAuto, "auto"}, {GlBackend::kOsmesa, "osmesa"}, {GlBackend::kEgl, "egl"}};
+  return kNames;
 }
 
 Result<GlBackend> OpenGl(GlBackend wanted, int threads, std::string* note) {
@@ -176,8 +179,8 @@ Result<GlBackend> OpenGl(GlBackend wanted, int threads, std::string* note) {
   if (opened.backend != GlBackend::kAuto) {
     if (wanted == GlBackend::kAuto || wanted == opened.backend) return opened.backend;
     return Error{.what = "cannot render with two OpenGL libraries in one process",
-                 .where = "--gl " + GlBackendName(wanted),
-                 .actual = GlBackendName(opened.backend) + " is open"};
+                 .where = "--gl " + NameOf(wanted),
+                 .actual = NameOf(opened.backend) + " is open"};
   }
   constexpr int kMost = 16;  // Mesa's own limit
   setenv("LP_NUM_THREADS", threads > 1 ? std::to_string(std::min(threads, kMost)).c_str() : "0", 0);

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "src/core/enum_names.h"
 #include "src/core/result.h"
 
 namespace gapscope {
@@ -16,9 +17,8 @@ namespace gapscope {
 // kAuto: OSMesa, or EGL where OSMesa's library is missing. kOsmesa renders in memory on the processor; kEgl is EGL
 // without a surface, on the device that Mesa finds, else on the processor.
 enum class GlBackend { kAuto, kOsmesa, kEgl };
-
-// "osmesa", "egl".
-std::string GlBackendName(GlBackend backend);
+template <>
+std::span<const EnumName<GlBackend>> EnumNames<GlBackend>();  // "auto", "osmesa", "egl"
 
 // Opens the backend's library for the process, once: later calls give the same answer when they ask for the same or
 // kAuto. `note`, when it is not null, receives a line when kAuto fell back. `threads` is how many Mesa shares the

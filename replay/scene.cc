@@ -89,6 +89,13 @@ float Apart(const mjvGeom& a, const mjvGeom& b) {
 
 }  // namespace
 
+template <>
+std::span<const EnumName<View>> EnumNames<View>() {
+  static constexpr EnumName<View> kNames[] = {
+      {View::kFixed, "fixed"}, {View::kTracking, "tracking"}, {View::kTop, "top"}};
+  return kNames;
+}
+
 Framing FrameMotion(const mjModel& model, std::span<const PoseTrack* const> tracks, View view, double aspect) {
   Framing framing{.view = view};
   const DataPtr data(mj_makeData(&model));

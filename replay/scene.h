@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "replay/poses.h"
+#include "src/core/enum_names.h"
 #include "src/core/mujoco_handles.h"
 #include "src/core/result.h"
 
@@ -25,6 +26,8 @@ struct Picture {
 // side or from above. Only the direction is taken from it: the distance is such that the motion fills the picture.
 // kTracking follows the middle of what moves.
 enum class View { kFixed, kTracking, kTop };
+template <>
+std::span<const EnumName<View>> EnumNames<View>();  // "fixed", "tracking", "top"
 
 // A camera for a motion.
 struct Framing {

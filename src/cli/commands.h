@@ -1,26 +1,42 @@
-// The subcommands. Each adds itself to the program and says what to run once the arguments are parsed; the callback
-// returns the exit status.
+// The subcommands, each as data: its options, and what to run once they are read. The command line, `--help` and
+// docs/options.md are made from these; only cli/arguments.cc knows the library that reads a command line.
 #ifndef GAPSCOPE_CLI_COMMANDS_H_
 #define GAPSCOPE_CLI_COMMANDS_H_
 
-#include <CLI/CLI.hpp>
 #include <functional>
+#include <string>
+#include <vector>
 
+#include "src/core/options.h"
 #include "src/core/result.h"
 
 namespace gapscope::cli {
 
-using Run = std::function<Result<int>()>;
+struct Command {
+  std::string name, what;            // what: one line
+  std::vector<Option> options;       // they write into what `run` holds
+  std::string example;               // "gapscope replay ..."
+  std::function<Result<int>()> run;  // gives the exit status; none where there are commands below this one
+  std::vector<Command> commands;
+};
 
-void AddInit(CLI::App& program, Run& run);
-void AddIdentify(CLI::App& program, Run& run);
-void AddInspect(CLI::App& program, Run& run);
-void AddDesign(CLI::App& program, Run& run);
-void AddDiagnose(CLI::App& program, Run& run);
-void AddReplay(CLI::App& program, Run& run);
-void AddRender(CLI::App& program, Run& run);
-void AddTune(CLI::App& program, Run& run);
-void AddPlan(CLI::App& program, Run& run);  // plan, run and merge: many logs, shared out
+Command InitCommand();
+Command InspectCommand();
+Command ReplayCommand();
+Command TuneCommand();
+Command DiagnoseCommand();
+Command IdentifyCommand();  // one command below it for each method
+Command DesignCommand();    // these below it:
+Command ChirpCommand();
+std::vector<Command> InputCommands();     // sweep, steps, triangle, multisine, square
+std::vector<Command> FeedbackCommands();  // lqr, poles
+Command OptimalCommand();
+Command RenderCommand();
+Command PlanCommand();  // plan, run and merge: many logs, shared out
+Command RunCommand();
+Command MergeCommand();
+
+std::vector<Command> AllCommands();
 
 }  // namespace gapscope::cli
 

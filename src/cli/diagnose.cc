@@ -68,20 +68,29 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
 
 }  // namespace
 
-void AddDiagnose(CLI::App& program, Run& run) {
+Command DiagnoseCommand() {
   auto flags = std::make_shared<DiagnoseFlags>();
-  CLI::App* command =
-      program.add_subcommand("diagnose", "Where the gap lies, which unmodelled effect causes it, how far it shrinks");
-  AddModelFlags(*command, flags->model, false);
-  AddCommonFlags(*command, flags->common, true);
-  command->add_option("--hold-out", flags->hold_out, "A log to judge by, not to fit")->allow_extra_args(false);
-  command->add_option("--budget", flags->budget_s, "Seconds; the best verdict so far when they are spent")
-      ->check(FinitePositive())
-      ->capture_default_str();
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
-  command->footer(
-      "Example: gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis");
-  command->callback([flags, &run] { run = [flags] { return RunDiagnose(*flags); }; });
+  const std::vector<Option> own = {
+      {.flag = "--hold-out",
+       .value = &flags->hold_out,
+       .help = "A log to judge by, not to fit; more than once",
+       .more = "Without it whole logs are held out where there are several, blocks of time where there is one; the "
+               "result says which"},
+      {.flag = "--budget",
+       .value = &flags->budget_s,
+       .unit = "s",
+       .range = Above(0),
+       .help = "Time; the best verdict so far when it is spent",
+       .more = "A diagnosis that ends by itself before that does not depend on it, nor on the machine"},
+      WindowOption(flags->window_s)};
+  return {.name = "diagnose",
+          .what = "Where the gap lies, which unmodelled effect causes it, how far it shrinks",
+          .options = Join({LogOptions(flags->model),
+                           own,
+                           {FolderOption(flags->common, "result.json, report.html and model.xml")},
+                           CommonOptions(flags->common)}),
+          .example = "gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis",
+          .run = [flags] { return RunDiagnose(*flags); }};
 }
 
 }  // namespace gapscope::cli

@@ -61,83 +61,144 @@ Result<int> RunIdentify(IdentifyFlags flags) {
 
 }  // namespace
 
-void AddIdentify(CLI::App& program, Run& run) {
-  CLI::App* identify = program.add_subcommand("identify", "Parameters by direct identification, without a simulation");
-  identify->require_subcommand(1);
-  identify->footer("Example: gapscope identify pd models/joint/experiment.yaml chirp.csv");
-  struct Entry {
-    const char *name, *what, *rig;
-    Method method;
-  };
-  const Entry entries[] = {
-      {"pd", "Gains of a position servo and the delay of its torque", "joint", IdentifyPd},
-      {"torque-constant", "Torque against current: constant and droop", "joint", IdentifyTorqueConstant},
-      {"tn-curve", "Torque against speed: peak, constant power, fastest", "joint", IdentifyTnCurve},
-      {"friction", "Dry and viscous friction by direction, from any sliding motion", "qube", IdentifyFriction},
-      {"resistance", "Winding resistance from voltage steps with the rotor held", "qube", IdentifyResistance},
-      {"current-offset", "Offset of the current sensor at rest", "qube", IdentifyCurrentOffset},
-      {"ring-down", "Frequency, viscous and dry friction of a free swing", "qube", IdentifyRingDown},
-      {"inertia", "Inertia of the driven joint from accelerations", "qube", IdentifyInertia},
-      {"steady", "Equivalent viscous damping from settled speeds", "qube", IdentifySteady},
-      {"resonance", "Peak, stiffness and damping of a flexible joint", "flexjoint", IdentifyResonance},
-      {"state-space", "State space of a flexible joint by constrained least squares", "flexjoint", IdentifyStateSpace},
-      {"cable", "Spring and rest angle of a cable on the driven joint", "qube", IdentifyCable},
-  };
-  for (const Entry& entry : entries) {
-    auto flags = std::make_shared<IdentifyFlags>();
-    flags->method = entry.method;
-    IdentifyOptions& o = flags->options;
-    CLI::App* command = identify->add_subcommand(entry.name, entry.what);
-    AddModelFlags(*command, flags->model, true);
-    AddCommonFlags(*command, flags->common, true);
-    command
-        ->add_option("--cutoff", o.cutoff_hz,
-                     "Of the zero-phase low pass, Hz (default: a twelfth of the sample rate, at most 15)")
-        ->check(FinitePositive());
-    command->add_option("--from", o.from_s, "Use the logs from this time on, s")->check(FiniteIn(0, 1e9));
-    command->add_option("--to", o.to_s, "Use the logs up to this time, s")->check(FinitePositive());
-    command->add_option("--joint", o.joint,
-                        "Which joint (default: the driven one; ring-down, resonance: the swinging one)");
-    const std::string name = entry.name;
-    if (name == "torque-constant" || name == "resistance" || name == "current-offset") {
-      command->add_option("--current-column", o.current_column, "Column of the current")->capture_default_str();
-      command->add_option("--current-unit", o.current_unit, "Its unit")->capture_default_str();
-    }
-    if (name == "pd") {
-      command->add_option("--longest-delay", o.longest_delay_s, "End of the scan, s")
-          ->check(FinitePositive())
-          ->capture_default_str();
-      command
-          ->add_option("--torque-limit", o.torque_limit,
-                       "Rows at this torque are left out (default: runs of equal extreme values)")
-          ->check(FinitePositive());
-    }
-    if (name == "tn-curve") {
-      command->add_option("--rated-torque", o.rated_torque_n_m, "Data sheet's, N m")->check(FinitePositive());
-      command->add_option("--rated-speed-rpm", flags->rated_speed_rpm, "Data sheet's")->check(FinitePositive());
-    }
-    if (name == "inertia" || name == "friction" || name == "cable") {
-      command
-          ->add_option("--torque-delay", o.torque_delay_s,
-                       "Of a servo whose torque is logged, s (from identify pd): which target a logged torque has seen")
-          ->check(FiniteIn(0, 1));
-    }
-    if (name == "friction" || name == "cable")
-      command->add_flag("--free-inertia", o.free_inertia,
-                        "Scale the model's inertial torques to the log: for fast motion, where the model's inertia is "
-                        "not known well");
-    if (name == "steady")
-      command->add_option("--coulomb", o.coulomb_n_m, "Dry friction, N m (default: fitted)")->check(FiniteIn(0, 1e6));
-    if (name == "state-space") {
-      command->add_option("--bounds", o.bounds_share, "Coefficients stay within this share of nominal")
-          ->check(FinitePositive())
-          ->capture_default_str();
-      command->add_option("--hold-out", flags->hold_out, "Score on this log, do not fit it")->allow_extra_args(false);
-    }
-    command->footer(
-        fmt::format("Example: gapscope identify {} models/{}/experiment.yaml log.csv", entry.name, entry.rig));
-    command->callback([flags, &run] { run = [flags] { return RunIdentify(*flags); }; });
-  }
+namespace {
+
+struct Entry {
+  const char *name, *what, *rig;
+  Method method;
+};
+constexpr Entry kMethods[] = {
+    {"pd", "Gains of a position servo and the delay of its torque", "joint", IdentifyPd},
+    {"torque-constant", "Torque against current: constant and droop", "joint", IdentifyTorqueConstant},
+    {"tn-curve", "Torque against speed: peak, constant power, fastest", "joint", IdentifyTnCurve},
+    {"friction", "Dry and viscous friction by direction, from any sliding motion", "qube", IdentifyFriction},
+    {"resistance", "Winding resistance from voltage steps with the rotor held", "qube", IdentifyResistance},
+    {"current-offset", "Offset of the current sensor at rest", "qube", IdentifyCurrentOffset},
+    {"ring-down", "Frequency, viscous and dry friction of a free swing", "qube", IdentifyRingDown},
+    {"inertia", "Inertia of the driven joint from accelerations", "qube", IdentifyInertia},
+    {"steady", "Equivalent viscous damping from settled speeds", "qube", IdentifySteady},
+    {"resonance", "Peak, stiffness and damping of a flexible joint", "flexjoint", IdentifyResonance},
+    {"state-space", "State space of a flexible joint by constrained least squares", "flexjoint", IdentifyStateSpace},
+    {"cable", "Spring and rest angle of a cable on the driven joint", "qube", IdentifyCable},
+};
+
+std::vector<Option> SharedOptions(IdentifyOptions& o) {
+  return {{.flag = "--cutoff",
+           .value = &o.cutoff_hz,
+           .unit = "Hz",
+           .range = Above(0, 0),
+           .unset = "a twelfth of the sample rate, at most 15",
+           .help = "Of the zero-phase low pass",
+           .more = "Speeds and accelerations come from positions smoothed by it; the motion must lie well below it"},
+          {.flag = "--from",
+           .value = &o.from_s,
+           .unit = "s",
+           .range = AtLeast(0),
+           .help = "Use the logs from this time on"},
+          {.flag = "--to",
+           .value = &o.to_s,
+           .unit = "s",
+           .range = Above(0, 0),
+           .unset = "their end",
+           .help = "Use the logs up to this time"},
+          {.flag = "--joint",
+           .value = &o.joint,
+           .unset = "the driven one; of ring-down and resonance the swinging one",
+           .help = "Which joint"}};
+}
+
+std::vector<Option> CurrentOptions(IdentifyOptions& o) {
+  return {{.flag = "--current-column", .value = &o.current_column, .help = "Column of the current"},
+          {.flag = "--current-unit", .value = &o.current_unit, .help = "Its unit"}};
+}
+
+Option TorqueDelayOption(IdentifyOptions& o) {
+  return {.flag = "--torque-delay",
+          .value = &o.torque_delay_s,
+          .unit = "s",
+          .range = Between(0, 1),
+          .help = "Of a servo whose torque is logged: which target a logged torque has seen",
+          .more = "`identify pd` gives it"};
+}
+
+Option FreeInertiaOption(IdentifyOptions& o) {
+  return {.flag = "--free-inertia",
+          .value = &o.free_inertia,
+          .help = "Scale the model's inertial torques to the log",
+          .more = "For fast motion, where the model's inertia is not known well; otherwise they are trusted"};
+}
+
+// What only one method, or a few, take.
+std::vector<Option> OwnOptions(const std::string& method, IdentifyFlags& flags) {
+  IdentifyOptions& o = flags.options;
+  if (method == "torque-constant" || method == "resistance" || method == "current-offset") return CurrentOptions(o);
+  if (method == "pd")
+    return {{.flag = "--longest-delay",
+             .value = &o.longest_delay_s,
+             .unit = "s",
+             .range = Above(0),
+             .help = "End of the scan of delays"},
+            {.flag = "--torque-limit",
+             .value = &o.torque_limit,
+             .unit = "as the torque is logged",
+             .range = Above(0, 0),
+             .unset = "runs of equal extreme values",
+             .help = "Rows at this torque are left out: the servo was at its limit"}};
+  if (method == "tn-curve")
+    return {{.flag = "--rated-torque",
+             .value = &o.rated_torque_n_m,
+             .unit = "N m",
+             .range = Above(0, 0),
+             .unset = "no comparison",
+             .help = "Data sheet's rated torque"},
+            {.flag = "--rated-speed-rpm",
+             .value = &flags.rated_speed_rpm,
+             .unit = "rpm",
+             .range = Above(0, 0),
+             .unset = "no comparison",
+             .help = "Data sheet's rated speed"}};
+  if (method == "inertia") return {TorqueDelayOption(o)};
+  if (method == "friction" || method == "cable") return {TorqueDelayOption(o), FreeInertiaOption(o)};
+  if (method == "steady")
+    return {{.flag = "--coulomb",
+             .value = &o.coulomb_n_m,
+             .unit = "N m",
+             .range = AtLeast(0, -1),
+             .unset = "fitted",
+             .help = "Dry friction, held at this"}};
+  if (method == "state-space")
+    return {
+        {.flag = "--bounds",
+         .value = &o.bounds_share,
+         .range = Above(0),
+         .help = "Coefficients stay within this share of nominal"},
+        {.flag = "--hold-out", .value = &flags.hold_out, .help = "Score on this log, do not fit it; more than once"}};
+  return {};
+}
+
+Command MethodCommand(const Entry& entry) {
+  auto flags = std::make_shared<IdentifyFlags>();
+  flags->method = entry.method;
+  return {.name = entry.name,
+          .what = entry.what,
+          .options = Join({LogOptions(flags->model),
+                           OwnOptions(entry.name, *flags),
+                           SharedOptions(flags->options),
+                           EffectOptions(flags->model),
+                           {FolderOption(flags->common, "result.json and the points behind it as CSV")},
+                           CommonOptions(flags->common)}),
+          .example = fmt::format("gapscope identify {} models/{}/experiment.yaml log.csv", entry.name, entry.rig),
+          .run = [flags] { return RunIdentify(*flags); }};
+}
+
+}  // namespace
+
+Command IdentifyCommand() {
+  Command identify = {.name = "identify",
+                      .what = "Parameters by direct identification, without a simulation",
+                      .example = "gapscope identify pd models/joint/experiment.yaml chirp.csv"};
+  for (const Entry& entry : kMethods) identify.commands.push_back(MethodCommand(entry));
+  return identify;
 }
 
 }  // namespace gapscope::cli

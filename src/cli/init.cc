@@ -52,15 +52,27 @@ Result<int> RunInit(const InitFlags& flags) {
 
 }  // namespace
 
-void AddInit(CLI::App& program, Run& run) {
+Command InitCommand() {
   auto flags = std::make_shared<InitFlags>();
-  CLI::App* command = program.add_subcommand("init", "Draft an experiment file for a robot of your own");
-  command->add_option("model", flags->model, "MJCF file")->required();
-  command->add_option("logs", flags->logs, "Hardware logs; the first one is looked at")->required();
-  command->add_option("--out", flags->out, "File to write (default: stdout)");
-  command->add_flag("--quiet", flags->quiet, "Do not list what is unsure");
-  command->footer("Example: gapscope init robot.xml run1.csv --out robot.yaml");
-  command->callback([flags, &run] { run = [flags] { return RunInit(*flags); }; });
+  return {.name = "init",
+          .what = "Draft an experiment file for a robot of your own",
+          .options = {{.flag = "model", .value = &flags->model, .required = true, .help = "MJCF file"},
+                      {.flag = "logs",
+                       .value = &flags->logs,
+                       .required = true,
+                       .help = "Hardware logs; the first one is looked at",
+                       .more = "With --out the draft is then tried on all of them"},
+                      {.flag = "--out",
+                       .value = &flags->out,
+                       .unset = "stdout",
+                       .help = "File to write",
+                       .more = "Paths in it are as seen from its folder"},
+                      {.flag = "--quiet",
+                       .value = &flags->quiet,
+                       .help = "Do not list what is unsure",
+                       .more = "Otherwise each guess that needs a look is told on stderr"}},
+          .example = "gapscope init robot.xml run1.csv --out robot.yaml",
+          .run = [flags] { return RunInit(*flags); }};
 }
 
 }  // namespace gapscope::cli

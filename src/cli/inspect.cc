@@ -51,14 +51,14 @@ Result<int> RunInspect(const InspectFlags& flags) {
 
 }  // namespace
 
-void AddInspect(CLI::App& program, Run& run) {
+Command InspectCommand() {
   auto flags = std::make_shared<InspectFlags>();
-  CLI::App* command =
-      program.add_subcommand("inspect", "Is this log fit for use: timing, gaps, repairs, saturation, excitation");
-  AddModelFlags(*command, flags->model, false);
-  AddCommonFlags(*command, flags->common, true);
-  command->footer("Example: gapscope inspect models/qube/experiment.yaml log.csv");
-  command->callback([flags, &run] { run = [flags] { return RunInspect(*flags); }; });
+  return {.name = "inspect",
+          .what = "Is this log fit for use: timing, gaps, repairs, saturation, excitation",
+          .options = Join(
+              {LogOptions(flags->model), {FolderOption(flags->common, "result.json")}, CommonOptions(flags->common)}),
+          .example = "gapscope inspect models/qube/experiment.yaml log.csv",
+          .run = [flags] { return RunInspect(*flags); }};
 }
 
 }  // namespace gapscope::cli

@@ -23,16 +23,13 @@ struct RenderFlags {
   CommonFlags common;
   ModelFlags model;
   std::vector<std::string> compare;
-  std::string log, out, view = "fixed", layout = "overlay", gl = "auto", size = "1280x720", mode;
+  std::string log, out, size = "1280x720";
+  View view = View::kFixed;
+  Layout layout = Layout::kOverlay;
+  GlBackend gl = GlBackend::kAuto;
+  std::optional<ReplayMode> mode;
   double speed = 1, from_s = 0, to_s = -1, at_s = -1, frames_per_s = 30, window_s = 0;
 };
-
-const std::vector<std::string> kViews = {"fixed", "tracking", "top"}, kLayouts = {"overlay", "side"},
-                               kGl = {"auto", "osmesa", "egl"};
-template <class Enum>
-Enum ValueOf(const std::vector<std::string>& names, const std::string& name) {
-  return static_cast<Enum>(std::find(names.begin(), names.end(), name) - names.begin());
-}
 
 std::atomic<bool> interrupted = false;
 void Interrupt(int) { interrupted = true; }
@@ -102,7 +99,7 @@ RenderRun RunOf(const RenderFlags& flags, const std::vector<VideoModel>& models,
                 .first_s = summary.first_s,
                 .last_s = summary.last_s,
                 .video_s = summary.length_s,
-                .gl = GlBackendName(summary.gl),
+                .gl = NameOf(summary.gl),
                 .wall_s = summary.wall_s};
   for (std::size_t m = 0; m < models.size(); ++m) run.models.push_back({models[m].label, summary.errors[m]});
   return run;
@@ -110,9 +107,9 @@ RenderRun RunOf(const RenderFlags& flags, const std::vector<VideoModel>& models,
 
 Result<int> RunRender(RenderFlags flags) {
   VideoOptions options{.out = flags.out,
-                       .view = ValueOf<View>(kViews, flags.view),
-                       .layout = ValueOf<Layout>(kLayouts, flags.layout),
-                       .gl = ValueOf<GlBackend>(kGl, flags.gl),
+                       .view = flags.view,
+                       .layout = flags.layout,
+                       .gl = flags.gl,
                        .speed = flags.speed,
                        .from_s = flags.from_s,
                        .to_s = flags.to_s,
@@ -122,9 +119,7 @@ Result<int> RunRender(RenderFlags flags) {
   flags.model.logs = {flags.log};
   GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
   PrintFindings(session.recordings, flags.common.quiet);
-  options.mode = flags.mode.empty()        ? session.experiment.replay.mode
-                 : flags.mode == "windows" ? ReplayMode::kWindows
-                                           : ReplayMode::kFreeRun;
+  options.mode = flags.mode.value_or(session.experiment.replay.mode);
   options.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s;
   GS_ASSIGN(const auto models, ModelsOf(flags, session));
 
@@ -155,49 +150,78 @@ Result<int> RunRender(RenderFlags flags) {
 
 }  // namespace
 
-void AddRender(CLI::App& program, Run& run) {
+namespace {
+
+// Which part of the log, and how it is drawn.
+std::vector<Option> PictureOptions(RenderFlags& flags) {
+  return {{.flag = "--layout",
+           .value = ChoiceOf(flags.layout),
+           .help = "overlay: the measured mechanism translucent over the simulated one; side: beside it"},
+          {.flag = "--view",
+           .value = ChoiceOf(flags.view),
+           .help = "The camera",
+           .more = "fixed: all of the motion in view; tracking: it follows the mechanism; top: from above"},
+          {.flag = "--speed",
+           .value = &flags.speed,
+           .range = Above(0),
+           .help = "Seconds of the log per second of video: 0.25 is slow motion"},
+          {.flag = "--from",
+           .value = &flags.from_s,
+           .unit = "s",
+           .range = AtLeast(0),
+           .help = "Where to begin, on the log's clock"},
+          {.flag = "--to",
+           .value = &flags.to_s,
+           .unit = "s",
+           .range = Above(0, -1),
+           .unset = "the log's end",
+           .help = "Where to end, on the log's clock"},
+          {.flag = "--at",
+           .value = &flags.at_s,
+           .unit = "s",
+           .range = AtLeast(0, -1),
+           .unset = "where the first model's error is greatest",
+           .help = "Time of a still, on the log's clock"},
+          {.flag = "--size",
+           .value = &flags.size,
+           .unit = "pixels",
+           .help = "WIDTHxHEIGHT, both even, 320x240 .. 7680x4320"},
+          {.flag = "--fps", .value = &flags.frames_per_s, .range = Between(1, 240), .help = "Frames per second"},
+          {.flag = "--mode",
+           .value = ChoiceAmong(flags.mode, std::vector{ReplayMode::kFreeRun, ReplayMode::kWindows}),
+           .unset = "the experiment's",
+           .help = "How the log is simulated",
+           .more = "As of replay"},
+          WindowOption(flags.window_s),
+          {.flag = "--gl",
+           .value = ChoiceOf(flags.gl),
+           .help = "OpenGL: osmesa (in memory), egl (without a surface), auto (OSMesa, else EGL)"}};
+}
+
+}  // namespace
+
+Command RenderCommand() {
   auto flags = std::make_shared<RenderFlags>();
-  CLI::App* command = program.add_subcommand(
-      "render", "Draw the measured mechanism against the simulated one: a video, a GIF or a still");
-  command->add_option("experiment", flags->model.experiment, "Experiment file (YAML)")->required();
-  command->add_option("log", flags->log, "Hardware log")->required();
-  command->add_option("--out", flags->out, "VIDEO.mp4, MOVING.gif or STILL.png")->required();
-  command
-      ->add_option("--compare", flags->compare,
-                   "A model to show, more than once: nominal, or the folder (or LABEL=FOLDER) that replay, tune or "
-                   "diagnose wrote")
-      ->allow_extra_args(false);
-  AddEffectFlags(*command, flags->model);
-  command
-      ->add_option("--layout", flags->layout,
-                   "overlay: the measured mechanism translucent over the simulated one; side: beside it")
-      ->check(CLI::IsMember(kLayouts))
-      ->capture_default_str();
-  command->add_option("--view", flags->view, "fixed, tracking or top")
-      ->check(CLI::IsMember(kViews))
-      ->capture_default_str();
-  command->add_option("--speed", flags->speed, "Seconds of the log per second of video: 0.25 is slow motion")
-      ->check(FinitePositive())
-      ->capture_default_str();
-  command->add_option("--from", flags->from_s, "Where to begin, s of the log")->check(FiniteNonNegative());
-  command->add_option("--to", flags->to_s, "Where to end, s of the log (default: its end)")->check(FinitePositive());
-  command->add_option("--at", flags->at_s, "Time of a still, s of the log (default: of the greatest error)")
-      ->check(FiniteNonNegative());
-  command->add_option("--size", flags->size, "WIDTHxHEIGHT in pixels, even")->capture_default_str();
-  command->add_option("--fps", flags->frames_per_s, "Frames per second")
-      ->check(FiniteIn(1, 240))
-      ->capture_default_str();
-  command->add_option("--mode", flags->mode, "free_run or windows (default: the experiment's)")
-      ->check(CLI::IsMember({"free_run", "windows"}));
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
-  command->add_option("--gl", flags->gl, "OpenGL: osmesa (in memory), egl (without a surface), auto (OSMesa, else EGL)")
-      ->check(CLI::IsMember(kGl))
-      ->capture_default_str();
-  AddCommonFlags(*command, flags->common, false);
-  command->footer(
-      "Example: gapscope render models/qube/experiment.yaml log.csv --compare nominal --compare out/tuned --speed 0.5 "
-      "--out video.mp4");
-  command->callback([flags, &run] { run = [flags] { return RunRender(*flags); }; });
+  const std::vector<Option> own = {
+      ExperimentOption(flags->model.experiment),
+      {.flag = "log", .value = &flags->log, .required = true, .help = "Hardware log"},
+      {.flag = "--out",
+       .value = &flags->out,
+       .required = true,
+       .help = "VIDEO.mp4, MOVING.gif or STILL.png",
+       .more = "A video beside a report.html is shown in it"},
+      {.flag = "--compare",
+       .value = &flags->compare,
+       .help = "A model to show: nominal, or a folder that replay, tune or diagnose wrote; more than once",
+       .more = "LABEL=FOLDER gives it a label of its own. Four models at most"},
+      WhileOption(flags->model.while_column)};
+  return {.name = "render",
+          .what = "Draw the measured mechanism against the simulated one: a video, a GIF or a still",
+          .options = Join({own, PictureOptions(*flags), EffectOptions(flags->model), CommonOptions(flags->common)}),
+          .example =
+              "gapscope render models/qube/experiment.yaml log.csv --compare nominal --compare out/tuned --speed 0.5 "
+              "--out video.mp4",
+          .run = [flags] { return RunRender(*flags); }};
 }
 
 }  // namespace gapscope::cli

@@ -16,19 +16,16 @@ namespace {
 struct ReplayFlags {
   CommonFlags common;
   ModelFlags model;
-  std::string mode;
+  std::optional<ReplayMode> mode;
   double window_s = 0, time_step_s = 0, fail_above = 0;
   bool nuisances = false;
 };
 
 ReplayOptions OptionsOf(const ReplayFlags& flags, const Session& session) {
-  ReplayOptions options{.mode = session.experiment.replay.mode,
+  ReplayOptions options{.mode = flags.mode.value_or(session.experiment.replay.mode),
                         .window_s = session.experiment.replay.window_s,
                         .time_step_s = flags.time_step_s,
                         .values = session.values};
-  if (flags.mode == "free_run") options.mode = ReplayMode::kFreeRun;
-  if (flags.mode == "windows") options.mode = ReplayMode::kWindows;
-  if (flags.mode == "closed_loop") options.mode = ReplayMode::kClosedLoop;
   if (flags.window_s > 0) options.window_s = flags.window_s;
   return options;
 }
@@ -120,28 +117,42 @@ Result<int> RunReplay(const ReplayFlags& flags) {
 
 }  // namespace
 
-void AddReplay(CLI::App& program, Run& run) {
+Command ReplayCommand() {
   auto flags = std::make_shared<ReplayFlags>();
-  CLI::App* command =
-      program.add_subcommand("replay", "Replay logged commands in simulation: predicted against measured, scores");
-  AddModelFlags(*command, flags->model, true);
-  AddCommonFlags(*command, flags->common, true);
-  command->add_option("--mode", flags->mode, "free_run, windows or closed_loop (default: the experiment's)")
-      ->check(CLI::IsMember({"free_run", "windows", "closed_loop"}));
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
-  command
-      ->add_option("--time-step", flags->time_step_s,
-                   "Largest simulation step, s (default: chosen so that halving it changes the error by < 1 %)")
-      ->check(FinitePositive());
-  command->add_flag("--nuisances", flags->nuisances,
-                    "Fit what is no finding first: zero offsets, initial states, a command shift below one sample; as "
-                    "tune and diagnose do");
-  command->add_option("--fail-above", flags->fail_above, "Exit status 1 when the error is above this")
-      ->check(FinitePositive());
-  command->footer(
-      "Example: gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set "
-      "cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out out");
-  command->callback([flags, &run] { run = [flags] { return RunReplay(*flags); }; });
+  const std::vector<Option> own = {
+      {.flag = "--mode",
+       .value = ChoiceOf(flags->mode),
+       .unset = "the experiment's",
+       .help = "free_run: from its first row to its last; windows: piece by piece; closed_loop: under the experiment's "
+               "controller",
+       .more = "Each window starts from a state of its own, taken from the log. In a closed loop the controller is fed "
+               "by what the model itself measures"},
+      WindowOption(flags->window_s),
+      TimeStepOption(flags->time_step_s),
+      {.flag = "--nuisances",
+       .value = &flags->nuisances,
+       .help =
+           "Fit what is no finding first: zero offsets, initial states, a command shift below one sample; as tune and "
+           "diagnose do",
+       .more = "Not in a closed loop, where nothing is fitted"},
+      {.flag = "--fail-above",
+       .value = &flags->fail_above,
+       .range = Above(0, 0),
+       .unset = "never",
+       .help = "Exit status 1 when the error is above this",
+       .more = "The error is the normalised one that is printed: root mean square over signals of RMSE by standard "
+               "deviation"}};
+  return {.name = "replay",
+          .what = "Replay logged commands in simulation: predicted against measured, scores",
+          .options = Join({LogOptions(flags->model),
+                           own,
+                           EffectOptions(flags->model),
+                           {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
+                           CommonOptions(flags->common)}),
+          .example =
+              "gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set "
+              "cable_spring@arm.stiffness_n_m_per_rad=0.0012 --out out",
+          .run = [flags] { return RunReplay(*flags); }};
 }
 
 }  // namespace gapscope::cli

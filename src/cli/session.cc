@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <set>
 
@@ -15,69 +14,102 @@
 
 namespace gapscope::cli {
 
-namespace {
-
-// `allowed` of a finite number that `good` accepts; `name` stands in the help.
-CLI::Validator Finite(const std::string& allowed, const std::string& name, std::function<bool(double)> good) {
-  return CLI::Validator(
-      [allowed, good = std::move(good)](std::string& text) {
-        double value = 0;
-        const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool number = code == std::errc() && end == text.data() + text.size() && std::isfinite(value);
-        return number && good(value) ? std::string() : "'" + text + "' is not a finite number " + allowed;
-      },
-      name);
+std::vector<Option> PrintOptions(CommonFlags& flags) {
+  return {{.flag = "--json",
+           .value = &flags.json,
+           .help = "Print the result as JSON on stdout, nothing else",
+           .more = "Messages go to stderr either way. The JSON names its schema and the versions that made it"},
+          {.flag = "--quiet", .value = &flags.quiet, .help = "No messages on stderr but errors"}};
 }
 
-}  // namespace
-
-CLI::Validator FinitePositive() {
-  return Finite("above zero", "POSITIVE", [](double value) { return value > 0; });
+std::vector<Option> CommonOptions(CommonFlags& flags) {
+  return Join({PrintOptions(flags),
+               {{.flag = "--jobs",
+                 .value = &flags.jobs,
+                 .range = Between(0, 1024),
+                 .help = "Workers; 0: one per processor",
+                 .more = "The result does not depend on it, to the last digit"},
+                {.flag = "--seed",
+                 .value = &flags.seed,
+                 .help = "Seed of everything random",
+                 .more = "The same seed and the same files give the same result"}}});
 }
 
-CLI::Validator FiniteNonNegative() {
-  return Finite("of at least zero", "NONNEGATIVE", [](double value) { return value >= 0; });
+Option FolderOption(CommonFlags& flags, const std::string& holds) {
+  return {.flag = "--out",
+          .value = &flags.out,
+          .unset = "nothing is written",
+          .help = "Folder for " + holds,
+          .more = "It is made where it is missing; files of an earlier run in it are overwritten"};
 }
 
-CLI::Validator FiniteIn(double low, double high) {
-  const std::string range = fmt::format("{:g} - {:g}", low, high);
-  return Finite("in " + range, "FLOAT in [" + range + "]",
-                [low, high](double value) { return value >= low && value <= high; });
+Option ExperimentOption(std::string& path) {
+  return {.flag = "experiment",
+          .value = &path,
+          .required = true,
+          .help = "Experiment file (YAML)",
+          .more = "It binds logs to a model; docs/experiment.md tells its keys, `gapscope init` drafts one"};
 }
 
-void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder) {
-  command.add_flag("--json", flags.json, "Print the result as JSON on stdout, nothing else");
-  command.add_flag("--quiet", flags.quiet, "No messages on stderr but errors");
-  command.add_option("--jobs", flags.jobs, "Workers; 0: one per processor. The result does not depend on it")
-      ->check(CLI::Range(0, 1024));
-  command.add_option("--seed", flags.seed, "Seed of everything random");
-  if (writes_folder)
-    command.add_option("--out", flags.out, "Folder for result.json, report.html, traces and model.xml");
+Option WhileOption(std::string& column) {
+  return {.flag = "--while",
+          .value = &column,
+          .unset = "the experiment's, else all rows",
+          .help = "Use a log's rows until this column falls to zero (\"torque_enable\")"};
 }
 
-namespace {
-void AddWhileFlag(CLI::App& command, ModelFlags& flags) {
-  command.add_option("--while", flags.while_column,
-                     "Use a log's rows until this column falls to zero (\"torque_enable\")");
-}
-}  // namespace
-
-void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects) {
-  command.add_option("experiment", flags.experiment, "Experiment file (YAML)")->required();
-  command.add_option("logs", flags.logs, "Hardware logs")->required();
-  if (effects) {
-    AddEffectFlags(command, flags);
-  } else {
-    AddWhileFlag(command, flags);
-  }
+std::vector<Option> LogOptions(ModelFlags& flags) {
+  return {ExperimentOption(flags.experiment),
+          {.flag = "logs",
+           .value = &flags.logs,
+           .required = true,
+           .help = "Hardware logs",
+           .more = "CSV or what else docs/experiment.md names; they are read by path and may lie anywhere"},
+          WhileOption(flags.while_column)};
 }
 
-void AddEffectFlags(CLI::App& command, ModelFlags& flags) {
-  AddWhileFlag(command, flags);
-  command.add_option("--with", flags.with, "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL], of " + Join(EffectNames()))
-      ->allow_extra_args(false);
-  command.add_option("--set", flags.set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
-  command.add_option("--params", flags.params, "YAML file of parameter values")->allow_extra_args(false);
+std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std::string>& params) {
+  return {{.flag = "--set",
+           .value = &set,
+           .help = "Override a parameter: NAME=VALUE, more than once",
+           .more = "In the parameter's own unit; it is written over --params. A name that does not exist is refused "
+                   "with the nearest one that does"},
+          {.flag = "--params",
+           .value = &params,
+           .help = "YAML file of parameter values, more than once",
+           .more = "Lines `name: value`; a later file is written over an earlier one"}};
+}
+
+std::vector<Option> EffectOptions(ModelFlags& flags) {
+  return Join(
+      {{{.flag = "--with",
+         .value = &flags.with,
+         .help = "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL], more than once, of " + gapscope::Join(EffectNames()),
+         .more = "docs/effects.md lists the effects. Without a place it goes where it can act, if there is one "
+                 "such place; its parameters are then known to --set as EFFECT@PLACE.NAME"}},
+       ValueOptions(flags.set, flags.params)});
+}
+
+Option WindowOption(double& window_s) {
+  return {.flag = "--window",
+          .value = &window_s,
+          .unit = "s",
+          .range = Above(0, 0),
+          .unset = "the experiment's",
+          .help = "Length of a window",
+          .more =
+              "Windows follow each other, each from a state of its own: short ones see local error, long ones what "
+              "accumulates"};
+}
+
+Option TimeStepOption(double& time_step_s) {
+  return {.flag = "--time-step",
+          .value = &time_step_s,
+          .unit = "s",
+          .range = Above(0, 0),
+          .unset = "chosen so that halving it changes the error by less than 1 %",
+          .help = "Largest simulation step",
+          .more = "A step never reaches over a logged row, so steps are parts of the log's sample time"};
 }
 
 Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,

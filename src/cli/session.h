@@ -2,20 +2,20 @@
 #ifndef GAPSCOPE_CLI_SESSION_H_
 #define GAPSCOPE_CLI_SESSION_H_
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "replay/replay.h"
+#include "src/core/options.h"
 #include "src/core/thread_pool.h"
 #include "src/experiment/recording.h"
 #include "src/model/model.h"
 
 namespace gapscope::cli {
 
-// Exit statuses of the program (contract.md).
+// Exit statuses of the program: what scripts rely on.
 inline constexpr int kDone = 0, kBelowThreshold = 1, kBadInput = 2, kBug = 3;
 
 struct CommonFlags {
@@ -25,14 +25,12 @@ struct CommonFlags {
   std::string out;
 };
 
-// Accept finite numbers above zero, of at least zero, from low to high: CLI11's own checks let nan through, and tell of
-// a bound in 300 digits.
-CLI::Validator FinitePositive();
-CLI::Validator FiniteNonNegative();
-CLI::Validator FiniteIn(double low, double high);
-
-// Adds --json, --jobs, --seed, --quiet; and --out where the command writes a folder.
-void AddCommonFlags(CLI::App& command, CommonFlags& flags, bool writes_folder);
+// --json and --quiet.
+std::vector<Option> PrintOptions(CommonFlags& flags);
+// Those, --jobs and --seed.
+std::vector<Option> CommonOptions(CommonFlags& flags);
+// --out for a command that writes a folder; `holds`: what is in it.
+Option FolderOption(CommonFlags& flags, const std::string& holds);
 
 struct ModelFlags {
   std::string experiment;
@@ -42,10 +40,17 @@ struct ModelFlags {
   std::vector<std::string> params;  // YAML files of values
   std::string while_column;         // over the experiment's own
 };
-// Adds EXPERIMENT LOG... and, where the command takes them, --with, --set, --params.
-void AddModelFlags(CLI::App& command, ModelFlags& flags, bool effects);
-// --while, --with, --set, --params alone.
-void AddEffectFlags(CLI::App& command, ModelFlags& flags);
+// EXPERIMENT alone; EXPERIMENT LOG... and --while; --with, --set and --params.
+Option ExperimentOption(std::string& path);
+std::vector<Option> LogOptions(ModelFlags& flags);
+std::vector<Option> EffectOptions(ModelFlags& flags);
+Option WhileOption(std::string& column);
+// --set and --params alone, for commands on a model without logs.
+std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std::string>& params);
+// --window over the experiment's own; 0: not given.
+Option WindowOption(double& window_s);
+// --time-step; 0: chosen by the program.
+Option TimeStepOption(double& time_step_s);
 
 struct Session {
   Experiment experiment;

@@ -12,6 +12,24 @@
 #include "src/report/tune_report.h"
 #include "src/report/write_run.h"
 
+namespace gapscope {
+
+template <>
+std::span<const EnumName<ObjectiveKind>> EnumNames<ObjectiveKind>() {
+  static constexpr EnumName<ObjectiveKind> kNames[] = {
+      {ObjectiveKind::kWindows, "windows"}, {ObjectiveKind::kFreeRun, "free_run"}, {ObjectiveKind::kBoth, "both"}};
+  return kNames;
+}
+
+template <>
+std::span<const EnumName<Normalization>> EnumNames<Normalization>() {
+  static constexpr EnumName<Normalization> kNames[] = {{Normalization::kDeviation, "deviation"},
+                                                       {Normalization::kRootMeanSquare, "rms"}};
+  return kNames;
+}
+
+}  // namespace gapscope
+
 namespace gapscope::cli {
 namespace {
 
@@ -19,7 +37,9 @@ struct TuneFlags {
   CommonFlags common;
   ModelFlags model;
   std::vector<std::string> hold_out, free, freeze, fixed_nuisances;
-  std::string optimizer = "lm", objective = "both", normalization = "deviation";
+  std::string optimizer = "lm";
+  ObjectiveKind objective = ObjectiveKind::kBoth;
+  Normalization normalization = Normalization::kDeviation;
   double window_s = 0, budget_s = 0, time_step_s = 0, huber = 4, tolerance = 1e-4;
   int starts = 2;
   bool resume = false, actuator = false;
@@ -57,18 +77,16 @@ Result<std::vector<int>> FreeParameters(const TuneFlags& flags, const Session& s
 
 Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
   TuneOptions options{.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s,
+                      .normalization = flags.normalization,
                       .huber = flags.huber,
                       .time_step_s = flags.time_step_s,
                       .starts = flags.starts,
                       .resume = flags.resume};
-  if (flags.normalization == "rms") options.normalization = Normalization::kRootMeanSquare;
   options.solve.optimizer = FindOptimizer(flags.optimizer)->name;
   options.solve.seed = flags.common.seed;
   options.solve.tolerance = flags.tolerance;
-  options.objective = flags.objective == "windows"    ? ObjectiveKind::kWindows
-                      : flags.objective == "free_run" ? ObjectiveKind::kFreeRun
-                                                      : ObjectiveKind::kBoth;
-  if (session.experiment.replay.mode == ReplayMode::kWindows && flags.objective == "both")
+  options.objective = flags.objective;
+  if (session.experiment.replay.mode == ReplayMode::kWindows && flags.objective == ObjectiveKind::kBoth)
     options.objective = ObjectiveKind::kWindows;
   for (const auto& nuisance : flags.fixed_nuisances) {
     if (nuisance == "offset") options.fit_offsets = false;
@@ -140,55 +158,92 @@ Result<int> RunTune(const TuneFlags& flags) {
 
 }  // namespace
 
-void AddTune(CLI::App& program, Run& run) {
+namespace {
+
+// What is fitted and what is not.
+std::vector<Option> FreedomOptions(TuneFlags& flags) {
+  return {
+      {.flag = "--hold-out",
+       .value = &flags.hold_out,
+       .help = "A log to score on, not to fit; more than once",
+       .more = "Without it every third log is held out, of two the second, of one its last 30 % of time; the result "
+               "says which"},
+      {.flag = "--free",
+       .value = &flags.free,
+       .help = "Tune this parameter although it is frozen; more than once",
+       .more = "It needs bounds in the experiment file"},
+      {.flag = "--freeze", .value = &flags.freeze, .help = "Do not tune this parameter; more than once"},
+      {.flag = "--fix",
+       .value = &flags.fixed_nuisances,
+       .words = {"offset", "shift", "state"},
+       .help = "Do not fit this nuisance: offset (per log and sensor), shift (of the commands, below a sample), state "
+               "(initial); more than once",
+       .more = "All three are fitted unless fixed, and are never a finding"},
+      {.flag = "--actuator",
+       .value = &flags.actuator,
+       .help = "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none"}};
+}
+
+// What is minimised, and by what.
+std::vector<Option> SolveOptionsOf(TuneFlags& flags) {
+  return {
+      {.flag = "--optimizer",
+       .value = &flags.optimizer,
+       .words = OptimizerNames(),
+       .help = OptimizerHelp(),
+       .more = "lm is the fastest here; slsqp and mma use gradients too, bobyqa none; crs2, isres and direct search "
+               "all of the bounds"},
+      {.flag = "--objective",
+       .value = ChoiceOf(flags.objective),
+       .help = "What is matched: windows, free runs, or both",
+       .more = "both: windows first, then free runs from there. An experiment whose mode is windows is fitted in "
+               "windows alone"},
+      {.flag = "--normalize",
+       .value = ChoiceOf(flags.normalization),
+       .help = "Residuals are divided by each signal's standard deviation, or by its root mean square (rms)"},
+      WindowOption(flags.window_s),
+      TimeStepOption(flags.time_step_s),
+      {.flag = "--tolerance",
+       .value = &flags.tolerance,
+       .range = Between(1e-9, 0.1),
+       .help = "Stop when a step lowers the cost by less than this share"},
+      {.flag = "--huber",
+       .value = &flags.huber,
+       .range = AtLeast(0),
+       .help = "Weigh residuals beyond this many standard deviations down; 0: plain squares"},
+      {.flag = "--starts",
+       .value = &flags.starts,
+       .range = Between(1, 1000),
+       .help = "Starting points: the nominal values, then random ones",
+       .more = "The best end is reported, and whether the ends agree"},
+      {.flag = "--budget",
+       .value = &flags.budget_s,
+       .unit = "s",
+       .range = Above(0, 0),
+       .unset = "until it has converged",
+       .help = "Time; the best so far is reported when it is spent"},
+      {.flag = "--resume",
+       .value = &flags.resume,
+       .help = "Go on with the interrupted run in --out, to the same result",
+       .more = "Each replay of a run is kept in --out/journal.bin; nothing is computed twice"}};
+}
+
+}  // namespace
+
+Command TuneCommand() {
   auto flags = std::make_shared<TuneFlags>();
-  CLI::App* command = program.add_subcommand(
-      "tune", "Fit parameters until replayed trajectories match the hardware; score on logs not seen");
-  AddModelFlags(*command, flags->model, true);
-  AddCommonFlags(*command, flags->common, true);
-  command->add_option("--hold-out", flags->hold_out, "A log to score on, not to fit")->allow_extra_args(false);
-  command->add_option("--free", flags->free, "Tune this parameter although it is frozen")->allow_extra_args(false);
-  command->add_option("--freeze", flags->freeze, "Do not tune this parameter")->allow_extra_args(false);
-  command
-      ->add_option("--fix", flags->fixed_nuisances,
-                   "Do not fit this nuisance: offset (per log and sensor), shift (of the commands, below a sample), "
-                   "state (initial)")
-      ->check(CLI::IsMember({"offset", "shift", "state"}))
-      ->allow_extra_args(false);
-  command->add_option("--optimizer", flags->optimizer, OptimizerHelp())
-      ->check(CLI::IsMember(OptimizerNames()))
-      ->capture_default_str();
-  command->add_option("--objective", flags->objective, "windows, free_run or both")
-      ->check(CLI::IsMember({"windows", "free_run", "both"}))
-      ->capture_default_str();
-  command
-      ->add_option("--normalize", flags->normalization,
-                   "Residuals are divided by each signal's standard deviation, or by its root mean square (rms)")
-      ->check(CLI::IsMember({"deviation", "rms"}))
-      ->capture_default_str();
-  command->add_option("--window", flags->window_s, "Length of a window, s")->check(FinitePositive());
-  command->add_option("--time-step", flags->time_step_s, "Largest simulation step, s (default: chosen)")
-      ->check(FinitePositive());
-  command->add_option("--tolerance", flags->tolerance, "Stop when a step lowers the cost by less than this share")
-      ->check(FiniteIn(1e-9, 0.1))
-      ->capture_default_str();
-  command
-      ->add_option("--huber", flags->huber,
-                   "Weigh residuals beyond this many standard deviations down; 0: plain squares")
-      ->check(FiniteNonNegative())
-      ->capture_default_str();
-  command->add_option("--starts", flags->starts, "Starting points: the nominal values, then random ones")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  command->add_option("--budget", flags->budget_s, "Seconds; the best so far is reported when they are spent")
-      ->check(FinitePositive());
-  command->add_flag("--resume", flags->resume, "Go on with the interrupted run in --out, to the same result");
-  command->add_flag("--actuator", flags->actuator,
-                    "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none");
-  command->footer(
-      "Example: gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm "
-      "--out tuned");
-  command->callback([flags, &run] { run = [flags] { return RunTune(*flags); }; });
+  return {.name = "tune",
+          .what = "Fit parameters until replayed trajectories match the hardware; score on logs not seen",
+          .options = Join({LogOptions(flags->model),
+                           FreedomOptions(*flags),
+                           SolveOptionsOf(*flags),
+                           EffectOptions(flags->model),
+                           {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
+                           CommonOptions(flags->common)}),
+          .example =
+              "gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm "
+              "--out tuned",
+          .run = [flags] { return RunTune(*flags); }};
 }
 
 }  // namespace gapscope::cli

@@ -62,9 +62,14 @@ std::vector<double> Steps(const Waveform& wave, std::size_t rows, double rate_hz
 
 }  // namespace
 
-std::string WaveShapeName(WaveShape shape) {
-  constexpr const char* kNames[] = {"chirp", "steps", "triangle", "multisine", "square"};
-  return kNames[static_cast<std::size_t>(shape)];
+template <>
+std::span<const EnumName<WaveShape>> EnumNames<WaveShape>() {
+  static constexpr EnumName<WaveShape> kNames[] = {{WaveShape::kChirp, "chirp"},
+                                                   {WaveShape::kSteps, "steps"},
+                                                   {WaveShape::kTriangle, "triangle"},
+                                                   {WaveShape::kMultisine, "multisine"},
+                                                   {WaveShape::kSquare, "square"}};
+  return kNames;
 }
 
 Result<std::vector<double>> SampleWaveform(const Waveform& wave, double rate_hz) {

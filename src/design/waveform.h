@@ -6,19 +6,21 @@
 #include <string>
 #include <vector>
 
+#include "src/core/enum_names.h"
 #include "src/core/result.h"
 
 namespace gapscope {
 
 enum class WaveShape { kChirp, kSteps, kTriangle, kMultisine, kSquare };
-std::string WaveShapeName(WaveShape shape);
+template <>
+std::span<const EnumName<WaveShape>> EnumNames<WaveShape>();  // "chirp", "steps", ...
 
 struct Waveform {
   WaveShape shape = WaveShape::kChirp;
   double duration_s = 10;
   double low_hz = 0.1;  // chirp: start; multisine: lowest line; steps: a level is held for half to one and a half times
                         // 1 / (2 low_hz); triangle, square: 1 / period
-  double high_hz = 5;      // chirp: end; multisine: highest line; else unused
+  double high_hz = 5;   // chirp: end; multisine: highest line; else unused
   std::uint64_t seed = 0;  // steps: levels
 };
 

@@ -258,7 +258,7 @@ Status ReadReplay(const YAML::Node& node, const std::string& path, Experiment* e
   if (!node.IsDefined()) return Ok();
   YamlMap map(node, path, "'replay'");
   constexpr ReplayMode kModes[] = {ReplayMode::kFreeRun, ReplayMode::kWindows};
-  experiment->replay.mode = kModes[map.Choice("mode", {"free_run", "windows"}, 0)];
+  experiment->replay.mode = kModes[map.Choice("mode", {NameOf(kModes[0]), NameOf(kModes[1])}, 0)];
   experiment->replay.window_s = map.Number("window_s", experiment->replay.window_s);
   experiment->replay.start_s = map.Number("start_s", 0);
   experiment->replay.while_column = map.Text("while", "");
@@ -269,6 +269,13 @@ Status ReadReplay(const YAML::Node& node, const std::string& path, Experiment* e
 }
 
 }  // namespace
+
+template <>
+std::span<const EnumName<ReplayMode>> EnumNames<ReplayMode>() {
+  static constexpr EnumName<ReplayMode> kNames[] = {
+      {ReplayMode::kFreeRun, "free_run"}, {ReplayMode::kWindows, "windows"}, {ReplayMode::kClosedLoop, "closed_loop"}};
+  return kNames;
+}
 
 Result<Experiment> LoadExperiment(const std::string& path) {
   GS_ASSIGN(const YAML::Node root, ReadYaml(path));

@@ -4,9 +4,11 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "src/core/enum_names.h"
 #include "src/core/result.h"
 #include "src/log/log.h"
 #include "src/log/timeline.h"
@@ -91,6 +93,8 @@ struct Limit {
 };
 
 enum class ReplayMode { kFreeRun, kWindows, kClosedLoop };
+template <>
+std::span<const EnumName<ReplayMode>> EnumNames<ReplayMode>();  // "free_run", "windows", "closed_loop"
 
 struct ReplayDefaults {
   ReplayMode mode = ReplayMode::kFreeRun;

@@ -18,16 +18,16 @@ std::string BandText(const Waveform& wave) {
   switch (wave.shape) {
     case WaveShape::kChirp:
     case WaveShape::kMultisine:
-      return fmt::format("{} {:.3g} to {:.3g} Hz", WaveShapeName(wave.shape), wave.low_hz, wave.high_hz);
+      return fmt::format("{} {:.3g} to {:.3g} Hz", NameOf(wave.shape), wave.low_hz, wave.high_hz);
     case WaveShape::kSteps:
       return fmt::format("steps held for about {:.3g} s", 1 / (2 * wave.low_hz));
     default:
-      return fmt::format("{}, period {:.3g} s", WaveShapeName(wave.shape), 1 / wave.low_hz);
+      return fmt::format("{}, period {:.3g} s", NameOf(wave.shape), 1 / wave.low_hz);
   }
 }
 
 ordered_json WaveJson(const Waveform& wave, double amplitude, const std::string& unit) {
-  return {{"shape", WaveShapeName(wave.shape)},
+  return {{"shape", NameOf(wave.shape)},
           {"amplitude", amplitude},
           {"unit", unit},
           {"duration_s", wave.duration_s},

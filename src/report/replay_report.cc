@@ -12,18 +12,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-const char* ModeName(ReplayMode mode) {
-  switch (mode) {
-    case ReplayMode::kFreeRun:
-      return "free_run";
-    case ReplayMode::kWindows:
-      return "windows";
-    case ReplayMode::kClosedLoop:
-      return "closed_loop";
-  }
-  return "";
-}
-
 constexpr std::size_t kSparks = 12;
 
 // The end of a path that fits `width`.
@@ -94,7 +82,7 @@ ordered_json ToJson(const ReplayRun& run, Timing timing) {
   const ReplayResult& result = run.result;
   ordered_json json = {
       {"schema", "gapscope.replay/1"},
-      {"mode", ModeName(result.mode)},
+      {"mode", NameOf(result.mode)},
       {"error", JsonNumber(run.comparison.error)},
       {result.mode == ReplayMode::kWindows ? "error_free_run" : "error_windows", JsonNumber(run.other_error)},
       {"time_step_s", result.time_step_s},
@@ -131,7 +119,7 @@ std::string ToTable(const ReplayRun& run, const Console& console) {
     paths.push_back(comparison.logs[l].log_path);
   }
   text += fmt::format("\nerror {:.4g} (RMSE over standard deviation, {}, {} log{})\n", comparison.error,
-                      ModeName(result.mode), comparison.logs.size(), comparison.logs.size() == 1 ? "" : "s");
+                      NameOf(result.mode), comparison.logs.size(), comparison.logs.size() == 1 ? "" : "s");
   if (std::isfinite(run.nominal_error)) text += fmt::format("the nominal model: error {:.4g}\n", run.nominal_error);
   const char* other = result.mode == ReplayMode::kWindows ? "a free run" : "windows, each started from the log";
   text += std::isfinite(run.other_error) ? fmt::format("in {}: error {:.4g}\n", other, run.other_error)

@@ -210,6 +210,12 @@ Status PaintAll(const Stage& stage, const std::vector<double>& times, const Vide
 
 }  // namespace
 
+template <>
+std::span<const EnumName<Layout>> EnumNames<Layout>() {
+  static constexpr EnumName<Layout> kNames[] = {{Layout::kOverlay, "overlay"}, {Layout::kSide, "side"}};
+  return kNames;
+}
+
 std::vector<double> FrameTimes(const VideoOptions& options) {
   std::vector<double> times;
   const double step = options.speed / options.frames_per_s;

@@ -23,6 +23,8 @@ struct VideoModel {
 };
 
 enum class Layout { kOverlay, kSide };
+template <>
+std::span<const EnumName<Layout>> EnumNames<Layout>();  // "overlay", "side"
 
 struct VideoOptions {
   std::string out;  // .mp4, .gif or .png (a still)

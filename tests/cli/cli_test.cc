@@ -101,13 +101,13 @@ TEST_F(CliTest, WrongArguments) {
   ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above 0", {"--fail-above"});
   // No number of 300 digits in a message, and nan is in no range.
   for (const auto& [command, flag, allowed] :
-       {std::tuple{"diagnose", "--budget", "above zero"}, std::tuple{"diagnose", "--window", "above zero"},
-        std::tuple{"tune", "--huber", "of at least zero"}, std::tuple{"tune", "--tolerance", "in 1e-09 - 0.1"},
-        std::tuple{"render --out still.png", "--at", "of at least zero"},
-        std::tuple{"render --out still.png", "--fps", "in 1 - 240"}}) {
+       {std::tuple{"diagnose", "--budget", "above 0 (s)"}, std::tuple{"diagnose", "--window", "above 0 (s)"},
+        std::tuple{"tune", "--huber", "at least 0"}, std::tuple{"tune", "--tolerance", "1e-09 .. 0.1"},
+        std::tuple{"render --out still.png", "--at", "at least 0 (s)"},
+        std::tuple{"render --out still.png", "--fps", "1 .. 240"}}) {
     for (const char* value : {"inf", "nan"}) {
       const std::string line = std::string(command) + " " + Joint() + " '" + log + "' " + flag + " " + value;
-      ExpectRefused(line, {flag, std::string("'") + value + "' is not a finite number " + allowed});
+      ExpectRefused(line, {flag, std::string("got '") + value + "', allowed: a finite number " + allowed});
       EXPECT_LT(Run(line).err.size(), 200u);
     }
   }

@@ -20,10 +20,10 @@ TEST(WaveformTest, AllBeginAtZeroAndPeakAtOne) {
   for (const WaveShape shape :
        {WaveShape::kChirp, WaveShape::kSteps, WaveShape::kTriangle, WaveShape::kMultisine, WaveShape::kSquare}) {
     const auto values = SampleWaveform({.shape = shape, .duration_s = 10, .low_hz = 0.5, .high_hz = 5, .seed = 3}, 400);
-    ASSERT_TRUE(values.ok()) << WaveShapeName(shape);
+    ASSERT_TRUE(values.ok()) << NameOf(shape);
     EXPECT_EQ(values.value().size(), 4001u);
-    EXPECT_NEAR(Peak(values.value()), 1, 0.02) << WaveShapeName(shape);
-    EXPECT_NEAR(values.value()[0], shape == WaveShape::kSquare ? 1 : 0, 1e-9) << WaveShapeName(shape);
+    EXPECT_NEAR(Peak(values.value()), 1, 0.02) << NameOf(shape);
+    EXPECT_NEAR(values.value()[0], shape == WaveShape::kSquare ? 1 : 0, 1e-9) << NameOf(shape);
   }
 }
 

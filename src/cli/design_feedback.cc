@@ -1,11 +1,10 @@
-#include "src/cli/feedback.h"
-
 #include <fmt/core.h>
 
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/cli/commands.h"
 #include "src/cli/session.h"
 #include "src/design/linear.h"
 #include "src/report/feedback_report.h"
@@ -88,39 +87,60 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
 
 }  // namespace
 
-void AddFeedback(CLI::App& design, Run& run) {
-  for (const bool lqr : {true, false}) {
-    auto flags = std::make_shared<FeedbackFlags>();
-    flags->lqr = lqr;
-    CLI::App* command =
-        design.add_subcommand(lqr ? "lqr" : "poles", lqr ? "State feedback by quadratic weights (Riccati)"
-                                                         : "State feedback by pole placement");
-    command->add_option("experiment", flags->experiment, "Experiment file (YAML)")->required();
-    command->add_option("--at", flags->at, "Equilibrium: JOINT=POSITION (default: the model's initial pose)")
-        ->allow_extra_args(false);
-    command->add_option("--set", flags->set, "Override a parameter: NAME=VALUE")->allow_extra_args(false);
-    command->add_option("--params", flags->params, "YAML file of parameter values")->allow_extra_args(false);
-    command->add_option("--value", flags->value, "A number that a log would bring: NAME=VALUE")
-        ->allow_extra_args(false);
-    command->add_flag("--json", flags->json, "Print the result as JSON on stdout, nothing else");
-    if (lqr) {
-      command->add_option("--q", flags->q, "Weights of the states, positions first, separated by commas")
-          ->required()
-          ->delimiter(',');
-      command->add_option("--r", flags->r, "Weight of the command")->check(FinitePositive())->capture_default_str();
-      command->footer(
-          "Example: gapscope design lqr models/qube/experiment.yaml --at pendulum=3.141592653589793 --q 10,10,1,10 --r "
-          "1");
-    } else {
-      command->add_option("--poles", flags->poles, "Wanted poles, separated by commas, as --poles=-2,-3+4i,-3-4i")
-          ->required()
-          ->delimiter(',');
-      command->footer(
-          "Example: gapscope design poles models/qube/experiment.yaml --at pendulum=3.141592653589793 "
-          "--poles=-2,-2.2,-15,-115");
-    }
-    command->callback([flags, &run] { run = [flags] { return RunFeedback(*flags); }; });
-  }
+namespace {
+
+std::vector<Option> OptionsOf(FeedbackFlags& flags) {
+  return Join({{ExperimentOption(flags.experiment),
+                {.flag = "--at",
+                 .value = &flags.at,
+                 .unset = "the model's initial pose",
+                 .help = "Equilibrium: JOINT=POSITION, more than once",
+                 .more = "Speeds and commands are zero there; what is no equilibrium is refused"}},
+               ValueOptions(flags.set, flags.params),
+               {{.flag = "--value",
+                 .value = &flags.value,
+                 .help = "A number that a log would bring: NAME=VALUE, more than once"},
+                {.flag = "--json", .value = &flags.json, .help = "Print the result as JSON on stdout, nothing else"}}});
 }
+
+Command LqrCommand() {
+  auto flags = std::make_shared<FeedbackFlags>();
+  const std::vector<Option> own = {
+      {.flag = "--q",
+       .value = &flags->q,
+       .required = true,
+       .commas = true,
+       .help = "Weights of the states, positions first, separated by commas"},
+      {.flag = "--r", .value = &flags->r, .range = Above(0), .help = "Weight of the command"}};
+  return {.name = "lqr",
+          .what = "State feedback by quadratic weights (Riccati)",
+          .options = Join({OptionsOf(*flags), own}),
+          .example =
+              "gapscope design lqr models/qube/experiment.yaml --at pendulum=3.141592653589793 --q 10,10,1,10 "
+              "--r 1",
+          .run = [flags] { return RunFeedback(*flags); }};
+}
+
+Command PolesCommand() {
+  auto flags = std::make_shared<FeedbackFlags>();
+  flags->lqr = false;
+  const std::vector<Option> own = {{.flag = "--poles",
+                                    .value = &flags->poles,
+                                    .unit = "1/s",
+                                    .required = true,
+                                    .commas = true,
+                                    .help = "Wanted poles, separated by commas, as --poles=-2,-3+4i,-3-4i"}};
+  return {.name = "poles",
+          .what = "State feedback by pole placement",
+          .options = Join({OptionsOf(*flags), own}),
+          .example =
+              "gapscope design poles models/qube/experiment.yaml --at pendulum=3.141592653589793 "
+              "--poles=-2,-2.2,-15,-115",
+          .run = [flags] { return RunFeedback(*flags); }};
+}
+
+}  // namespace
+
+std::vector<Command> FeedbackCommands() { return {LqrCommand(), PolesCommand()}; }
 
 }  // namespace gapscope::cli

@@ -1,0 +1,10 @@
+#include "src/cli/commands.h"
+
+namespace gapscope::cli {
+
+std::vector<Command> AllCommands() {
+  return {InitCommand(),   InspectCommand(), ReplayCommand(), TuneCommand(), DiagnoseCommand(), IdentifyCommand(),
+          DesignCommand(), RenderCommand(),  PlanCommand(),   RunCommand(),  MergeCommand()};
+}
+
+}  // namespace gapscope::cli

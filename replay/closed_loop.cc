@@ -7,11 +7,12 @@
 #include <memory>
 #include <optional>
 
+#include "replay/policy.h"
+
 namespace gapscope {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kRunaway = 1e6;
 
 // One log. False after a divergence; `sent` and predictions are NaN from there on.
 bool RunLoop(const Model& model, const Recording& recording, Controller& controller, const ReplayOptions& options,

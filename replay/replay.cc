@@ -6,12 +6,13 @@
 #include <limits>
 #include <memory>
 
+#include "replay/policy.h"
+
 namespace gapscope {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr int kMaxHalvings = 5;
-constexpr double kStepTolerance = 0.01;  // of the error
+constexpr TimeStepPolicy kTimeStep;
 
 struct Job {
   std::size_t log;
@@ -173,7 +174,7 @@ TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& record
   for (const auto& recording : recordings) sample = std::max(sample, recording.timeline.median_step_s);
   const double own = model.compiled().opt.timestep;
   TimeStep chosen{.step_s = sample > 0 ? sample : own, .error_change = 0};
-  const double finest = std::min(own, chosen.step_s) / (1 << kMaxHalvings);
+  const double finest = std::min(own, chosen.step_s) / (1 << kTimeStep.halvings);
   double error = error_at(chosen.step_s);
   while (true) {
     const double finer = error_at(chosen.step_s / 2);
@@ -181,7 +182,7 @@ TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& record
     // What diverges at a slow log's samples may be sound at the model's own step.
     const bool diverges = !std::isfinite(finer) && !std::isfinite(error);
     if (diverges && chosen.step_s <= own) break;
-    if (!diverges && chosen.error_change < kStepTolerance * finer) break;
+    if (!diverges && chosen.error_change < kTimeStep.error_share * finer) break;
     if (chosen.step_s <= finest * 1.001) break;
     chosen.step_s /= 2;
     error = finer;

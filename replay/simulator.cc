@@ -5,16 +5,14 @@
 #include <limits>
 #include <string_view>
 
+#include "replay/policy.h"
 #include "replay/sensors.h"
 #include "src/plugins/motor/history.h"
 
 namespace gapscope {
 namespace {
 
-// How far back a window's past reaches: for delays alone; for states whose time constant is nobody's parameter; else so
-// many time constants, at most the last.
-constexpr double kHistory_s = 0.2, kTransmission_s = 0.5, kPreRoll_s = 1.5, kTimeConstants = 5, kLongest_s = 6;
-constexpr double kRunaway = 1e6;  // |position| in rad or m, |speed| / 1000: beyond this a simulation has diverged
+constexpr PastPolicy kPast;
 
 // Even steps of at most `max_step_s`.
 int StepsOver(double interval_s, double max_step_s) {
@@ -275,10 +273,10 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
 }
 
 double Simulator::Past() const {
-  double past_s = mujoco_->na > 0 && model_.memories().empty() ? kPreRoll_s : kHistory_s;
-  if (!apart_.empty()) past_s = std::max(past_s, kTransmission_s);
+  double past_s = mujoco_->na > 0 && model_.memories().empty() ? kPast.unknown_states_s : kPast.delays_s;
+  if (!apart_.empty()) past_s = std::max(past_s, kPast.transmission_s);
   for (const int i : model_.memories())
-    past_s = std::max(past_s, std::min(kTimeConstants * values_[i], kLongest_s));
+    past_s = std::max(past_s, std::min(kPast.time_constants * values_[i], kPast.longest_s));
   return std::max(past_s, command_delay_s_);
 }
 
@@ -307,7 +305,6 @@ void Simulator::StandAt(const Recording& recording, std::size_t row) {
 void Simulator::FindEarlierCommands(const Recording& recording) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  constexpr double kBetter = 0.5;
   const auto& actuators = model_.command_actuators();
   for (std::size_t c = 0; c < earlier_.size(); ++c) earlier_[c] = recording.commands[c].values.front();
   bool measured = false, still = true, commanded = false;
@@ -327,7 +324,7 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
     mj_resetData(m, d);
     return norm;
   };
-  from_nothing_ = acceleration(false) < kBetter * acceleration(true);
+  from_nothing_ = acceleration(false) < kRestShare * acceleration(true);
   for (std::size_t c = 0; c < earlier_.size(); ++c) {
     if (from_nothing_ && moves_[c]) earlier_[c] = 0;
   }

@@ -8,7 +8,6 @@
 
 #include "src/core/file.h"
 #include "src/model/effect.h"
-#include "tests/docs/wrap.h"
 
 namespace gapscope {
 namespace {
@@ -66,7 +65,7 @@ std::string EffectsText() {
   for (const Effect& effect : Catalogue()) {
     std::string meaning = effect.meaning;
     meaning[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(meaning[0])));
-    text += "## " + effect.name + "\n\n" + Wrapped(meaning + ". On " + PlaceText(effect.place) + ".") + "\n";
+    text += "## " + effect.name + "\n\n" + meaning + ". On " + PlaceText(effect.place) + ".\n\n";
     text += "| parameter | unit | base | bounds |\n|---|---|---|---|\n";
     for (const EffectParameter& p : effect.parameters) {
       const std::string key = p.scale == ScaleKind::kCommand
@@ -76,12 +75,9 @@ std::string EffectsText() {
       text += "| " + key + " | " + unit + " | " + Number(p.neutral, p.scale) + " | " + Number(p.low, p.scale) + " .. " +
               Number(p.high, p.scale) + " |\n";
     }
-    std::string partners;
-    for (const auto& partner : effect.partners) partners += (partners.empty() ? "`" : ", `") + partner + "`";
-    text += "\n" +
-            Wrapped("Shows as: " + effect.signature + ". Told apart by: " + effect.told_apart +
-                    ". Mistaken for: " + partners + ".") +
-            "\n";
+    text += "\nShows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
+    for (std::size_t i = 0; i < effect.partners.size(); ++i) text += (i ? ", " : "") + ("`" + effect.partners[i] + "`");
+    text += ".\n\n";
   }
   return text;
 }

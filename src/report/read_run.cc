@@ -119,8 +119,10 @@ Result<ordered_json> ReadJson(const std::string& path) {
 }
 
 Result<RunModel> ReadRunModel(const ordered_json& json, const std::string& where) {
-  const auto read = [&] { return ModelFrom(json.at("model")); };
-  return Guarded(read, where, "a result of gapscope replay, tune or diagnose");
+  constexpr char kAllowed[] = "a result of gapscope replay, tune or diagnose";
+  if (!json.is_object() || !json.contains("model"))
+    return Error{.what = "not a result of a model: it has no 'model'", .where = where, .allowed = kAllowed};
+  return Guarded([&] { return ModelFrom(json.at("model")); }, where, kAllowed);
 }
 
 Result<TuneRun> ReadTuneRun(const ordered_json& json, const std::string& where) {

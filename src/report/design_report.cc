@@ -27,13 +27,8 @@ std::string BandText(const Waveform& wave) {
 }
 
 ordered_json WaveJson(const Waveform& wave, double amplitude, const std::string& unit) {
-  return {{"shape", NameOf(wave.shape)},
-          {"amplitude", amplitude},
-          {"unit", unit},
-          {"duration_s", wave.duration_s},
-          {"low_hz", wave.low_hz},
-          {"high_hz", wave.high_hz},
-          {"seed", wave.seed}};
+  return {{"shape", NameOf(wave.shape)}, {"amplitude", amplitude},  {"unit", unit},     {"duration_s", wave.duration_s},
+          {"low_hz", wave.low_hz},       {"high_hz", wave.high_hz}, {"seed", wave.seed}};
 }
 
 ordered_json ExtremesJson(const Rehearsal& rehearsal) {

@@ -172,7 +172,8 @@ TEST_F(RecordingTest, WrappedAnglesAreUnwrapped) {
 TEST_F(RecordingTest, ScalingThatOverflowsIsAnError) {
   const std::string message =
       MessageOf("time_s,u,q\n0,1e307,2\n1,1,2\n", Replaced(kExperiment, "unit: mV, add: 1", "unit: V, scale: 1e3"));
-  for (const char* part : {"log.csv:2, column u", "too large once converted", "got 1e+307", "the column's unit and scale"})
+  for (const char* part :
+       {"log.csv:2, column u", "too large once converted", "got 1e+307", "the column's unit and scale"})
     EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
 }
 

@@ -142,8 +142,8 @@ TEST(QubeModelTest, EnergyIsKeptWithoutDampingAndVoltage) {
   EXPECT_NEAR(after, before, 1e-5 * p.mass * p.g * p.length);
 }
 
-// What a log of this rig means: positive voltage turns the arm positive; the pendulum grows when its tip moves the way a
-// positive arm rotation moves it, so a hanging pendulum swings negative when the arm accelerates positive.
+// What a log of this rig means: positive voltage turns the arm positive; the pendulum grows when its tip moves the way
+// a positive arm rotation moves it, so a hanging pendulum swings negative when the arm accelerates positive.
 TEST(QubeModelTest, SignsAreThoseOfTheContract) {
   const ModelPtr m = LoadRig("qube");
   ASSERT_NE(m, nullptr);

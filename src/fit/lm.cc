@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/fit/checkpoint.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -10,47 +11,10 @@ namespace {
 
 using Columns = DifferenceOptions::Columns;
 
-// Where a run is between two Jacobians: all that it takes to go on.
-struct LmState {
-  FitPoint point;
-  Residuals residuals;  // at the point; not journaled
-  double cost = 0, damping = 0, difference = 0;
-  int quiet = 0, iterations = 0;
-  bool done = false;
-  Termination termination = Termination::kIterations;
-  Work work;
+// Where a run is between two Jacobians. The residuals at the point are not journaled.
+struct LmState : Checkpoint {
+  Residuals residuals;
 };
-
-std::vector<double> Pack(const LmState& s) {
-  std::vector<double> record = {s.cost,
-                                s.damping,
-                                s.difference,
-                                static_cast<double>(s.quiet),
-                                static_cast<double>(s.iterations),
-                                static_cast<double>(s.done),
-                                static_cast<double>(s.termination),
-                                static_cast<double>(s.work.evaluations),
-                                static_cast<double>(s.work.replays),
-                                static_cast<double>(s.work.steps)};
-  record.insert(record.end(), s.point.y.begin(), s.point.y.end());
-  for (const auto& state : s.point.states) record.insert(record.end(), state.begin(), state.end());
-  return record;
-}
-
-void Unpack(const std::vector<double>& record, LmState* s) {
-  s->residuals.clear();
-  s->cost = record[0], s->damping = record[1], s->difference = record[2];
-  s->quiet = static_cast<int>(record[3]), s->iterations = static_cast<int>(record[4]), s->done = record[5] != 0;
-  s->termination = static_cast<Termination>(static_cast<int>(record[6]));
-  s->work = {.evaluations = static_cast<std::size_t>(record[7]),
-             .replays = static_cast<std::size_t>(record[8]),
-             .steps = static_cast<std::size_t>(record[9])};
-  std::size_t at = 10;
-  for (double& y : s->point.y) y = record[at++];
-  for (auto& state : s->point.states) {
-    for (double& x : state) x = record[at++];
-  }
-}
 
 // One run: the problem, how it is asked to be solved, and where it is.
 class LmRun {
@@ -206,6 +170,7 @@ void Run(const SolveTask& task, const SolveOptions& options, LmState* s) {
   while (s->iterations < options.max_iterations && !s->done) {
     if (std::vector<double> record; task.journal && task.journal->Next(s->point, &record)) {
       Unpack(record, s);
+      s->residuals.clear();
       continue;
     }
     if (IsLate(options.deadline)) {
@@ -231,12 +196,11 @@ void Run(const SolveTask& task, const SolveOptions& options, LmState* s) {
 
 SolveResult SolveLm(const SolveTask& task, const FitPoint& start, const SolveOptions& options, const OptimizerRow&) {
   Evaluation first = task.objective.Evaluate(start, Keep::kResiduals);
-  LmState s{.point = start,
-            .residuals = std::move(first.residuals),
-            .cost = first.cost,
-            .damping = options.damping,
-            .difference = options.coarse_step,
-            .work = first.work};
+  LmState s;
+  s.point = start;
+  s.residuals = std::move(first.residuals);
+  s.cost = first.cost, s.damping = options.damping, s.difference = options.coarse_step;
+  s.work = first.work;
   const bool any_state =
       std::any_of(start.states.begin(), start.states.end(), [](const auto& state) { return state.size() > 0; });
   if (!std::isfinite(s.cost)) {

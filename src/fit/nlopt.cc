@@ -6,6 +6,8 @@
 #include <limits>
 #include <nlopt.hpp>
 
+#include "src/fit/checkpoint.h"
+
 namespace gapscope {
 namespace {
 
@@ -222,49 +224,14 @@ Termination Round(const FitProblem& problem, const SolveOptions& options, nlopt:
   return Optimize(opt, std::vector<double>(n, 0.0));
 }
 
-// Where a run is between two rounds: all that it takes to go on.
-struct RoundState {
-  FitPoint point;
-  double cost = 0, difference = 0, damping = 0;
-  int rounds = 0, quiet = 0;
-  bool done = false;
-  Termination termination = Termination::kIterations;
-  Work work;
-};
-
-std::vector<double> Pack(const RoundState& s) {
-  std::vector<double> record = {s.cost, s.difference, s.damping};
-  for (const std::size_t n :
-       {static_cast<std::size_t>(s.rounds), static_cast<std::size_t>(s.quiet), static_cast<std::size_t>(s.done),
-        static_cast<std::size_t>(s.termination), s.work.evaluations, s.work.replays, s.work.steps})
-    record.push_back(static_cast<double>(n));
-  record.insert(record.end(), s.point.y.begin(), s.point.y.end());
-  for (const auto& state : s.point.states) record.insert(record.end(), state.begin(), state.end());
-  return record;
-}
-
-void Unpack(const std::vector<double>& record, RoundState* s) {
-  s->cost = record[0], s->difference = record[1], s->damping = record[2];
-  s->rounds = static_cast<int>(record[3]), s->quiet = static_cast<int>(record[4]), s->done = record[5] != 0;
-  s->termination = static_cast<Termination>(static_cast<int>(record[6]));
-  s->work = {.evaluations = static_cast<std::size_t>(record[7]),
-             .replays = static_cast<std::size_t>(record[8]),
-             .steps = static_cast<std::size_t>(record[9])};
-  std::size_t at = 10;
-  for (double& y : s->point.y) y = record[at++];
-  for (auto& state : s->point.states) {
-    for (double& x : state) x = record[at++];
-  }
-}
-
 // A round, and what it means for the run.
-void Advance(FitProblem& problem, const SolveOptions& options, nlopt::algorithm algorithm, RoundState* s) {
+void Advance(FitProblem& problem, const SolveOptions& options, nlopt::algorithm algorithm, Checkpoint* s) {
   Projected projected(problem, options, s->difference);
   const auto end = [&](Termination termination) { s->done = true, s->termination = termination; };
   if (!projected.Begin(s->point)) return end(Termination::kNotSimulated);
   const Termination round = Round(problem, options, algorithm, s->damping, &projected);
   s->work += projected.work();
-  ++s->rounds;
+  ++s->iterations;
   const Known& best = projected.best();
   const double before = s->cost;
   if (best.cost() < s->cost) s->cost = best.cost(), s->point = best.point;
@@ -290,14 +257,14 @@ void Advance(FitProblem& problem, const SolveOptions& options, nlopt::algorithm 
 SolveResult Locally(const SolveTask& task, const FitPoint& start, const SolveOptions& options,
                     nlopt::algorithm algorithm) {
   const Evaluation first = task.objective.Evaluate(start, Keep::kCost);
-  RoundState s{.point = start,
+  Checkpoint s{.point = start,
                .cost = first.cost,
-               .difference = options.coarse_step,
                .damping = kPolicy.first_damping,
+               .difference = options.coarse_step,
                .work = first.work};
   if (!std::isfinite(first.cost)) s.done = true, s.termination = Termination::kNotSimulated;
   if (start.y.size() == 0) s.done = true, s.termination = Termination::kConverged;
-  while (!s.done && s.rounds < kPolicy.most_rounds) {
+  while (!s.done && s.iterations < kPolicy.most_rounds) {
     if (std::vector<double> record; task.journal && task.journal->Next(s.point, &record)) {
       Unpack(record, &s);
       continue;
@@ -311,7 +278,7 @@ SolveResult Locally(const SolveTask& task, const FitPoint& start, const SolveOpt
     // A round that the deadline cut short is made anew.
     if (task.journal && !IsLate(options.deadline)) task.journal->Append(before, Pack(s));
   }
-  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.rounds, .work = s.work};
+  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations, .work = s.work};
 }
 
 }  // namespace

@@ -3,23 +3,21 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 
 #include "replay/policy.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // One log. False after a divergence; `sent` and predictions are NaN from there on.
 bool RunLoop(const Model& model, const Recording& recording, Controller& controller, const ReplayOptions& options,
              LogReplay* log, std::vector<double>* sent, std::size_t* steps) {
   const std::vector<double> values = options.values.empty() ? model.Nominal() : options.values;
   Simulator simulator(model, options.time_step_s);
-  sent->assign(recording.rows(), kNan);
+  sent->assign(recording.rows(), kNaN);
   if (!simulator.SetParameters(values, recording)) return false;
   mjModel* m = const_cast<mjModel*>(&simulator.mujoco_model());
   mjData* d = &simulator.data();
@@ -38,7 +36,7 @@ bool RunLoop(const Model& model, const Recording& recording, Controller& control
       const SignalSource& source = model.source(measured.index);
       double value = source.kind == SignalKind::kPosition   ? d->qpos[source.qpos]
                      : source.kind == SignalKind::kVelocity ? d->qvel[source.dof]
-                                                            : kNan;
+                                                            : kNaN;
       if (source.offset >= 0) value += values[source.offset];
       log->signals[s].predicted[row] = value;
       const double count = measured.spec.resolution;
@@ -75,7 +73,7 @@ bool RunLoop(const Model& model, const Recording& recording, Controller& control
 }  // namespace
 
 MotionStatistics StatisticsOf(const std::vector<double>& time_s, const std::vector<double>& values) {
-  MotionStatistics out{.mean = kNan, .deviation = kNan, .low = kNan, .high = kNan, .crossings_hz = kNan};
+  MotionStatistics out{.mean = kNaN, .deviation = kNaN, .low = kNaN, .high = kNaN, .crossings_hz = kNaN};
   std::vector<double> finite;
   for (const double v : values) {
     if (std::isfinite(v)) finite.push_back(v);
@@ -115,7 +113,7 @@ Result<ClosedLoopResult> ReplayClosedLoop(const Model& model, const std::vector<
   ClosedLoopResult closed;
   closed.result.mode = ReplayMode::kClosedLoop;
   closed.result.time_step_s = options.time_step_s > 0 ? options.time_step_s : model.compiled().opt.timestep;
-  closed.result.time_step_error = kNan;
+  closed.result.time_step_error = kNaN;
   closed.sent.resize(recordings.size());
   std::vector<Controller> controllers;
   for (const auto& recording : recordings) {

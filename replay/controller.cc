@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
+#include "src/core/statistics.h"
 #include "src/experiment/yaml_reader.h"
 
 namespace gapscope {
@@ -268,7 +268,7 @@ void Controller::Reset(Start start) {
   }
   if (observer_) observer_->Reset();
   law_ = sent_ = swing_angle_ = swing_speed_ = arm_angle_ = arm_speed_ = last_s_ = 0;
-  next_s_ = -std::numeric_limits<double>::infinity();
+  next_s_ = -kInfinity;
   first_ = true, start_ = start, caught_ = !spec_.swing_up.has_value();
 }
 

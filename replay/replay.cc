@@ -7,11 +7,11 @@
 #include <memory>
 
 #include "replay/policy.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr TimeStepPolicy kTimeStep;
 
 struct Job {
@@ -21,7 +21,7 @@ struct Job {
 
 // Error of one log: see ReplayError.
 double LogError(const LogReplay& log) {
-  if (log.outcome == Outcome::kDiverged) return std::numeric_limits<double>::infinity();
+  if (log.outcome == Outcome::kDiverged) return kInfinity;
   double sum = 0;
   int signals = 0;
   for (const auto& signal : log.signals) {
@@ -39,7 +39,7 @@ double LogError(const LogReplay& log) {
     sum += error / static_cast<double>(rows) / (deviation * deviation);
     ++signals;
   }
-  return signals == 0 ? kNan : std::sqrt(sum / signals);
+  return signals == 0 ? kNaN : std::sqrt(sum / signals);
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ LogReplay EmptyTraces(const Recording& recording) {
                            .scored = measured.spec.scored,
                            .resolution = measured.spec.resolution,
                            .measured = measured.values,
-                           .predicted = std::vector<double>(recording.rows(), kNan)});
+                           .predicted = std::vector<double>(recording.rows(), kNaN)});
   }
   return log;
 }
@@ -87,7 +87,7 @@ double ReplayError(const std::vector<LogReplay>& logs) {
     sum += error * error;
     ++count;
   }
-  return count == 0 ? kNan : std::sqrt(sum / static_cast<double>(count));
+  return count == 0 ? kNaN : std::sqrt(sum / static_cast<double>(count));
 }
 
 ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options,
@@ -97,7 +97,7 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
   const std::vector<double> values = options.values.empty() ? model.Nominal() : options.values;
   if (options.time_step_s > 0) {
     result.time_step_s = options.time_step_s;
-    result.time_step_error = kNan;
+    result.time_step_error = kNaN;
   } else {
     const TimeStep chosen = ChooseTimeStep(model, recordings, options, pool);
     result.time_step_s = chosen.step_s;
@@ -107,7 +107,7 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
   std::vector<Job> jobs;
   for (std::size_t log = 0; log < recordings.size(); ++log) {
     result.logs.push_back(EmptyTraces(recordings[log]));
-    if (options.keep_poses) result.logs.back().qpos.assign(recordings[log].rows() * nq, kNan);
+    if (options.keep_poses) result.logs.back().qpos.assign(recordings[log].rows() * nq, kNaN);
     for (const Window& window : MakeWindows(recordings[log], options.mode, options.window_s))
       jobs.push_back({log, window});
   }
@@ -138,7 +138,7 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
                     result.logs[job.log].qpos.begin() + static_cast<std::ptrdiff_t>(job.window.begin * nq));
     } else {
       runs[index].outcome = Outcome::kDiverged;
-      std::fill(buffer.begin(), buffer.end(), kNan);
+      std::fill(buffer.begin(), buffer.end(), kNaN);
     }
     // A window's first row is its initial state: it says nothing about the model.
     const std::size_t first = job.window.begin == 0 && options.mode == ReplayMode::kFreeRun ? 0 : 1;

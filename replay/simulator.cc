@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string_view>
 
 #include "replay/policy.h"
 #include "replay/sensors.h"
+#include "src/core/statistics.h"
 #include "src/plugins/motor/history.h"
 
 namespace gapscope {
@@ -229,10 +229,9 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     if (!IsSane(*m, *d)) {
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;
-      std::fill(out + signals, predicted.data() + window.rows() * signals, std::numeric_limits<double>::quiet_NaN());
+      std::fill(out + signals, predicted.data() + window.rows() * signals, kNaN);
       if (!qpos.empty())
-        std::fill(qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin + 1) * nq), qpos.end(),
-                  std::numeric_limits<double>::quiet_NaN());
+        std::fill(qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin + 1) * nq), qpos.end(), kNaN);
       break;
     }
   }

@@ -1,7 +1,8 @@
 #include "src/compare/comparison.h"
 
 #include <cmath>
-#include <limits>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -36,8 +37,7 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
     if (!recording.commands.empty()) input.command = recording.commands.front().values;
     for (auto& share : LocateError(input)) comparison.where.push_back(std::move(share));
   }
-  comparison.error =
-      log.outcome == Outcome::kDiverged ? std::numeric_limits<double>::infinity() : CombinedError(scored);
+  comparison.error = log.outcome == Outcome::kDiverged ? kInfinity : CombinedError(scored);
   return comparison;
 }
 

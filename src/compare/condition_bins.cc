@@ -4,7 +4,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <limits>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -30,12 +31,6 @@ int Exponent(double value) { return static_cast<int>(std::floor(std::log10(std::
 double Nearest(double value) { return std::round(value); }
 double Up(double value) { return std::ceil(value - 1e-9); }
 double Down(double value) { return std::floor(value + 1e-9); }
-
-// The value below which `part` of the sorted values lie.
-double Quantile(const std::vector<double>& sorted, double part) {
-  const double last = static_cast<double>(sorted.size() - 1);
-  return sorted[static_cast<std::size_t>(std::lround(part * last))];
-}
 
 std::vector<double> SortedMagnitudes(std::span<const double> values, const std::vector<char>& used) {
   std::vector<double> result;
@@ -102,10 +97,10 @@ Partition ByDirection(const ConditionInput& input, const std::vector<char>& used
 // speed passes `standing` the other way.
 std::vector<double> LastReversal(const ConditionInput& input, double standing) {
   const std::size_t n = input.speed.size();
-  std::vector<double> reversal(n, std::numeric_limits<double>::quiet_NaN());
+  std::vector<double> reversal(n, kNaN);
   int direction = 0;
   std::size_t crossing = 0, previous = n;  // row of the latest change of sign; latest finite row
-  double crossing_s = 0, current_s = std::numeric_limits<double>::quiet_NaN();
+  double crossing_s = 0, current_s = kNaN;
   for (std::size_t i = 0; i < n; ++i) {
     const double speed = input.speed[i];
     if (std::isfinite(speed)) {
@@ -164,7 +159,7 @@ std::vector<double> EqualLimits(double low, double high, int count) {
 }
 
 std::vector<double> AngleLimits(std::span<const double> angle, const std::vector<char>& used) {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
+  double low = kInfinity, high = -low;
   for (std::size_t i = 0; i < angle.size(); ++i) {
     if (!used[i] || !std::isfinite(angle[i])) continue;
     low = std::min(low, angle[i]);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -15,11 +14,11 @@
 #include "src/compare/noise.h"
 #include "src/compare/spectrum.h"
 #include "src/core/result.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kFewestRows = 3;
 constexpr std::size_t kFewestRowsForInterval = 20;
 constexpr std::size_t kFewestRowsForFrequency = 16;
@@ -176,12 +175,6 @@ std::size_t BlockCells(const Conditions& conditions, const std::vector<double>& 
       std::max(1L, std::lround(std::clamp(kBlockCorrelationTimes * slowest, cells / 200, cells / 10))));
 }
 
-double Percentile(std::vector<double>* values, double part) {
-  const auto at = static_cast<std::ptrdiff_t>(std::lround(part * static_cast<double>(values->size() - 1)));
-  std::nth_element(values->begin(), values->begin() + at, values->end());
-  return (*values)[static_cast<std::size_t>(at)];
-}
-
 // How much wider an interval is than the bootstrap's, for three small-sample effects: Student's t for the normal
 // distribution (Cornish-Fisher series), the variance of few draws, and the correlation cut where blocks meet (for an
 // AR(1) a part 1 / (2 kBlockCorrelationTimes) of the variance).
@@ -217,8 +210,8 @@ void SetIntervals(const Conditions& conditions, std::size_t block, const Conditi
     }
     if (values.size() < 20) continue;
     ConditionShare& share = (*result)[c];
-    share.low = Widen(share.share_of_error, Percentile(&values, kLow), widening);
-    share.high = Widen(share.share_of_error, Percentile(&values, kHigh), widening);
+    share.low = Widen(share.share_of_error, Quantile(values, kLow), widening);
+    share.high = Widen(share.share_of_error, Quantile(values, kHigh), widening);
   }
 }
 

@@ -3,18 +3,17 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <vector>
 
 #include "src/compare/spectrum.h"
 #include "src/core/result.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t kFewestRows = 64;
+constexpr std::size_t kFewestRowsForNoise = 64;
 constexpr std::size_t kLongestSegment = 4096;
 constexpr double kHannWidth = 1.5;        // bins that one Hann bin covers
 constexpr double kTopOfNyquist = 0.95;    // anti-alias filters and the last bin stay out
@@ -24,7 +23,7 @@ constexpr double kNoiseRise = 3;          // ... plus this many of its own stand
 constexpr double kColouredGain = 9;       // twice the log-likelihood, for two more parameters
 
 // A quarter octave of the spectrum.
-struct Band {
+struct NoiseBand {
   double low_hz, high_hz;   // first and last bin
   std::size_t first, last;  // bins first..last-1
   double density;           // mean over the bins
@@ -34,7 +33,7 @@ struct Band {
 // density = white + coloured * shape(tau), `white` and `coloured` densities at frequency zero.
 struct Fit {
   double white = 0, coloured = 0, tau_s = kNaN;
-  double cost = std::numeric_limits<double>::infinity();  // -2 log-likelihood, up to a constant
+  double cost = kInfinity;  // -2 log-likelihood, up to a constant
 };
 
 // AR(1) sampled at dt, relative to frequency zero.
@@ -43,8 +42,8 @@ double Shape(double frequency_hz, double tau_s, double dt_s) {
   return (1 - phi) * (1 - phi) / (1 - 2 * phi * std::cos(2 * std::numbers::pi * frequency_hz * dt_s) + phi * phi);
 }
 
-std::vector<Band> MakeBands(const Spectrum& spectrum, double lowest_hz) {
-  std::vector<Band> bands;
+std::vector<NoiseBand> MakeBands(const Spectrum& spectrum, double lowest_hz) {
+  std::vector<NoiseBand> bands;
   const double nyquist_hz = spectrum.bin_hz * static_cast<double>(spectrum.density.size() - 1);
   const auto end = static_cast<std::size_t>(kTopOfNyquist * nyquist_hz / spectrum.bin_hz) + 1;
   // Bins 0 and 1 hold what is left of mean and slope.
@@ -53,12 +52,12 @@ std::vector<Band> MakeBands(const Spectrum& spectrum, double lowest_hz) {
   while (first < end) {
     const auto wide = static_cast<std::size_t>(static_cast<double>(first) * std::exp2(0.25));
     const std::size_t last = std::min(end, std::max(first + 1, wide));
-    Band band{.low_hz = static_cast<double>(first) * spectrum.bin_hz,
-              .high_hz = static_cast<double>(last - 1) * spectrum.bin_hz,
-              .first = first,
-              .last = last,
-              .density = 0,
-              .averages = 0};
+    NoiseBand band{.low_hz = static_cast<double>(first) * spectrum.bin_hz,
+                   .high_hz = static_cast<double>(last - 1) * spectrum.bin_hz,
+                   .first = first,
+                   .last = last,
+                   .density = 0,
+                   .averages = 0};
     const double bins = static_cast<double>(last - first);
     for (std::size_t k = first; k < last; ++k) band.density += spectrum.density[k] / bins;
     band.averages = spectrum.averages * std::max(1.0, bins / kHannWidth);
@@ -70,7 +69,7 @@ std::vector<Band> MakeBands(const Spectrum& spectrum, double lowest_hz) {
 
 class DensityFitter {
  public:
-  DensityFitter(std::vector<Band> bands, double dt_s) : bands_(std::move(bands)), dt_s_(dt_s) {}
+  DensityFitter(std::vector<NoiseBand> bands, double dt_s) : bands_(std::move(bands)), dt_s_(dt_s) {}
 
   // Best white plus coloured density for bands first..end, correlated no longer than `slowest_s`.
   Fit Best(std::size_t first, double slowest_s) const {
@@ -84,11 +83,11 @@ class DensityFitter {
     return best;
   }
 
-  double Density(const Fit& fit, const Band& band) const {
+  double Density(const Fit& fit, const NoiseBand& band) const {
     return fit.white + (fit.coloured > 0 ? fit.coloured * MeanShape(band, fit.tau_s) : 0);
   }
 
-  const std::vector<Band>& bands() const { return bands_; }
+  const std::vector<NoiseBand>& bands() const { return bands_; }
 
   // The slowest noise whose corner lies within bands first..end.
   double SlowestSeen(std::size_t first) const {
@@ -96,7 +95,7 @@ class DensityFitter {
   }
 
  private:
-  double MeanShape(const Band& band, double tau_s) const {
+  double MeanShape(const NoiseBand& band, double tau_s) const {
     return (Shape(band.low_hz, tau_s, dt_s_) + 4 * Shape((band.low_hz + band.high_hz) / 2, tau_s, dt_s_) +
             Shape(band.high_hz, tau_s, dt_s_)) /
            6;
@@ -106,7 +105,7 @@ class DensityFitter {
     double cost = 0;
     for (std::size_t b = first; b < bands_.size(); ++b) {
       const double m = model[b - first];
-      if (!(m > 0)) return std::numeric_limits<double>::infinity();
+      if (!(m > 0)) return kInfinity;
       cost += 2 * bands_[b].averages * (bands_[b].density / m + std::log(m));
     }
     return cost;
@@ -156,7 +155,7 @@ class DensityFitter {
     return best;
   }
 
-  std::vector<Band> bands_;
+  std::vector<NoiseBand> bands_;
   double dt_s_;
 };
 
@@ -164,7 +163,7 @@ class DensityFitter {
 std::size_t LowestNoiseBand(const DensityFitter& fitter, std::size_t start) {
   std::size_t first = start;
   while (first > 0) {
-    const Band& next = fitter.bands()[first - 1];
+    const NoiseBand& next = fitter.bands()[first - 1];
     const double foretold = fitter.Density(fitter.Best(first, fitter.SlowestSeen(0)), next);
     if (next.density > foretold * (kCoarseRise + kNoiseRise / std::sqrt(next.averages))) {
       // The motion's foot may reach into the band just taken.
@@ -187,14 +186,14 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
                    .band_low_hz = kNaN,
                    .band_high_hz = kNaN};
   const auto finite = std::count_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-  if (static_cast<std::size_t>(finite) < kFewestRows) return floor;
+  if (static_cast<std::size_t>(finite) < kFewestRowsForNoise) return floor;
   const std::vector<double> filled = FillGaps(values);
   const double dt_s = MedianStep(time_s);
   GS_CHECK(dt_s > 0);
 
   const std::size_t segment = std::clamp(std::bit_floor(filled.size() / 4), std::size_t{32}, kLongestSegment);
   const Spectrum spectrum = WelchSpectrum(filled, dt_s, segment);
-  std::vector<Band> bands = MakeBands(spectrum, options.motion_band_hz);
+  std::vector<NoiseBand> bands = MakeBands(spectrum, options.motion_band_hz);
   if (bands.size() < 2) return floor;
   floor.band_high_hz = bands.back().high_hz;
   const auto [low, high] = std::minmax_element(filled.begin(), filled.end());
@@ -207,8 +206,8 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
   }
   // An exactly empty band has no logarithm.
   double highest = 0;
-  for (const Band& band : bands) highest = std::max(highest, band.density);
-  for (Band& band : bands) band.density = std::max(band.density, 1e-30 * highest);
+  for (const NoiseBand& band : bands) highest = std::max(highest, band.density);
+  for (NoiseBand& band : bands) band.density = std::max(band.density, 1e-30 * highest);
 
   const DensityFitter fitter(std::move(bands), dt_s);
   std::size_t first = 0;
@@ -248,7 +247,7 @@ double CorrelationTime(std::span<const double> residual, double dt_s) {
   const std::size_t most = n - 1;
   for (std::size_t lags = std::min<std::size_t>(most, 255);; lags = std::min(most, 4 * lags + 3)) {
     const std::vector<double> correlation = CrossCorrelation(values, values, lags);
-    double sum = 0, previous = std::numeric_limits<double>::infinity();
+    double sum = 0, previous = kInfinity;
     bool ended = false;
     for (std::size_t k = 0; k + 1 <= lags && !ended; k += 2) {
       const double pair = (correlation[lags + k] + correlation[lags + k + 1]) / correlation[lags];

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "replay/simulator.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -102,8 +102,7 @@ TorqueMap MapTorque(const ResidualTorque& residual, std::size_t angles, std::siz
     ++map.rows[at];
   }
   for (std::size_t i = 0; i < map.rows.size(); ++i)
-    map.mean_n_m[i] = map.rows[i] >= least ? map.mean_n_m[i] / static_cast<double>(map.rows[i])
-                                           : std::numeric_limits<double>::quiet_NaN();
+    map.mean_n_m[i] = map.rows[i] >= least ? map.mean_n_m[i] / static_cast<double>(map.rows[i]) : kNaN;
   return map;
 }
 

@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 #include <vector>
 
 #include "src/compare/spectrum.h"
 #include "src/core/result.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kLongestLag_s = 0.25;
 constexpr double kFlat = 1e-9;  // correlation that varies less than this has no peak
 constexpr std::size_t kFewestRowsForLag = 8;

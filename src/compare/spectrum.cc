@@ -4,11 +4,11 @@
 #include <bit>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
 #include "src/core/result.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -36,12 +36,10 @@ std::size_t QuickLength(std::size_t n) {
 }  // namespace
 
 double MedianStep(std::span<const double> time_s) {
-  if (time_s.size() < 2) return std::numeric_limits<double>::quiet_NaN();
+  if (time_s.size() < 2) return kNaN;
   std::vector<double> steps(time_s.size() - 1);
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = time_s[i + 1] - time_s[i];
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return Median(std::move(steps));
 }
 
 std::vector<double> FillGaps(std::span<const double> values) {

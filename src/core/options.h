@@ -8,28 +8,27 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "src/core/enum_names.h"
 #include "src/core/result.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 
 // Finite numbers from `low` to `high`. `low_is_in`: false where the lowest number is the first one refused.
 struct NumberRange {
-  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  double low = -kInfinity, high = kInfinity;
   bool low_is_in = true;
-  double unset =
-      std::numeric_limits<double>::quiet_NaN();  // stands for "not given": no word gives it, Check lets it be
+  double unset = kNaN;  // stands for "not given": no word gives it, Check lets it be
 
   bool Contains(double value) const;
   std::string Text() const;  // "above 0", "0 .. 1024", "" for every finite number
 };
-NumberRange Above(double low, double unset = std::numeric_limits<double>::quiet_NaN());
-NumberRange AtLeast(double low, double unset = std::numeric_limits<double>::quiet_NaN());
+NumberRange Above(double low, double unset = kNaN);
+NumberRange AtLeast(double low, double unset = kNaN);
 NumberRange Between(double low, double high);
 
 // A value that is one of a few words.

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "src/core/statistics.h"
 #include "src/diagnose/rules.h"
 #include "src/diagnose/score_test.h"
 
@@ -135,8 +135,7 @@ std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& c
 }  // namespace
 
 void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
-  candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors =
-      std::numeric_limits<double>::infinity();
+  candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors = kInfinity;
   candidate->at_bound = LastEffectAtBound(bench, *candidate);
   candidate->held_out_blocks.clear();
   candidate->train_blocks = BlockCosts(*candidate->problem, candidate->point);
@@ -161,7 +160,7 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   options.weights.clear();
   FitPoint point;
   const auto problem = OnHeldOut(bench, candidate, options, &point);
-  return problem ? ReplayError(problem->Predict(point)) : std::numeric_limits<double>::infinity();
+  return problem ? ReplayError(problem->Predict(point)) : kInfinity;
 }
 
 }  // namespace gapscope

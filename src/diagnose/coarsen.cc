@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "src/core/statistics.h"
+
 namespace gapscope {
 
 Recording Coarsen(const Recording& recording, double least_step_s) {
@@ -36,8 +38,7 @@ Recording Coarsen(const Recording& recording, double least_step_s) {
   }
   std::vector<double> steps;
   for (std::size_t k = 0; k + 1 < kept.size(); ++k) steps.push_back(coarse.time_s[k + 1] - coarse.time_s[k]);
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  coarse.timeline.median_step_s = steps[steps.size() / 2];
+  coarse.timeline.median_step_s = Median(std::move(steps));
   return coarse;
 }
 

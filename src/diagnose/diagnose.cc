@@ -6,6 +6,7 @@
 #include <set>
 
 #include "src/compare/noise.h"
+#include "src/core/statistics.h"
 #include "src/diagnose/coarsen.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/explain.h"
@@ -14,8 +15,6 @@
 
 namespace gapscope {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // Noise of each measured signal, from the log itself: the median over logs. SI.
 std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& data) {
@@ -34,9 +33,7 @@ std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& d
   std::vector<double> noise(found.size(), 1.0);
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (found[i].empty()) continue;
-    std::nth_element(found[i].begin(), found[i].begin() + static_cast<std::ptrdiff_t>(found[i].size() / 2),
-                     found[i].end());
-    noise[i] = std::max(found[i][found[i].size() / 2], std::numeric_limits<double>::min());
+    noise[i] = std::max(Median(found[i]), std::numeric_limits<double>::min());
   }
   return noise;
 }
@@ -164,7 +161,7 @@ std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const
     if (named.contains(s.use)) continue;
     reports.push_back(
         {.effect = s.use,
-         .held_out_error = kNan,
+         .held_out_error = kNaN,
          .screen_drop = s.trial.drop,
          .absorbed = s.trial.absorbed,
          .reason = !s.left_out.empty() ? s.left_out
@@ -183,7 +180,7 @@ std::vector<CandidateReport> DescribeSeconds(const SearchResult& found) {
   std::vector<CandidateReport> reports;
   for (const auto& s : found.second.screen) {
     CandidateReport report{.effect = s.use,
-                           .held_out_error = kNan,
+                           .held_out_error = kNaN,
                            .screen_drop = s.trial.drop,
                            .absorbed = s.trial.absorbed,
                            .reason = s.left_out};
@@ -292,7 +289,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                   .weights = {},
                   .window_s = options.window_s,
                   .max_windows = options.max_windows};
-  bench.sample_s = std::numeric_limits<double>::infinity();
+  bench.sample_s = kInfinity;
   for (const auto* part : {&fine.train, &fine.held_out}) {
     for (const auto& recording : *part) bench.sample_s = std::min(bench.sample_s, recording.timeline.median_step_s);
   }

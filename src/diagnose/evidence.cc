@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -52,8 +53,7 @@ Evidence Compare(const Candidate& a, const Candidate& b) {
 }
 
 double LogMisfit(const Candidate& candidate) {
-  if (candidate.held_out_blocks.empty() || candidate.train_blocks.empty())
-    return std::numeric_limits<double>::infinity();
+  if (candidate.held_out_blocks.empty() || candidate.train_blocks.empty()) return kInfinity;
   double sum = 0;
   for (const auto* blocks : {&candidate.train_blocks, &candidate.held_out_blocks}) {
     for (const double cost : *blocks) sum += std::log(cost + candidate.block_floor);
@@ -62,11 +62,8 @@ double LogMisfit(const Candidate& candidate) {
 }
 
 double TypicalFloors(const Candidate& candidate) {
-  if (candidate.held_out_blocks.empty()) return std::numeric_limits<double>::infinity();
-  std::vector<double> blocks = candidate.held_out_blocks;
-  const auto middle = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 2);
-  std::nth_element(blocks.begin(), middle, blocks.end());
-  return std::sqrt(*middle / candidate.block_floor);
+  if (candidate.held_out_blocks.empty()) return kInfinity;
+  return std::sqrt(Median(candidate.held_out_blocks) / candidate.block_floor);
 }
 
 bool Convincing(const Evidence& e, const Limits& limits) {

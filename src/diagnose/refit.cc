@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "src/core/statistics.h"
 #include "src/diagnose/rules.h"
 
 namespace gapscope {
@@ -22,7 +22,7 @@ GiveUp FarBehind(double best_cost) {
 
 // Gives up where the better of the last two gains, made again in each iteration left, would not lead below `known`.
 GiveUp TooSlow(double known, int iterations) {
-  double last = std::numeric_limits<double>::infinity(), gained = last;
+  double last = kInfinity, gained = last;
   return [=](double cost, int iteration) mutable {
     const double gain = last - cost, best = std::max(gain, gained);
     last = cost;
@@ -50,7 +50,7 @@ void TryStart(const Workbench& bench, Candidate* candidate, const FitPoint& star
 // valleys that take many Jacobians back.
 FitPoint StartFrom(const FitProblem& parent, const FitPoint& at, const Trial& trial, FitProblem* child) {
   FitPoint best;
-  double least = std::numeric_limits<double>::infinity();
+  double least = kInfinity;
   for (const double share : {1.0, 0.3, 0.0}) {
     FitPoint start = FromParent(parent, at, *child, trial.values, share * trial.dy);
     const double cost = child->Evaluate(start, Keep::kCost).cost;

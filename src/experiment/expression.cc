@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
 
 #include "src/core/names.h"
+#include "src/core/statistics.h"
 #include "src/log/text.h"
 
 namespace gapscope {
@@ -98,7 +98,7 @@ double Expression::Evaluate() const {
   try {
     return impl_->parser->Eval();
   } catch (const mu::Parser::exception_type&) {
-    return std::numeric_limits<double>::quiet_NaN();
+    return kNaN;
   }
 }
 

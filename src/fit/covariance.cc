@@ -4,18 +4,11 @@
 #include <cmath>
 
 #include "src/core/dense.h"
+#include "src/core/statistics.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
 namespace {
-
-// 97.5 % quantile of Student's t (Abramowitz & Stegun 26.7.5, two terms).
-double StudentQuantile(double freedom) {
-  const double z = 1.959964;
-  return freedom < 1 ? 12.7
-                     : z + (z * z * z + z) / (4 * freedom) +
-                           (5 * std::pow(z, 5) + 16 * z * z * z + 3 * z) / (96 * freedom * freedom);
-}
 
 struct Covariance {
   Eigen::MatrixXd robust, model_based;  // of y, in units of each coordinate's range

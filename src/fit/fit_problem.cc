@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "src/core/statistics.h"
 #include "src/fit/fit_worker.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::size_t CountResiduals(const FitLayout& layout, const std::vector<FitWindow>& windows) {
   std::size_t count = 0;

@@ -31,11 +31,11 @@ std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const 
 }
 
 // A window's columns with its state taken out of them, and the rows of its prior after that.
-struct Projected {
+struct StateFree {
   Eigen::MatrixXd rows, prior;
 };
 
-Projected TakeStateOut(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& states, const Eigen::VectorXd& prior,
+StateFree TakeStateOut(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& states, const Eigen::VectorXd& prior,
                        const Eigen::VectorXd& state) {
   const Eigen::Index rows = columns.rows(), m = prior.size();
   if (m == 0) return {.rows = columns, .prior = Eigen::MatrixXd(0, columns.cols())};
@@ -52,7 +52,7 @@ Projected TakeStateOut(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& st
 }
 
 // Columns [y | extra | residual] of one window, with robust weights.
-Projected WindowColumns(const FitProblem& problem, std::size_t w, const FitPoint& point, const Derivatives& at,
+StateFree WindowColumns(const FitProblem& problem, std::size_t w, const FitPoint& point, const Derivatives& at,
                         const std::vector<Residuals>& extra) {
   const Eigen::Index n = problem.layout().low.size(), m = point.states[w].size();
   Eigen::VectorXd residual = at.residuals[w];
@@ -97,7 +97,7 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
   std::vector<Eigen::MatrixXd> priors(count);
   parent.pool().ForEach(count, [&](std::size_t w, int) {
     const FitWindow& window = parent.windows()[w];
-    const Projected columns = WindowColumns(parent, w, point, at, others);
+    const StateFree columns = WindowColumns(parent, w, point, at, others);
     for (const RowBlock& block : RowBlocks(parent.recordings()[window.log], window))
       parts[w].emplace_back(block, Products(columns.rows, block, window.scored()));
     priors[w] = columns.prior.transpose() * columns.prior;

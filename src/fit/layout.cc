@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "src/compare/score.h"
+#include "src/core/statistics.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -68,7 +68,7 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
                      const SearchSpace& space) {
   FitLayout layout{.parameters = space.size()};
   std::vector<double> low(space.low().begin(), space.low().end()), high(space.high().begin(), space.high().end());
-  double step = std::numeric_limits<double>::infinity();
+  double step = kInfinity;
   for (const Recording& recording : recordings) {
     step = std::min(step, recording.timeline.median_step_s);
     AddLog(model, recording, options, &layout, &low, &high);

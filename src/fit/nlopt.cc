@@ -3,9 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <nlopt.hpp>
 
+#include "src/core/statistics.h"
 #include "src/fit/checkpoint.h"
 
 namespace gapscope {
@@ -36,7 +36,7 @@ struct Known {
   FitPoint point;
   Derivatives derivatives;
   Linearization at;
-  double cost() const { return at.valid ? at.cost : std::numeric_limits<double>::infinity(); }
+  double cost() const { return at.valid ? at.cost : kInfinity; }
 };
 
 // The cost around the point where a round begins: one Jacobian there, then a replay or a few an evaluation. States go

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "src/core/dense.h"
+#include "src/core/statistics.h"
 #include "src/fit/blocks.h"
 
 namespace gapscope {
@@ -214,7 +215,7 @@ double TakeBetterStates(const FitProblem& problem, FitPoint& point, Residuals& r
   double total = problem.prior().Cost(point.y);
   for (std::size_t w = 0; w < problem.windows().size(); ++w) {
     const auto cost = [&](const FitPoint& at, const Residuals& of) {
-      return of[w].size() > 0 ? problem.WindowCost(w, of[w], at.states[w]) : std::numeric_limits<double>::infinity();
+      return of[w].size() > 0 ? problem.WindowCost(w, of[w], at.states[w]) : kInfinity;
     };
     const double here = cost(point, residuals), there = cost(other, others);
     if (there < here) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/statistics.h"
+
 namespace gapscope {
 
 double Huber::Sum(const Eigen::VectorXd& residual) const {
@@ -34,10 +36,8 @@ double HuberThreshold(const std::vector<Eigen::VectorXd>& residuals, double devi
       if (r != 0) sizes.push_back(std::abs(r));
     }
   }
-  if (sizes.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return deviations * kDeviationOverMedian * *middle;
+  if (sizes.empty()) return kInfinity;
+  return deviations * kDeviationOverMedian * Median(std::move(sizes));
 }
 
 }  // namespace gapscope

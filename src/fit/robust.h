@@ -4,15 +4,16 @@
 #define GAPSCOPE_FIT_ROBUST_H_
 
 #include <Eigen/Core>
-#include <limits>
 #include <vector>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 
 struct Huber {
-  double threshold = std::numeric_limits<double>::infinity();  // in residual units; infinity: plain squares
+  double threshold = kInfinity;  // in residual units; infinity: plain squares
 
-  bool plain() const { return threshold == std::numeric_limits<double>::infinity(); }
+  bool plain() const { return threshold == kInfinity; }
   // Sum of squares, large residuals linearly.
   double Sum(const Eigen::VectorXd& residual) const;
   // Rows of a residual and its Jacobian times the square root of their weights: with these, least squares has Huber's

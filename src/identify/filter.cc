@@ -2,17 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "src/compare/noise.h"
 #include "src/core/names.h"
+#include "src/core/statistics.h"
 #include "src/core/units.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // Standard deviations of the Gaussian that are summed. Cut at 4.5 the weights of a second derivative would add up to
 // -1.4e-4 / sigma^2 instead of zero: times an angle, and an inertia, that looks like a spring.
 constexpr double kReach = 6;
@@ -48,7 +47,7 @@ SmoothLog::SmoothLog(const Recording& recording, const IdentifyOptions& options)
 
 std::vector<double> SmoothLog::GridOf(const std::vector<double>& values, bool held) const {
   const auto& t = recording_.time_s;
-  std::vector<double> grid(rows_, kNan);
+  std::vector<double> grid(rows_, kNaN);
   std::size_t k = 0;
   for (std::size_t i = 0; i < rows_; ++i) {
     const double now = time_s(i) + 1e-9 * dt_;
@@ -106,7 +105,7 @@ std::vector<double> SmoothLog::OnGrid(const std::vector<double>& grid, int order
   double sum_of_weights = 0;
   for (const double w : weights) sum_of_weights += w;
   for (double& w : weights) w -= (sum_of_weights - (order == 0 ? 1 : 0)) / static_cast<double>(weights.size());
-  std::vector<double> out(grid.size(), kNan);
+  std::vector<double> out(grid.size(), kNaN);
   const std::ptrdiff_t rows = static_cast<std::ptrdiff_t>(grid.size());
   for (std::ptrdiff_t i = reach; i < rows - reach; ++i) {
     double sum = 0;

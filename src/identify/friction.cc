@@ -11,6 +11,7 @@
 #include <functional>
 #include <optional>
 
+#include "src/core/statistics.h"
 #include "src/identify/plateaus.h"
 #include "src/identify/regression.h"
 #include "src/identify/torque.h"

@@ -1,12 +1,11 @@
 #include "src/identify/plateaus.h"
 
 #include <cmath>
-#include <limits>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 double Slope(const std::vector<double>& t, const std::vector<double>& y, std::size_t from, std::size_t to) {
   double st = 0, sy = 0, n = 0;
@@ -17,7 +16,7 @@ double Slope(const std::vector<double>& t, const std::vector<double>& y, std::si
   for (std::size_t k = from; k < to; ++k) {
     if (std::isfinite(y[k])) tt += (t[k] - st / n) * (t[k] - st / n), ty += (t[k] - st / n) * (y[k] - sy / n);
   }
-  return tt > 0 ? ty / tt : kNan;
+  return tt > 0 ? ty / tt : kNaN;
 }
 
 double Mean(const std::vector<double>& y, std::size_t from, std::size_t to) {
@@ -25,7 +24,7 @@ double Mean(const std::vector<double>& y, std::size_t from, std::size_t to) {
   for (std::size_t k = from; k < to; ++k) {
     if (std::isfinite(y[k])) sum += y[k], n += 1;
   }
-  return n > 0 ? sum / n : kNan;
+  return n > 0 ? sum / n : kNaN;
 }
 
 }  // namespace
@@ -51,12 +50,12 @@ std::vector<Plateau> FindPlateaus(const IdentifyInput& input, int joint,
                   .to_s = t[last],
                   .command = command[begin],
                   .rows = last - middle};
-        p.speed = angle ? Slope(t, angle->values, middle, last) : kNan;
+        p.speed = angle ? Slope(t, angle->values, middle, last) : kNaN;
         p.acceleration = angle ? (Slope(t, angle->values, quarter, last) - Slope(t, angle->values, middle, quarter)) /
                                      (t[quarter] - t[middle])
-                               : kNan;
-        p.current = current.empty() || current[log].empty() ? kNan : Mean(current[log], middle, last);
-        p.torque = torque ? Mean(torque->values, middle, last) : kNan;
+                               : kNaN;
+        p.current = current.empty() || current[log].empty() ? kNaN : Mean(current[log], middle, last);
+        p.torque = torque ? Mean(torque->values, middle, last) : kNaN;
         plateaus.push_back(p);
       }
       begin = k;

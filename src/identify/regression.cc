@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "src/compare/noise.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 
@@ -25,16 +26,6 @@ Eigen::MatrixXd Rows::X() const {
 }
 Eigen::VectorXd Rows::Y() const {
   return Eigen::Map<const Eigen::VectorXd>(y_.data(), static_cast<Eigen::Index>(y_.size()));
-}
-
-double StudentQuantile(double n) {
-  if (n <= 1) return 12.706;
-  if (n <= 2) return 4.303;
-  if (n <= 3) return 3.182;
-  // Cornish and Fisher's expansion about the normal quantile.
-  const double z = 1.959964, z2 = z * z;
-  return z + z * (z2 + 1) / (4 * n) + z * (5 * z2 * z2 + 16 * z2 + 3) / (96 * n * n) +
-         z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
 }
 
 BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual,

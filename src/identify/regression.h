@@ -59,9 +59,6 @@ struct BlockCovariance {
 BlockCovariance CovarianceByBlocks(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual,
                                    const std::vector<int>& logs, const std::vector<double>& times, double dt_s);
 
-// 97.5 % quantile of Student's t, to 1 % from 2 degrees of freedom on.
-double StudentQuantile(double degrees);
-
 Estimate ToEstimate(const Regression& fit, Eigen::Index i, std::string name, std::string unit);
 
 }  // namespace gapscope

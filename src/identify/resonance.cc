@@ -11,6 +11,7 @@
 #include <complex>
 #include <numbers>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 #include "src/model/parameter_writer.h"

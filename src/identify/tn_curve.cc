@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 
@@ -14,12 +15,6 @@ struct Sample {
   double speed, torque;  // magnitudes; motoring only
   bool limited;          // the servo asked for more
 };
-
-double Quantile(std::vector<double> values, double share) {
-  const std::size_t k = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
-  return values[k];
-}
 
 using Envelope = std::vector<std::pair<double, double>>;  // speed, torque
 

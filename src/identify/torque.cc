@@ -2,16 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "src/core/statistics.h"
 #include "src/model/parameter_writer.h"
 
 namespace gapscope {
-namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
+namespace {}  // namespace
 
 Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, const IdentifyOptions& options) {
   const Model& model = input.model;
@@ -82,9 +78,9 @@ Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, 
     for (std::size_t i = 0; i < rows; ++i) logged[i] += base.actuator_gainprm[mjNGAIN * actuator] * (mean[i] - seen[i]);
   }
   motion.angle_rad = q[joint], motion.speed_rad_per_s = v[joint], motion.acceleration_rad_per_s2 = a[joint];
-  motion.drive_n_m.assign(rows, kNan);
-  motion.demand_n_m.assign(rows, kNan);
-  motion.others_n_m.assign(rows, kNan);
+  motion.drive_n_m.assign(rows, kNaN);
+  motion.demand_n_m.assign(rows, kNaN);
+  motion.others_n_m.assign(rows, kNaN);
   std::vector<mjtNum> acceleration(base.nv), inertial(base.nv);
   mjData* d = data.get();
   for (std::size_t i = 0; i < rows; ++i) {

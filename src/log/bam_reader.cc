@@ -7,13 +7,13 @@
 #include <cmath>
 #include <cstdint>
 #include <iterator>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <unordered_map>
 #include <vector>
 
+#include "src/core/statistics.h"
 #include "src/log/text.h"
 
 namespace gapscope {
@@ -21,9 +21,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kDeepest = 64;
-constexpr std::size_t kMostColumns = 1000;
+constexpr std::size_t kMostKeys = 1000;
 
 // Bytes for the parser; keeps the place it has reached where the event handler can see it.
 class WatchedBytes {
@@ -310,9 +309,9 @@ class Handler : public nlohmann::json_sax<Json> {
 
   // Keys that come in few entries would make a table far larger than the file.
   bool AddColumn() {
-    if (log_->columns.size() == kMostColumns) {
-      return Fail("too many different keys in the entries", std::to_string(kMostColumns + 1),
-                  fmt::format("at most {}", kMostColumns), "give all entries the same keys");
+    if (log_->columns.size() == kMostKeys) {
+      return Fail("too many different keys in the entries", std::to_string(kMostKeys + 1),
+                  fmt::format("at most {}", kMostKeys), "give all entries the same keys");
     }
     const std::size_t cells = (log_->columns.size() + 1) * rows_;
     if (cells > 10'000'000 && cells > 100 * values_) {

@@ -7,18 +7,16 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <utility>
 #include <vector>
 
+#include "src/core/statistics.h"
 #include "src/log/csv_dialect.h"
 #include "src/log/csv_fields.h"
 #include "src/log/text.h"
 
 namespace gapscope {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // How often something was met, and the row of the first.
 struct Tally {

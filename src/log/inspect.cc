@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "src/core/statistics.h"
 #include "src/log/inspect_parts.h"
 #include "src/log/signal_checks.h"
 
@@ -12,7 +12,7 @@ namespace {
 
 ChannelReport Describe(const InspectChannel& channel) {
   ChannelReport report{.name = channel.name, .unit = channel.unit, .role = channel.role};
-  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double nan = kNaN;
   std::size_t count = 0;
   double low = nan, high = nan, mean = 0, squares = 0;
   for (const double x : channel.values) {

@@ -5,18 +5,11 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
+#include "src/core/statistics.h"
 #include "src/log/inspect_parts.h"
 
 namespace gapscope {
 namespace {
-
-// The value that `share` of the sorted values lie below.
-double Percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
 
 // One-sided power of a signal without its mean, by bins of 1 / (size * step): bin 0 is left out.
 struct Spectrum {
@@ -104,8 +97,8 @@ CommandExcitation MeasureExcitation(const InspectChannel& command, const std::ve
   result.range = *high - *low;
   const std::vector<double> peaks = HalfCyclePeaks(signal.values);
   result.half_cycles = peaks.size();
-  const double small = Percentile(peaks, 0.1);
-  result.amplitude_ratio = small > 0 ? Percentile(peaks, 0.9) / small : 0;
+  const double small = Quantile(peaks, 0.1);
+  result.amplitude_ratio = small > 0 ? Quantile(peaks, 0.9) / small : 0;
   return result;
 }
 
@@ -130,7 +123,7 @@ MotionCoverage MeasureCoverage(const InspectChannel& channel, const ChannelRepor
   }
   std::vector<double> sizes;
   for (const double v : speed) sizes.push_back(std::abs(v));
-  coverage.speed_max = Percentile(sizes, 0.999);
+  coverage.speed_max = Quantile(sizes, 0.999);
   threshold = std::max(threshold, 0.005 * coverage.speed_max);
 
   std::size_t moving = 0, slow = 0, positive = 0;

@@ -5,16 +5,17 @@
 namespace gapscope {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 const char* Name(ChannelRole role) { return role == ChannelRole::kCommand ? "command" : "measured"; }
 
 // Names may come from files that are not UTF-8 through and through; the writer would throw.
 std::string Clean(const std::string& text) {
-  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+  return OrderedJson::parse(OrderedJson(text).dump(-1, ' ', false, OrderedJson::error_handler_t::replace))
+      .get<std::string>();
 }
 
-Json ToJson(const Finding& finding) {
+OrderedJson ToJson(const Finding& finding) {
   return {{"kind", finding.kind},
           {"column", Clean(finding.column)},
           {"count", finding.count},
@@ -22,7 +23,7 @@ Json ToJson(const Finding& finding) {
           {"text", Clean(finding.text)}};
 }
 
-Json ToJson(const ChannelReport& channel) {
+OrderedJson ToJson(const ChannelReport& channel) {
   return {{"name", Clean(channel.name)},
           {"unit", Clean(channel.unit)},
           {"role", Name(channel.role)},
@@ -36,7 +37,7 @@ Json ToJson(const ChannelReport& channel) {
           {"missing_share", channel.missing_share}};
 }
 
-Json ToJson(const DelayReport& delay) {
+OrderedJson ToJson(const DelayReport& delay) {
   return {{"command", Clean(delay.command)},
           {"measured", Clean(delay.measured)},
           {"delay_s", delay.delay_s},
@@ -44,8 +45,8 @@ Json ToJson(const DelayReport& delay) {
           {"reliable", delay.reliable}};
 }
 
-Json ToJson(const CommandExcitation& command) {
-  Json bands = Json::array();
+OrderedJson ToJson(const CommandExcitation& command) {
+  OrderedJson bands = OrderedJson::array();
   for (const auto& band : command.bands)
     bands.push_back({{"low_hz", band.low_hz}, {"high_hz", band.high_hz}, {"share", band.share}});
   return {{"command", Clean(command.name)},
@@ -57,7 +58,7 @@ Json ToJson(const CommandExcitation& command) {
           {"bands", std::move(bands)}};
 }
 
-Json ToJson(const MotionCoverage& motion) {
+OrderedJson ToJson(const MotionCoverage& motion) {
   return {{"signal", Clean(motion.name)},        {"range", motion.range},
           {"speed_max", motion.speed_max},       {"reversals", motion.reversals},
           {"moving_share", motion.moving_share}, {"rest_share", motion.rest_share},
@@ -65,14 +66,14 @@ Json ToJson(const MotionCoverage& motion) {
 }
 
 template <class T>
-Json ListToJson(const std::vector<T>& items) {
-  Json list = Json::array();
+OrderedJson ListToJson(const std::vector<T>& items) {
+  OrderedJson list = OrderedJson::array();
   for (const auto& item : items) list.push_back(ToJson(item));
   return list;
 }
 
-Json TextsToJson(const std::vector<std::string>& texts) {
-  Json list = Json::array();
+OrderedJson TextsToJson(const std::vector<std::string>& texts) {
+  OrderedJson list = OrderedJson::array();
   for (const auto& text : texts) list.push_back(Clean(text));
   return list;
 }

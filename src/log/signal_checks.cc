@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "src/core/statistics.h"
+
 namespace gapscope {
 namespace {
 
@@ -174,9 +176,7 @@ double NoiseEstimate(const std::vector<double>& values, double step) {
   }
   const double floor = step / std::sqrt(12.0);
   if (bends.empty()) return floor;
-  const auto middle = bends.begin() + static_cast<std::ptrdiff_t>(bends.size() / 2);
-  std::nth_element(bends.begin(), middle, bends.end());
-  return std::max(floor, *middle / (0.6744897501960817 * std::sqrt(6.0)));
+  return std::max(floor, Median(std::move(bends)) / (0.6744897501960817 * std::sqrt(6.0)));
 }
 
 }  // namespace gapscope

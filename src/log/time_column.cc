@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "src/core/names.h"
+#include "src/core/statistics.h"
 #include "src/core/units.h"
 #include "src/log/text.h"
 
@@ -113,9 +114,7 @@ std::optional<RawSteps> MedianRawStep(const Column& column) {
     previous = t;
   }
   if (steps.empty()) return std::nullopt;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return RawSteps{*middle, *first};
+  return RawSteps{Median(std::move(steps)), *first};
 }
 
 TimeUnit Guess(const Column& column) {

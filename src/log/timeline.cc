@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "src/core/statistics.h"
 #include "src/log/time_column.h"
 
 namespace gapscope {
@@ -75,9 +76,7 @@ double MedianPositiveStep(const Stamps& stamps) {
     if (stamps[k].raw > stamps[k - 1].raw) steps.push_back(stamps[k].raw - stamps[k - 1].raw);
   }
   if (steps.empty()) return 0;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return Median(std::move(steps));
 }
 
 bool IsIncreasing(const Stamps& stamps) {
@@ -205,10 +204,7 @@ void Measure(double gap_factor, Timeline* timeline) {
   const auto& t = timeline->time_s;
   std::vector<double> steps(t.size() - 1);
   for (std::size_t k = 0; k + 1 < t.size(); ++k) steps[k] = t[k + 1] - t[k];
-  std::vector<double> sorted = steps;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  timeline->median_step_s = *middle;
+  timeline->median_step_s = Median(steps);
   const auto [shortest, longest] = std::minmax_element(steps.begin(), steps.end());
   timeline->shortest_step_s = *shortest;
   timeline->longest_step_s = *longest;

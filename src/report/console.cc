@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <string_view>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 
@@ -49,8 +50,7 @@ std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<cons
     ++rows[part];
   }
   for (std::size_t p = 0; p < parts; ++p)
-    sums[p] =
-        rows[p] > 0 ? std::sqrt(sums[p] / static_cast<double>(rows[p])) : std::numeric_limits<double>::quiet_NaN();
+    sums[p] = rows[p] > 0 ? std::sqrt(sums[p] / static_cast<double>(rows[p])) : kNaN;
   return sums;
 }
 

@@ -1,19 +1,18 @@
 #include "src/report/read_run.h"
 
 #include <filesystem>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "src/core/file.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
 using nlohmann::ordered_json;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // Null stands for a number that does not exist.
-double Number(const ordered_json& json) { return json.is_null() ? kNan : json.get<double>(); }
+double Number(const ordered_json& json) { return json.is_null() ? kNaN : json.get<double>(); }
 double NumberAt(const ordered_json& json, const char* key) { return Number(json.at(key)); }
 
 RunModel ModelFrom(const ordered_json& json) {
@@ -77,11 +76,11 @@ TuneRun TuneRunFrom(const ordered_json& json) {
       .termination = json.at("termination"),
       .starts_agree = json.at("starts_agree"),
       .starts = json.at("starts"),
-      .cost = json.contains("cost") ? NumberAt(json, "cost") : kNan,
+      .cost = json.contains("cost") ? NumberAt(json, "cost") : kNaN,
       .evaluations = json.at("evaluations"),
       .replays = json.at("replays"),
-      .wall_s = json.value("wall_s", kNan),
-      .solve_s = json.value("solve_s", kNan),
+      .wall_s = json.value("wall_s", kNaN),
+      .solve_s = json.value("solve_s", kNaN),
       .error_nominal = NumberAt(error, "nominal"),
       .error_train = NumberAt(error, "train"),
       .error_held_out = NumberAt(error, "held_out"),

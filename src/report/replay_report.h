@@ -2,7 +2,6 @@
 #ifndef GAPSCOPE_REPORT_REPLAY_REPORT_H_
 #define GAPSCOPE_REPORT_REPLAY_REPORT_H_
 
-#include <limits>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "src/compare/comparison.h"
+#include "src/core/statistics.h"
 #include "src/report/closed_loop_report.h"
 #include "src/report/console.h"
 #include "src/report/json.h"
@@ -23,10 +23,9 @@ struct ReplayRun {
   Comparison comparison;  // their scores, log by log
   RunModel model;
   std::vector<std::pair<std::string, double>> parameters;  // of the model, without the rig's own sizes
-  double other_error = 0;  // of a free run where the replay was in windows, in windows where it was a free run
-  double nominal_error =
-      std::numeric_limits<double>::quiet_NaN();  // of the nominal model, where this one has effects or other values
-  std::optional<LoopStatistics> loop;            // of a replay with the loop closed
+  double other_error = 0;       // of a free run where the replay was in windows, in windows where it was a free run
+  double nominal_error = kNaN;  // of the nominal model, where this one has effects or other values
+  std::optional<LoopStatistics> loop;  // of a replay with the loop closed
 };
 // The parts that come from the model. `values` as model.Nominal().
 ReplayRun ReplayRunOf(const Model& model, std::span<const double> values, ReplayResult result, Comparison comparison);

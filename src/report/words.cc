@@ -6,12 +6,14 @@
 #include <charconv>
 #include <cmath>
 
+#include "src/core/statistics.h"
+
 namespace gapscope {
 namespace {
 
 constexpr const char* kUnknown = "–";
 
-std::string Percent(double share) {
+std::string WholePercent(double share) {
   return std::isfinite(share) ? fmt::format("{:.0f} %", std::floor(100 * share + 0.5)) : kUnknown;
 }
 
@@ -34,12 +36,12 @@ std::string ChangeText(double before, double after) {
 
 // A stage whose error is not known is not shown.
 void AddStage(std::vector<Stage>* stages, const std::string& name, double error, Stage::Mark mark = Stage::Mark::kNone,
-              double share_of_gap = std::numeric_limits<double>::quiet_NaN()) {
+              double share_of_gap = kNaN) {
   if (!std::isfinite(error)) return;
   Stage stage{.name = name, .error = error, .mark = mark, .change = {}};
   if (!stages->empty() && mark != Stage::Mark::kFloor) stage.change = ChangeText(stages->back().error, error);
   if (std::isfinite(share_of_gap))
-    stage.change += fmt::format("{}{} of the gap", stage.change.empty() ? "" : ", ", Percent(share_of_gap));
+    stage.change += fmt::format("{}{} of the gap", stage.change.empty() ? "" : ", ", WholePercent(share_of_gap));
   stages->push_back(std::move(stage));
 }
 
@@ -62,9 +64,7 @@ const char* HowItFollows(const ReplayRun& run) {
 
 // The signal with the greatest error; null: no signal.
 const SignalScore* Worst(const Comparison& comparison) {
-  const auto badness = [](const SignalScore& s) {
-    return std::isfinite(s.nrmse) ? s.nrmse : std::numeric_limits<double>::infinity();
-  };
+  const auto badness = [](const SignalScore& s) { return std::isfinite(s.nrmse) ? s.nrmse : kInfinity; };
   const SignalScore* worst = nullptr;
   for (const auto& log : comparison.logs) {
     for (const auto& signal : log.signals) {
@@ -151,7 +151,7 @@ Headline HeadlineOf(const TuneRun& run) {
   const double gain = run.error_nominal > 0 ? 1 - run.error_held_out / run.error_nominal : 0;
   Headline headline{.kind = "Tuning"};
   headline.title = gain > kLeastGain
-                       ? fmt::format("Tuning {} parameters cuts the held-out error by {}.", count, Percent(gain))
+                       ? fmt::format("Tuning {} parameters cuts the held-out error by {}.", count, WholePercent(gain))
                        : fmt::format("Tuning {} parameters does not help on held-out data.", count);
   headline.sentences.push_back(fmt::format("From {} to {} on data that the fit did not see ({}); {} on what it saw.",
                                            ShortNumber(run.error_nominal, 3), ShortNumber(run.error_held_out, 3),
@@ -178,8 +178,8 @@ Headline HeadlineOf(const DiagnoseRun& run) {
       fmt::format("Held-out error {} with nominal parameters, {} with the best parameters, {} with what was found.",
                   ShortNumber(d.nominal, 3), ShortNumber(d.refit, 3), ShortNumber(d.final, 3)));
   if (std::isfinite(d.closed) && d.verdict != Verdict::kNone) {
-    headline.sentences.push_back(
-        fmt::format("That closes {} of the gap down to the floor of {}.", Percent(d.closed), ShortNumber(d.floor, 3)));
+    headline.sentences.push_back(fmt::format("That closes {} of the gap down to the floor of {}.",
+                                             WholePercent(d.closed), ShortNumber(d.floor, 3)));
   }
   AddStage(&headline.stages, "nominal", d.nominal);
   AddStage(&headline.stages, "best parameters", d.refit);

@@ -3,10 +3,10 @@
 #ifndef GAPSCOPE_REPORT_WORDS_H_
 #define GAPSCOPE_REPORT_WORDS_H_
 
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "src/core/statistics.h"
 #include "src/report/diagnose_report.h"
 #include "src/report/replay_report.h"
 #include "src/report/tune_report.h"
@@ -26,13 +26,13 @@ struct Stage {
 };
 
 struct Headline {
-  std::string kind;                                              // "Replay"
-  std::string title;                                             // the result in a sentence
-  std::vector<std::string> sentences;                            // the numbers that it rests on
-  std::vector<Stage> stages;                                     // in order
-  double confidence = std::numeric_limits<double>::quiet_NaN();  // in the verdict, 0..1; NaN: it claims none
-  std::string explanation;                                       // a paragraph; may be empty
-  std::vector<std::string> notes;                                // on the parameters, a line each
+  std::string kind;                    // "Replay"
+  std::string title;                   // the result in a sentence
+  std::vector<std::string> sentences;  // the numbers that it rests on
+  std::vector<Stage> stages;           // in order
+  double confidence = kNaN;            // in the verdict, 0..1; NaN: it claims none
+  std::string explanation;             // a paragraph; may be empty
+  std::vector<std::string> notes;      // on the parameters, a line each
 };
 Headline HeadlineOf(const ReplayRun& run);
 Headline HeadlineOf(const TuneRun& run);

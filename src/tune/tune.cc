@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "src/core/statistics.h"
 #include "src/fit/journal.h"
 #include "src/tune/job_key.h"
 
@@ -120,7 +121,7 @@ std::optional<Found> FitBoth(const Fit& fit, const Eigen::VectorXd& y) {
   joint.y = y;
   const Evaluation first = both.stage->objective().Evaluate(joint, Keep::kCost);
   both.work += first.work;
-  both.result.cost = std::numeric_limits<double>::infinity();
+  both.result.cost = kInfinity;
   if (!std::isfinite(first.cost)) return both;
   // Windows come log by log, each log's free run last: their states are found again from the log.
   if (fit.options.fit_states) problem.WeighStates(problem.Evaluate(joint, Keep::kResiduals).residuals);

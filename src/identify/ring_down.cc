@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "src/core/statistics.h"
@@ -170,185 +171,210 @@ Result<std::pair<double, double>> FreeStretch(const Recording& recording, const 
   return std::pair{best_from, best_to};
 }
 
-}  // namespace
+using Stretch = std::pair<double, double>;  // from, to: seconds
 
-Result<Identification> IdentifyRingDown(const IdentifyInput& input, const IdentifyOptions& options) {
-  const mjModel& m = input.model.compiled();
-  int joint = -1;
-  if (!options.joint.empty()) {
-    GS_ASSIGN(joint, DrivenJoint(input.model, options.joint));
-  } else {
-    joint = static_cast<int>(m.njnt) - 1;  // the last link swings
-    for (int j = 0; j < m.njnt; ++j) {
-      if (m.jnt_stiffness[j] > 0) joint = j;
+// The joint asked for, or the one on a spring, or the last link.
+Result<int> SwingingJoint(const Model& model, const std::string& asked) {
+  if (!asked.empty()) return DrivenJoint(model, asked);
+  const mjModel& m = model.compiled();
+  int joint = static_cast<int>(m.njnt) - 1;
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_stiffness[j] > 0) joint = j;
+  }
+  return joint;
+}
+
+// Where the joint that carries the swinging one moves, its acceleration drives the swing.
+void AddCarrier(const Model& model, const Recording& recording, int joint, Stretch stretch,
+                const IdentifyOptions& options, Swing* swing) {
+  const mjModel& m = model.compiled();
+  const int parent_body = m.body_parentid[m.jnt_bodyid[joint]];
+  if (parent_body <= 0 || m.body_jntnum[parent_body] != 1) return;
+  const auto* carrier = FindSignal(model, recording, SignalKind::kPosition, m.body_jntadr[parent_body]);
+  if (!carrier) return;
+  double low = INFINITY, high = -INFINITY;
+  for (std::size_t k = 0; k < recording.rows(); ++k) {
+    if (recording.time_s[k] >= stretch.first && recording.time_s[k] <= stretch.second)
+      low = std::min(low, carrier->values[k]), high = std::max(high, carrier->values[k]);
+  }
+  if (!(high - low > std::max(0.01, 3 * carrier->spec.resolution))) return;
+  IdentifyOptions whole = options;
+  whole.from_s = whole.to_s = 0;
+  const SmoothLog smooth(recording, whole);
+  const std::vector<double> acceleration = smooth.Sampled(carrier->values, 2);
+  for (std::size_t i = 0; i < smooth.size(); ++i) {
+    swing->parent_s.push_back(smooth.time_s(i));
+    swing->parent_acceleration.push_back(std::isfinite(acceleration[i]) ? acceleration[i] : 0);
+  }
+}
+
+Result<Swing> ReadSwing(const Recording& recording, const Recording::Measured& angle, Stretch stretch) {
+  Swing swing;
+  for (std::size_t k = 0; k < recording.rows(); ++k) {
+    if (recording.time_s[k] < stretch.first || recording.time_s[k] > stretch.second || !std::isfinite(angle.values[k]))
+      continue;
+    swing.time_s.push_back(recording.time_s[k]);
+    swing.angle.push_back(angle.values[k]);
+  }
+  if (swing.time_s.size() < 50)
+    return Error{.what = "the free stretch is too short",
+                 .where = recording.log_path,
+                 .actual = std::to_string(swing.time_s.size()) + " rows",
+                 .allowed = "at least 50"};
+  return swing;
+}
+
+// What is seen of a swing without a fit.
+struct Sight {
+  double rest = 0, amplitude = 0;
+  std::vector<double> crossings_s;  // of rest, behind a dead band, so that noise does not count
+};
+
+Sight LookAt(const Swing& swing, double resolution) {
+  Sight sight;
+  const std::vector<double> tail(swing.angle.begin() + static_cast<std::ptrdiff_t>(swing.angle.size() * 3 / 4),
+                                 swing.angle.end());
+  for (const double q : tail) sight.rest += q / static_cast<double>(tail.size());
+  for (const double q : swing.angle) sight.amplitude = std::max(sight.amplitude, std::abs(q - sight.rest));
+  int side = 0;
+  for (std::size_t k = 0; k < swing.angle.size(); ++k) {
+    const double x = swing.angle[k] - sight.rest;
+    if (std::abs(x) < std::max(0.04 * sight.amplitude, 2 * resolution)) continue;
+    const int now = x > 0 ? 1 : -1;
+    if (side != 0 && now != side) sight.crossings_s.push_back(swing.time_s[k]);
+    side = now;
+  }
+  return sight;
+}
+
+Parameters GuessFrom(const Swing& swing, const Sight& sight) {
+  // Later swings are small ones: their period is the linear one.
+  const std::size_t n = sight.crossings_s.size(), first = n > 6 ? n / 2 : 0;
+  const double half_period = (sight.crossings_s.back() - sight.crossings_s[first]) / static_cast<double>(n - 1 - first);
+  const double w = std::numbers::pi / half_period;
+  Parameters start{};
+  start[kLogW2] = 2 * std::log(w), start[kDamping] = 0.05 * w, start[kDry] = 0.002 * w * w * sight.amplitude,
+  start[kRest] = sight.rest, start[kAngle] = swing.angle.front();
+  start[kSpeed] = (swing.angle[3] - swing.angle[0]) / (swing.time_s[3] - swing.time_s[0]);
+  start[kCoupling] = swing.parent_s.empty() ? 0 : swing.spring ? 1 : 0.5;
+  return start;
+}
+
+// Several starts of frequency and dry friction: the cost has minima a swing apart.
+SwingFit FitFromSeveral(const Swing& swing, const Parameters& start) {
+  std::vector<int> free = {kLogW2, kDamping, kDry, kRest, kAngle, kSpeed};
+  if (!swing.parent_s.empty()) free.push_back(kCoupling);
+  SwingFit best;
+  for (const double factor : {1.0, 0.94, 1.06, 0.88, 1.13}) {
+    for (const double dry : {0.0, 1.0}) {
+      Parameters other = start;
+      other[kLogW2] += 2 * std::log(factor);
+      other[kDry] *= dry * 10;
+      SwingFit fit = Fit(swing, other, free);
+      if (fit.rmse < best.rmse) best = std::move(fit);
     }
   }
-  Identification result{.method = "ring-down", .relation = "", .unit = "rad"};
-  struct OneLog {
-    SwingFit fit;
-    BlockCovariance covariance;
-  };
-  std::vector<OneLog> logs;
-  PointTable peaks{.name = "peaks", .columns = {"log", "time_s", "amplitude_rad"}, .rows = {}};
-  double total_square = 0, total_rows = 0, viscous_only = 0, dry_only = 0, variance = 0;
-  bool coupled = false, spring = false;
-  for (std::size_t log = 0; log < input.recordings.size(); ++log) {
-    const Recording& recording = input.recordings[log];
-    const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
-    if (!angle)
-      return Error{.what = "the log has no angle of '" + JointName(input.model, joint) + "'",
-                   .where = recording.log_path};
-    GS_ASSIGN(const auto stretch, FreeStretch(recording, options));
-    Swing swing{.spring = m.jnt_stiffness[joint] > 0};
-    spring = swing.spring;
-    for (std::size_t k = 0; k < recording.rows(); ++k) {
-      if (recording.time_s[k] < stretch.first || recording.time_s[k] > stretch.second ||
-          !std::isfinite(angle->values[k]))
-        continue;
-      swing.time_s.push_back(recording.time_s[k]);
-      swing.angle.push_back(angle->values[k]);
-    }
-    if (swing.time_s.size() < 50)
-      return Error{.what = "the free stretch is too short",
-                   .where = recording.log_path,
-                   .actual = std::to_string(swing.time_s.size()) + " rows",
-                   .allowed = "at least 50"};
-    // Where the parent moves, its acceleration drives the swing.
-    const int body = m.jnt_bodyid[joint], parent_body = m.body_parentid[body];
-    const int parent = parent_body > 0 && m.body_jntnum[parent_body] == 1 ? m.body_jntadr[parent_body] : -1;
-    if (const auto* carrier =
-            parent >= 0 ? FindSignal(input.model, recording, SignalKind::kPosition, parent) : nullptr) {
-      double low = INFINITY, high = -INFINITY;
-      for (std::size_t k = 0; k < recording.rows(); ++k) {
-        if (recording.time_s[k] >= stretch.first && recording.time_s[k] <= stretch.second)
-          low = std::min(low, carrier->values[k]), high = std::max(high, carrier->values[k]);
-      }
-      if (high - low > std::max(0.01, 3 * carrier->spec.resolution)) {
-        IdentifyOptions whole = options;
-        whole.from_s = whole.to_s = 0;
-        const SmoothLog smooth(recording, whole);
-        const std::vector<double> acceleration = smooth.Sampled(carrier->values, 2);
-        for (std::size_t i = 0; i < smooth.size(); ++i) {
-          swing.parent_s.push_back(smooth.time_s(i));
-          swing.parent_acceleration.push_back(std::isfinite(acceleration[i]) ? acceleration[i] : 0);
-        }
-        coupled = true;
-      }
-    }
-    // A first guess from the mean and its crossings.
-    double mean = 0;
-    for (const double q : swing.angle) mean += q / static_cast<double>(swing.angle.size());
-    std::vector<double> tail(swing.angle.begin() + static_cast<std::ptrdiff_t>(swing.angle.size() * 3 / 4),
-                             swing.angle.end());
-    double rest = 0, amplitude = 0;
-    for (const double q : tail) rest += q / static_cast<double>(tail.size());
-    for (const double q : swing.angle) amplitude = std::max(amplitude, std::abs(q - rest));
-    // Crossings with a dead band, so that noise does not count.
-    std::vector<double> crossings;
-    int side = 0;
+  return best;
+}
+
+// The mean square of the same fit with one parameter held at zero.
+double MeanSquareWithout(Index held, const Swing& swing, const SwingFit& fit) {
+  std::vector<int> free = fit.free;
+  std::erase(free, static_cast<int>(held));
+  Parameters start = fit.parameters;
+  start[held] = 0;
+  return std::pow(Fit(swing, start, free).rmse, 2);
+}
+
+// Peaks of the measured motion between passages, one row each: log, time, amplitude.
+void AddPeaks(std::size_t log, const Swing& swing, const std::vector<double>& crossings_s, double rest,
+              PointTable* peaks) {
+  for (std::size_t c = 0; c + 1 < crossings_s.size(); ++c) {
+    double peak = 0, at = 0;
     for (std::size_t k = 0; k < swing.angle.size(); ++k) {
-      const double x = swing.angle[k] - rest;
-      if (std::abs(x) < std::max(0.04 * amplitude, 2 * angle->spec.resolution)) continue;
-      const int now = x > 0 ? 1 : -1;
-      if (side != 0 && now != side) crossings.push_back(swing.time_s[k]);
-      side = now;
+      if (swing.time_s[k] < crossings_s[c] || swing.time_s[k] >= crossings_s[c + 1]) continue;
+      if (std::abs(swing.angle[k] - rest) > peak) peak = std::abs(swing.angle[k] - rest), at = swing.time_s[k];
     }
-    if (crossings.size() < 2) {
-      return Error{.what = "the joint does not swing in the free stretch",
-                   .where = recording.log_path,
-                   .actual = std::to_string(crossings.size()) + " passages through rest between " +
-                             std::to_string(stretch.first) + " and " + std::to_string(stretch.second) + " s",
-                   .allowed = "at least two",
-                   .cure = "let it go from a larger angle, or name the stretch by --from and --to"};
-    }
-    // Later swings are small ones: their period is the linear one.
-    const std::size_t n = crossings.size(), first = n > 6 ? n / 2 : 0;
-    const double half_period = n > 1 ? (crossings.back() - crossings[first]) / static_cast<double>(n - 1 - first) : 0.5;
-    Parameters start{};
-    const double w = std::numbers::pi / half_period;
-    start[kLogW2] = 2 * std::log(w), start[kDamping] = 0.05 * w, start[kDry] = 0.002 * w * w * amplitude,
-    start[kRest] = rest, start[kAngle] = swing.angle.front();
-    start[kSpeed] = (swing.angle[3] - swing.angle[0]) / (swing.time_s[3] - swing.time_s[0]);
-    start[kCoupling] = swing.spring ? 1 : 0.5;
-    std::vector<int> free = {kLogW2, kDamping, kDry, kRest, kAngle, kSpeed};
-    if (!swing.parent_s.empty()) free.push_back(kCoupling);
-    if (swing.parent_s.empty()) start[kCoupling] = 0;
-    // Several starts of frequency and dry friction: the cost has minima a swing apart.
-    SwingFit best;
-    for (const double factor : {1.0, 0.94, 1.06, 0.88, 1.13}) {
-      for (const double dry : {0.0, 1.0}) {
-        Parameters other = start;
-        other[kLogW2] += 2 * std::log(factor);
-        other[kDry] *= dry * 10;
-        SwingFit fit = Fit(swing, other, free);
-        if (fit.rmse < best.rmse) best = std::move(fit);
-      }
-    }
-    std::vector<int> without_dry = free, without_damping = free;
-    std::erase(without_dry, static_cast<int>(kDry));
-    std::erase(without_damping, static_cast<int>(kDamping));
-    Parameters no_dry = best.parameters, no_damping = best.parameters;
-    no_dry[kDry] = 0, no_damping[kDamping] = 0;
-    const double rows = static_cast<double>(swing.angle.size());
-    viscous_only += std::pow(Fit(swing, no_dry, without_dry).rmse, 2) * rows;
-    dry_only += std::pow(Fit(swing, no_damping, without_damping).rmse, 2) * rows;
-    total_square += best.residual.squaredNorm();
-    total_rows += rows;
-    for (const double q : swing.angle) variance += (q - mean) * (q - mean);
-    std::vector<int> ids(swing.angle.size(), 0);
-    const BlockCovariance covariance =
-        CovarianceByBlocks(best.jacobian, best.residual, ids, swing.time_s, recording.timeline.median_step_s);
-    // Peaks of the measured motion between passages.
-    for (std::size_t c = 0; c + 1 < crossings.size(); ++c) {
-      double peak = 0, at = 0;
-      for (std::size_t k = 0; k < swing.angle.size(); ++k) {
-        if (swing.time_s[k] < crossings[c] || swing.time_s[k] >= crossings[c + 1]) continue;
-        if (std::abs(swing.angle[k] - best.parameters[kRest]) > peak)
-          peak = std::abs(swing.angle[k] - best.parameters[kRest]), at = swing.time_s[k];
-      }
-      peaks.rows.push_back({static_cast<double>(log), at, peak});
-    }
-    logs.push_back({std::move(best), covariance});
+    peaks->rows.push_back({static_cast<double>(log), at, peak});
   }
-  // Several logs: mean weighted by each one's variance, with their scatter where it is larger than the intervals say.
-  const auto combine = [&](int index, const std::function<double(double)>& value,
-                           const std::function<double(double)>& slope) {
-    double weight = 0, mean = 0, quantile = 0;
-    for (const auto& one : logs) {
-      const Eigen::Index c = std::find(one.fit.free.begin(), one.fit.free.end(), index) - one.fit.free.begin();
-      const double x = one.fit.parameters[index],
-                   s = slope(x) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
-      weight += 1 / (s * s), mean += value(x) / (s * s), quantile = std::max(quantile, one.covariance.quantile);
-    }
-    mean /= weight;
-    double chi = 0;
-    for (const auto& one : logs) {
-      const Eigen::Index c = std::find(one.fit.free.begin(), one.fit.free.end(), index) - one.fit.free.begin();
-      const double x = one.fit.parameters[index],
-                   s = slope(x) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
-      chi += std::pow((value(x) - mean) / s, 2);
-    }
-    const double n = static_cast<double>(logs.size()), scatter = n > 1 ? std::max(1.0, std::sqrt(chi / (n - 1))) : 1;
-    const double half = (n > 1 && scatter > 1 ? StudentQuantile(n - 1) : quantile) * scatter / std::sqrt(weight);
-    return Estimate{.name = "", .unit = "", .value = mean, .low = mean - half, .high = mean + half};
+}
+
+struct FittedLog {
+  SwingFit fit;
+  BlockCovariance covariance;
+};
+
+// What the logs add up to.
+struct RingDown {
+  std::vector<FittedLog> logs;
+  bool coupled = false, spring = false;
+  double square = 0, rows = 0, variance = 0;  // of the residuals; of the angles
+  double viscous_only = 0, dry_only = 0;      // squares of the residuals of each friction alone
+  PointTable peaks{.name = "peaks", .columns = {"log", "time_s", "amplitude_rad"}, .rows = {}};
+};
+
+Status AddLog(const IdentifyInput& input, std::size_t log, int joint, const IdentifyOptions& options, RingDown* all) {
+  const Recording& recording = input.recordings[log];
+  const auto* angle = FindSignal(input.model, recording, SignalKind::kPosition, joint);
+  if (!angle)
+    return Error{.what = "the log has no angle of '" + JointName(input.model, joint) + "'",
+                 .where = recording.log_path};
+  GS_ASSIGN(const Stretch stretch, FreeStretch(recording, options));
+  GS_ASSIGN(Swing swing, ReadSwing(recording, *angle, stretch));
+  swing.spring = all->spring;
+  AddCarrier(input.model, recording, joint, stretch, options, &swing);
+  all->coupled = all->coupled || !swing.parent_s.empty();
+  const Sight sight = LookAt(swing, angle->spec.resolution);
+  if (sight.crossings_s.size() < 2) {
+    return Error{.what = "the joint does not swing in the free stretch",
+                 .where = recording.log_path,
+                 .actual = std::to_string(sight.crossings_s.size()) + " passages through rest between " +
+                           std::to_string(stretch.first) + " and " + std::to_string(stretch.second) + " s",
+                 .allowed = "at least two",
+                 .cure = "let it go from a larger angle, or name the stretch by --from and --to"};
+  }
+  SwingFit fit = FitFromSeveral(swing, GuessFrom(swing, sight));
+  const double rows = static_cast<double>(swing.angle.size());
+  all->viscous_only += MeanSquareWithout(kDry, swing, fit) * rows;
+  all->dry_only += MeanSquareWithout(kDamping, swing, fit) * rows;
+  all->square += fit.residual.squaredNorm();
+  all->rows += rows;
+  double mean = 0;
+  for (const double q : swing.angle) mean += q / rows;
+  for (const double q : swing.angle) all->variance += (q - mean) * (q - mean);
+  AddPeaks(log, swing, sight.crossings_s, fit.parameters[kRest], &all->peaks);
+  const std::vector<int> ids(swing.angle.size(), 0);
+  BlockCovariance covariance =
+      CovarianceByBlocks(fit.jacobian, fit.residual, ids, swing.time_s, recording.timeline.median_step_s);
+  all->logs.push_back({std::move(fit), std::move(covariance)});
+  return Ok();
+}
+
+// Mean over the logs of `value(parameter)`, weighted by each one's variance, with their scatter where it is larger than
+// the intervals say. `slope`: that of `value`.
+Estimate Combine(const std::vector<FittedLog>& logs, Index index, const std::function<double(double)>& value,
+                 const std::function<double(double)>& slope) {
+  const auto deviation = [&](const FittedLog& one) {
+    const Eigen::Index c = std::find(one.fit.free.begin(), one.fit.free.end(), index) - one.fit.free.begin();
+    return slope(one.fit.parameters[index]) * std::sqrt(std::max(one.covariance.covariance(c, c), 1e-300));
   };
-  const auto same = [](double x) { return x; };
-  const auto one = [](double) { return 1.0; };
-  const auto add = [&](const char* name, const char* unit, Estimate e) {
-    e.name = name, e.unit = unit;
-    result.values.push_back(e);
-    return e;
-  };
-  const double two_pi = 2 * std::numbers::pi;
-  add("frequency", "Hz",
-      combine(
-          kLogW2, [&](double x) { return std::exp(0.5 * x) / two_pi; },
-          [&](double x) { return 0.5 * std::exp(0.5 * x) / two_pi; }));
-  const Estimate damping = add("damping_rate", "1/s", combine(kDamping, same, one)),
-                 dry = add("dry_rate", "rad/s^2", combine(kDry, same, one));
-  add("rest", "rad", combine(kRest, same, one));
-  if (coupled) add("coupling", "1", combine(kCoupling, same, one));
-  // With the model's own inertia about the joint.
+  double weight = 0, mean = 0, quantile = 0;
+  for (const auto& one : logs) {
+    const double s = deviation(one);
+    weight += 1 / (s * s), mean += value(one.fit.parameters[index]) / (s * s);
+    quantile = std::max(quantile, one.covariance.quantile);
+  }
+  mean /= weight;
+  double chi = 0;
+  for (const auto& one : logs) chi += std::pow((value(one.fit.parameters[index]) - mean) / deviation(one), 2);
+  const double n = static_cast<double>(logs.size()), scatter = n > 1 ? std::max(1.0, std::sqrt(chi / (n - 1))) : 1;
+  const double half = (n > 1 && scatter > 1 ? StudentQuantile(n - 1) : quantile) * scatter / std::sqrt(weight);
+  return Estimate{.name = "", .unit = "", .value = mean, .low = mean - half, .high = mean + half};
+}
+
+// The model's own inertia about the joint, in the pose it starts from.
+Result<double> InertiaAbout(const IdentifyInput& input, int joint) {
+  const mjModel& m = input.model.compiled();
   const DataPtr data(mj_makeData(&m));
   const ModelPtr copy(mj_copyModel(nullptr, &m));
   ParameterWriter writer(input.model, copy.get(), data.get());
@@ -359,36 +385,72 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
   std::vector<mjtNum> unit(m.nv, 0), column(m.nv);
   unit[m.jnt_dofadr[joint]] = 1;
   mj_mulM(copy.get(), data.get(), column.data(), unit.data());
-  const double inertia = column[m.jnt_dofadr[joint]];
+  return column[m.jnt_dofadr[joint]];
+}
+
+// The values of all logs together; torques by the model's inertia about the joint.
+void AddValues(const RingDown& all, double inertia, Identification* result) {
+  const auto add = [&](const char* name, const char* unit, Estimate e) {
+    e.name = name, e.unit = unit;
+    result->values.push_back(e);
+    return e;
+  };
+  const auto own = [&](Index index) {
+    return Combine(all.logs, index, [](double x) { return x; }, [](double) { return 1.0; });
+  };
+  const auto known = [](double value) {
+    return Estimate{.name = "", .unit = "", .value = value, .low = NAN, .high = NAN};
+  };
   const auto scaled = [&](Estimate e) {
     return Estimate{
         .name = "", .unit = "", .value = e.value * inertia, .low = e.low * inertia, .high = e.high * inertia};
   };
+  const double two_pi = 2 * std::numbers::pi;
+  add("frequency", "Hz",
+      Combine(
+          all.logs, kLogW2, [&](double x) { return std::exp(0.5 * x) / two_pi; },
+          [&](double x) { return 0.5 * std::exp(0.5 * x) / two_pi; }));
+  const Estimate damping = add("damping_rate", "1/s", own(kDamping)), dry = add("dry_rate", "rad/s^2", own(kDry));
+  add("rest", "rad", own(kRest));
+  if (all.coupled) add("coupling", "1", own(kCoupling));
   add("viscous", "N m s/rad", scaled(damping));
   add("coulomb", "N m", scaled(dry));
-  add("inertia_nominal", "kg m2", {.name = "", .unit = "", .value = inertia, .low = NAN, .high = NAN});
-  add("rmse_viscous_only", "rad",
-      {.name = "", .unit = "", .value = std::sqrt(viscous_only / total_rows), .low = NAN, .high = NAN});
-  add("rmse_dry_only", "rad",
-      {.name = "", .unit = "", .value = std::sqrt(dry_only / total_rows), .low = NAN, .high = NAN});
-  result.relation =
-      spring ? "acceleration = -(2 pi frequency)^2 (angle - rest) - damping_rate speed - dry_rate sign(speed)"
-             : "acceleration = -(2 pi frequency)^2 sin(angle - rest) - damping_rate speed - dry_rate sign(speed)";
-  if (coupled) result.relation += " - coupling x acceleration of the joint that carries it";
-  result.rmse = std::sqrt(total_square / total_rows);
-  result.r2 = variance > 0 ? 1 - total_square / variance : NAN;
-  result.rows = static_cast<std::size_t>(total_rows);
+  add("inertia_nominal", "kg m2", known(inertia));
+  add("rmse_viscous_only", "rad", known(std::sqrt(all.viscous_only / all.rows)));
+  add("rmse_dry_only", "rad", known(std::sqrt(all.dry_only / all.rows)));
   const bool viscous_seen = damping.low > 0, dry_seen = dry.low > 0;
-  result.remarks.push_back(
+  result->remarks.push_back(
       viscous_seen && dry_seen
           ? "the envelope is between exponential and linear: viscous and dry friction both stand clear of zero"
       : viscous_seen ? "the envelope is exponential: viscous friction; dry friction does not stand clear of zero"
       : dry_seen     ? "the envelope is linear: dry friction; viscous friction does not stand clear of zero"
                      : "neither viscous nor dry friction stands clear of zero: the swing is too short");
+}
+
+}  // namespace
+
+Result<Identification> IdentifyRingDown(const IdentifyInput& input, const IdentifyOptions& options) {
+  GS_ASSIGN(const int joint, SwingingJoint(input.model, options.joint));
+  RingDown all{.spring = input.model.compiled().jnt_stiffness[joint] > 0};
+  for (std::size_t log = 0; log < input.recordings.size(); ++log)
+    GS_RETURN_IF_ERROR(AddLog(input, log, joint, options, &all));
+  GS_ASSIGN(const double inertia, InertiaAbout(input, joint));
+  Identification result{
+      .method = "ring-down",
+      .relation =
+          all.spring
+              ? "acceleration = -(2 pi frequency)^2 (angle - rest) - damping_rate speed - dry_rate sign(speed)"
+              : "acceleration = -(2 pi frequency)^2 sin(angle - rest) - damping_rate speed - dry_rate sign(speed)",
+      .r2 = all.variance > 0 ? 1 - all.square / all.variance : NAN,
+      .rmse = std::sqrt(all.square / all.rows),
+      .unit = "rad",
+      .rows = static_cast<std::size_t>(all.rows)};
+  if (all.coupled) result.relation += " - coupling x acceleration of the joint that carries it";
+  AddValues(all, inertia, &result);
   if (result.r2 < 0.98)
     result.remarks.push_back(
         "the equation leaves more than 2 % of the motion's variance: another effect, or not a free swing");
-  result.tables.push_back(std::move(peaks));
+  result.tables.push_back(std::move(all.peaks));
   return result;
 }
 

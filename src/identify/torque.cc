@@ -7,110 +7,149 @@
 #include "src/model/parameter_writer.h"
 
 namespace gapscope {
-namespace {}  // namespace
+namespace {
+
+// Angle, speed, acceleration per joint and grid row, and the commands.
+struct GridMotion {
+  std::vector<std::vector<double>> q, v, a, commands;
+
+  bool Known(std::size_t row) const {
+    for (std::size_t j = 0; j < q.size(); ++j) {
+      if (!std::isfinite(q[j][row]) || !std::isfinite(a[j][row])) return false;
+    }
+    return std::all_of(commands.begin(), commands.end(), [&](const auto& u) { return std::isfinite(u[row]); });
+  }
+};
+
+// A joint that is not logged is taken to rest at the initial pose.
+GridMotion ReadGridMotion(const IdentifyInput& input, const Recording& recording, const SmoothLog& smooth) {
+  const mjModel& m = input.model.compiled();
+  const std::size_t rows = smooth.size(), joints = static_cast<std::size_t>(m.njnt);
+  GridMotion motion{.q = std::vector<std::vector<double>>(joints), .v = motion.q, .a = motion.q, .commands = {}};
+  for (int j = 0; j < m.njnt; ++j) {
+    const auto* signal = FindSignal(input.model, recording, SignalKind::kPosition, j);
+    if (!signal) {
+      motion.q[j].assign(rows, m.qpos0[m.jnt_qposadr[j]]);
+      motion.v[j].assign(rows, 0);
+      motion.a[j].assign(rows, 0);
+      continue;
+    }
+    motion.q[j] = smooth.Sampled(signal->values, 0);
+    motion.v[j] = smooth.Sampled(signal->values, 1);
+    motion.a[j] = smooth.Sampled(signal->values, 2);
+    const SignalSource& source = input.model.source(signal->index);
+    if (source.offset >= 0) {
+      for (double& angle : motion.q[j]) angle -= input.values[source.offset];
+    }
+  }
+  for (const auto& command : recording.commands) motion.commands.push_back(smooth.Held(command.values));
+  return motion;
+}
+
+// The model at the recording's values without friction of the joint, and the same with a joint that weighs nothing.
+struct BalanceModels {
+  ModelPtr whole, light;
+  DataPtr data;
+};
+
+Result<BalanceModels> MakeBalanceModels(const IdentifyInput& input, const Recording& recording, int joint) {
+  const mjModel& base = input.model.compiled();
+  BalanceModels models{.whole = ModelPtr(mj_copyModel(nullptr, &base)),
+                       .light = ModelPtr(mj_copyModel(nullptr, &base)),
+                       .data = DataPtr(mj_makeData(&base))};
+  const int dof = base.jnt_dofadr[joint], body = base.jnt_bodyid[joint];
+  for (mjModel* m : {models.whole.get(), models.light.get()}) {
+    ParameterWriter writer(input.model, m, models.data.get());
+    if (!writer.Write(input.values, recording.values))
+      return Error{.what = "the parameters make no model", .where = input.model.experiment().path};
+    m->dof_damping[dof] = 0;
+    m->opt.disableflags |= mjDSBL_CONSTRAINT;  // no dry friction: that is what is sought
+  }
+  // Next to nothing rather than nothing: MuJoCo factors the inertia matrix on the way.
+  constexpr double kNothing = 1e-9;
+  mjModel* light = models.light.get();
+  light->body_mass[body] *= kNothing;
+  for (int i = 0; i < 3; ++i) light->body_inertia[3 * body + i] *= kNothing;
+  light->dof_armature[dof] *= kNothing;
+  mj_setConst(light, models.data.get());  // inertias of simple bodies are stored
+  return models;
+}
+
+// The torque as logged, on the grid. A servo's torque jumps with each new target and is logged just before: what moves
+// the joint is the mean over the row, half a row's change of the target further.
+std::vector<double> MovingTorque(const mjModel& m, const Recording& recording, const Recording::Measured& torque,
+                                 const SmoothLog& smooth, int joint, double delay_s) {
+  std::vector<double> logged = smooth.Sampled(torque.values, 0);
+  for (const auto& command : recording.commands) {
+    const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
+    if (actuator < 0 || m.actuator_plugin[actuator] >= 0 || m.actuator_trntype[actuator] != mjTRN_JOINT ||
+        m.actuator_trnid[2 * actuator] != joint)
+      continue;
+    const std::vector<double> mean = smooth.Held(command.values, delay_s),
+                              seen = smooth.OnGrid(smooth.HeldBefore(command.values, delay_s), 0);
+    for (std::size_t i = 0; i < smooth.size(); ++i)
+      logged[i] += m.actuator_gainprm[mjNGAIN * actuator] * (mean[i] - seen[i]);
+  }
+  return logged;
+}
+
+}  // namespace
 
 Result<Motion> MotionOf(const IdentifyInput& input, std::size_t log, int joint, const IdentifyOptions& options) {
-  const Model& model = input.model;
   const Recording& recording = input.recordings[log];
-  const mjModel& base = model.compiled();
+  const mjModel& base = input.model.compiled();
   const SmoothLog smooth(recording, options);
   const std::size_t rows = smooth.size();
-  const auto measured = [&](int j) { return FindSignal(model, recording, SignalKind::kPosition, j); };
-  if (!measured(joint))
-    return Error{.what = "the log has no angle of '" + JointName(model, joint) + "'", .where = recording.log_path};
+  if (!FindSignal(input.model, recording, SignalKind::kPosition, joint))
+    return Error{.what = "the log has no angle of '" + JointName(input.model, joint) + "'",
+                 .where = recording.log_path};
   if (rows < 4 * smooth.reach()) {
     return Error{.what = "the log is too short for its low pass",
                  .where = recording.log_path,
                  .actual = std::to_string(static_cast<double>(rows) * smooth.dt_s()) + " s",
                  .cure = "raise --cutoff (now " + std::to_string(smooth.cutoff_hz()) + " Hz)"};
   }
-  // Angle, speed, acceleration of every joint; one that is not logged is taken to rest at the initial pose.
-  std::vector<std::vector<double>> q(base.njnt), v(base.njnt), a(base.njnt);
-  for (int j = 0; j < base.njnt; ++j) {
-    if (const auto* signal = measured(j)) {
-      q[j] = smooth.Sampled(signal->values, 0);
-      v[j] = smooth.Sampled(signal->values, 1);
-      a[j] = smooth.Sampled(signal->values, 2);
-      const SignalSource& source = model.source(signal->index);
-      if (source.offset >= 0) {
-        for (double& angle : q[j]) angle -= input.values[source.offset];
-      }
-    } else {
-      q[j].assign(rows, base.qpos0[base.jnt_qposadr[j]]);
-      v[j].assign(rows, 0);
-      a[j].assign(rows, 0);
-    }
-  }
-  std::vector<std::vector<double>> commands;
-  for (const auto& command : recording.commands) commands.push_back(smooth.Held(command.values));
-  const Recording::Measured* torque = FindSignal(model, recording, SignalKind::kTorque, joint);
-
-  const ModelPtr copy(mj_copyModel(nullptr, &base)), light(mj_copyModel(nullptr, &base));
-  const DataPtr data(mj_makeData(copy.get()));
-  const int dof = base.jnt_dofadr[joint], body = base.jnt_bodyid[joint];
-  for (mjModel* m : {copy.get(), light.get()}) {
-    ParameterWriter writer(model, m, data.get());
-    if (!writer.Write(input.values, recording.values))
-      return Error{.what = "the parameters make no model", .where = model.experiment().path};
-    m->dof_damping[dof] = 0;
-    m->opt.disableflags |= mjDSBL_CONSTRAINT;  // no dry friction: that is what is sought
-  }
-  // Next to nothing rather than nothing: MuJoCo factors the inertia matrix on the way.
-  constexpr double kNothing = 1e-9;
-  light->body_mass[body] *= kNothing;
-  for (int i = 0; i < 3; ++i) light->body_inertia[3 * body + i] *= kNothing;
-  light->dof_armature[dof] *= kNothing;
-  mj_setConst(light.get(), data.get());  // inertias of simple bodies are stored
-
-  Motion motion;
-  motion.torque_logged = torque != nullptr;
-  std::vector<double> logged = torque ? smooth.Sampled(torque->values, 0) : std::vector<double>();
-  // A servo's torque jumps with each new target and is logged just before: what moves the joint is the mean over the
-  // row, half a row's change of the target further.
-  for (std::size_t c = 0; torque && c < recording.commands.size(); ++c) {
-    const int actuator = mj_name2id(&base, mjOBJ_ACTUATOR, recording.commands[c].actuator.c_str());
-    if (actuator < 0 || base.actuator_plugin[actuator] >= 0 || base.actuator_trntype[actuator] != mjTRN_JOINT ||
-        base.actuator_trnid[2 * actuator] != joint)
-      continue;
-    const std::vector<double> mean = smooth.Held(recording.commands[c].values, options.torque_delay_s),
-                              seen = smooth.OnGrid(
-                                  smooth.HeldBefore(recording.commands[c].values, options.torque_delay_s), 0);
-    for (std::size_t i = 0; i < rows; ++i) logged[i] += base.actuator_gainprm[mjNGAIN * actuator] * (mean[i] - seen[i]);
-  }
-  motion.angle_rad = q[joint], motion.speed_rad_per_s = v[joint], motion.acceleration_rad_per_s2 = a[joint];
-  motion.drive_n_m.assign(rows, kNaN);
-  motion.demand_n_m.assign(rows, kNaN);
-  motion.others_n_m.assign(rows, kNaN);
+  const GridMotion grid = ReadGridMotion(input, recording, smooth);
+  GS_ASSIGN(const BalanceModels models, MakeBalanceModels(input, recording, joint));
+  const auto* torque = FindSignal(input.model, recording, SignalKind::kTorque, joint);
+  Motion motion{.time_s = {},
+                .angle_rad = grid.q[joint],
+                .speed_rad_per_s = grid.v[joint],
+                .acceleration_rad_per_s2 = grid.a[joint],
+                .drive_n_m = std::vector<double>(rows, kNaN),
+                .demand_n_m = std::vector<double>(rows, kNaN),
+                .others_n_m = std::vector<double>(rows, kNaN),
+                .torque_logged = torque != nullptr};
+  const std::vector<double> logged =
+      torque ? MovingTorque(base, recording, *torque, smooth, joint, options.torque_delay_s) : std::vector<double>();
+  const int dof = base.jnt_dofadr[joint];
   std::vector<mjtNum> acceleration(base.nv), inertial(base.nv);
-  mjData* d = data.get();
+  mjData* d = models.data.get();
   for (std::size_t i = 0; i < rows; ++i) {
     motion.time_s.push_back(smooth.time_s(i));
-    bool known = true;
-    mj_resetData(copy.get(), d);
+    if (!grid.Known(i)) continue;
+    mj_resetData(models.whole.get(), d);
     for (int j = 0; j < base.njnt; ++j) {
-      known = known && std::isfinite(q[j][i]) && std::isfinite(a[j][i]);
-      d->qpos[base.jnt_qposadr[j]] = q[j][i];
-      d->qvel[base.jnt_dofadr[j]] = v[j][i];
-      acceleration[base.jnt_dofadr[j]] = a[j][i];
+      d->qpos[base.jnt_qposadr[j]] = grid.q[j][i];
+      d->qvel[base.jnt_dofadr[j]] = grid.v[j][i];
+      acceleration[base.jnt_dofadr[j]] = grid.a[j][i];
     }
-    for (std::size_t c = 0; c < commands.size(); ++c) {
-      known = known && std::isfinite(commands[c][i]);
-      d->ctrl[model.command_actuators()[c]] = commands[c][i];
-    }
-    if (!known) continue;
-    for (mjModel* m : {copy.get(), light.get()}) {
+    for (std::size_t c = 0; c < grid.commands.size(); ++c)
+      d->ctrl[input.model.command_actuators()[c]] = grid.commands[c][i];
+    const auto demand = [&](const mjModel* m) {
       mj_fwdPosition(m, d);
       mj_fwdVelocity(m, d);
       mj_mulM(m, d, inertial.data(), acceleration.data());
-      (m == copy.get() ? motion.demand_n_m : motion.others_n_m)[i] =
-          inertial[dof] + d->qfrc_bias[dof] - d->qfrc_passive[dof];
-    }
+      return inertial[dof] + d->qfrc_bias[dof] - d->qfrc_passive[dof];
+    };
+    motion.demand_n_m[i] = demand(models.whole.get());
+    motion.others_n_m[i] = demand(models.light.get());
     if (torque) {
       motion.drive_n_m[i] = logged[i];
     } else {
-      mj_fwdPosition(copy.get(), d);
-      mj_fwdVelocity(copy.get(), d);
-      mj_fwdActuation(copy.get(), d);
+      mj_fwdPosition(models.whole.get(), d);
+      mj_fwdVelocity(models.whole.get(), d);
+      mj_fwdActuation(models.whole.get(), d);
       motion.drive_n_m[i] = d->qfrc_actuator[dof];
     }
   }

@@ -30,6 +30,45 @@ Status NeedsUnit(const IdentifyInput& input, const char* unit, const char* what)
                .actual = commands.empty() ? "no command" : "a command in " + commands.front().unit};
 }
 
+// A line through the points, its slope and offset with half their intervals. Each plateau is one reading: its rows
+// share the drive's errors. So its own classical interval, and no blocks.
+struct FittedLine {
+  double slope = 0, slope_error = 0, offset = 0, offset_error = 0;
+  double points = 0, rest = 0, spread = 0;  // sums of squares: left by the line; about the mean
+
+  Estimate Resistance(const char* name) const {
+    return {.name = name,
+            .unit = "ohm",
+            .value = 1 / slope,
+            .low = 1 / (slope + slope_error),
+            .high = slope > slope_error ? 1 / (slope - slope_error) : INFINITY};
+  }
+};
+
+// Through the points with voltages of `sign`, 0: through all. None where they are fewer than four: `points` says so.
+FittedLine LineThrough(const std::vector<Plateau>& plateaus, int sign) {
+  double n = 0, sv = 0, si = 0, vv = 0, vi = 0, ii = 0;
+  for (const auto& p : plateaus) {
+    if (sign != 0 && p.command * sign <= 0) continue;
+    n += 1, sv += p.command, si += p.current;
+  }
+  if (n < 4) return {.points = n};
+  for (const auto& p : plateaus) {
+    if (sign != 0 && p.command * sign <= 0) continue;
+    const double dv = p.command - sv / n, di = p.current - si / n;
+    vv += dv * dv, vi += dv * di, ii += di * di;
+  }
+  const double slope = vi / vv, offset = (si - slope * sv) / n, rest = std::max(0.0, ii - slope * vi),
+               scatter = rest / (n - 2), t = StudentQuantile(n - 2);
+  return {.slope = slope,
+          .slope_error = t * std::sqrt(scatter / vv),
+          .offset = offset,
+          .offset_error = t * std::sqrt(scatter * (1 / n + sv * sv / (n * n) / vv)),
+          .points = n,
+          .rest = rest,
+          .spread = ii};
+}
+
 }  // namespace
 
 Result<Identification> IdentifyResistance(const IdentifyInput& input, const IdentifyOptions& options) {
@@ -38,63 +77,46 @@ Result<Identification> IdentifyResistance(const IdentifyInput& input, const Iden
   GS_ASSIGN(const auto currents, Currents(input, options));
   constexpr double kStandstill_rad_per_s = 0.05;
   std::vector<Plateau> points = FindPlateaus(input, joint, currents, options, 0.2);
-  PointTable table{.name = "points", .columns = {"voltage_v", "current_a", "speed_rad_per_s"}, .rows = {}};
   std::size_t moving = 0;
   std::erase_if(points, [&](const Plateau& p) {
     const bool moves = std::isfinite(p.speed) && std::abs(p.speed) > kStandstill_rad_per_s;
     moving += moves ? 1 : 0;
     return moves || !std::isfinite(p.current);
   });
-  for (const auto& p : points) table.rows.push_back({p.command, p.current, p.speed});
-  Identification result{
-      .method = "resistance", .relation = "current = voltage / resistance + offset, rotor held", .unit = "A"};
-  // Each plateau is one reading: its rows share the drive's errors. So its own classical interval, and no blocks.
-  const auto line = [&](const char* name, int sign, bool all) -> Status {
-    double n = 0, sv = 0, si = 0, vv = 0, vi = 0, ii = 0;
-    for (const auto& p : points) {
-      if (sign != 0 && p.command * sign <= 0) continue;
-      n += 1, sv += p.command, si += p.current;
-    }
-    if (n < 4)
-      return Error{.what = "fewer than four standing voltages to put a line through",
-                   .where = input.recordings.front().log_path,
-                   .actual = std::to_string(static_cast<int>(n)) +
-                             (moving > 0 ? ", and " + std::to_string(moving) + " at which the rotor turns" : ""),
-                   .cure = "hold the rotor and step the voltage, 0.2 s or more a step"};
-    for (const auto& p : points) {
-      if (sign != 0 && p.command * sign <= 0) continue;
-      const double dv = p.command - sv / n, di = p.current - si / n;
-      vv += dv * dv, vi += dv * di, ii += di * di;
-    }
-    const double slope = vi / vv, offset = (si - slope * sv) / n, rest = std::max(0.0, ii - slope * vi),
-                 scatter = rest / (n - 2);
-    const double t = StudentQuantile(n - 2), slope_error = t * std::sqrt(scatter / vv),
-                 offset_error = t * std::sqrt(scatter * (1 / n + sv * sv / (n * n) / vv));
-    result.values.push_back({.name = name,
-                             .unit = "ohm",
-                             .value = 1 / slope,
-                             .low = 1 / (slope + slope_error),
-                             .high = slope > slope_error ? 1 / (slope - slope_error) : INFINITY});
-    if (all) {
-      result.values.push_back({.name = "current_offset",
-                               .unit = "A",
-                               .value = offset,
-                               .low = offset - offset_error,
-                               .high = offset + offset_error});
-      result.r2 = ii > 0 ? 1 - rest / ii : 0;
-      result.rmse = std::sqrt(rest / n);
-      result.rows = static_cast<std::size_t>(n);
-    }
-    return Ok();
-  };
-  GS_RETURN_IF_ERROR(line("resistance", 0, true));
-  if (!line("resistance_positive", 1, false).ok())
+  const FittedLine all = LineThrough(points, 0), positive = LineThrough(points, 1), negative = LineThrough(points, -1);
+  if (all.points < 4)
+    return Error{.what = "fewer than four standing voltages to put a line through",
+                 .where = input.recordings.front().log_path,
+                 .actual = std::to_string(static_cast<int>(all.points)) +
+                           (moving > 0 ? ", and " + std::to_string(moving) + " at which the rotor turns" : ""),
+                 .cure = "hold the rotor and step the voltage, 0.2 s or more a step"};
+  Identification result{.method = "resistance",
+                        .relation = "current = voltage / resistance + offset, rotor held",
+                        .r2 = all.spread > 0 ? 1 - all.rest / all.spread : 0,
+                        .rmse = std::sqrt(all.rest / all.points),
+                        .unit = "A",
+                        .rows = static_cast<std::size_t>(all.points)};
+  result.values = {all.Resistance("resistance"),
+                   {.name = "current_offset",
+                    .unit = "A",
+                    .value = all.offset,
+                    .low = all.offset - all.offset_error,
+                    .high = all.offset + all.offset_error}};
+  if (positive.points >= 4) {
+    result.values.push_back(positive.Resistance("resistance_positive"));
+  } else {
     result.remarks.push_back("too few positive voltages for a line of their own");
-  if (!line("resistance_negative", -1, false).ok())
+  }
+  if (negative.points >= 4) {
+    result.values.push_back(negative.Resistance("resistance_negative"));
+  } else {
     result.remarks.push_back("too few negative voltages for a line of their own");
+  }
   if (moving > 0)
     result.remarks.push_back(std::to_string(moving) +
                              " steps at which the rotor turns are left out: back-EMF would count as resistance");
+  PointTable table{.name = "points", .columns = {"voltage_v", "current_a", "speed_rad_per_s"}, .rows = {}};
+  for (const auto& p : points) table.rows.push_back({p.command, p.current, p.speed});
   result.tables.push_back(std::move(table));
   return result;
 }

@@ -233,40 +233,38 @@ Status FindDelay(const Servo& servo, const IdentifyInput& input, const IdentifyO
   return Ok();
 }
 
-}  // namespace
-
-Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOptions& options) {
-  GS_ASSIGN(Servo servo, LoadServo(input, options));
-  const double dt = servo.smooth.front().dt_s();
-  GS_ASSIGN(const Regression direct, Regress(MakeRows(servo, 0, Reading::kStamped, false, {}), dt));
-  // Scan both readings, then golden section inside the best row: a stamped target jumps at whole rows. Twice: the first
-  // pass gives the ripple's size.
-  PointTable scan;
-  double delay = 0;
+// When a logged torque has seen a target.
+struct Lateness {
+  double delay_s = 0;
   Reading reading = Reading::kStamped;
+  PointTable scan;
+};
+
+// Scans both readings, then golden section inside the best row: a stamped target jumps at whole rows. Twice: the first
+// pass gives the ripple's size, which is put into `servo`.
+Result<Lateness> FindLateness(const IdentifyInput& input, const IdentifyOptions& options, Servo* servo) {
+  const double dt = servo->smooth.front().dt_s();
+  Lateness late;
   for (const bool last : {false, true}) {
-    GS_RETURN_IF_ERROR(FindDelay(servo, input, options, &scan, &delay, &reading));
+    GS_RETURN_IF_ERROR(FindDelay(*servo, input, options, &late.scan, &late.delay_s, &late.reading));
     if (last) break;
-    GS_ASSIGN(const Regression rough, Regress(MakeRows(servo, delay, reading, false, {}), dt));
-    const double inertia = DrivenInertiaOf(servo, dt);
-    servo.ripple = inertia > 0 && rough.value[0] > 0 ? rough.value[0] / inertia : 0;
+    GS_ASSIGN(const Regression rough, Regress(MakeRows(*servo, late.delay_s, late.reading, false, {}), dt));
+    const double inertia = DrivenInertiaOf(*servo, dt);
+    servo->ripple = inertia > 0 && rough.value[0] > 0 ? rough.value[0] / inertia : 0;
   }
-  GS_ASSIGN(const Regression at_delay, Regress(MakeRows(servo, delay, reading, false, {}), dt));
-  // The delay as one more column: its interval, and what not knowing it costs the gains.
-  GS_ASSIGN(const Regression fit, Regress(MakeRows(servo, delay, reading, true, at_delay.value), dt));
-  const std::string gain = servo.torque_unit == "1" ? "1/rad" : servo.torque_unit + "/rad",
-                    damping = servo.torque_unit == "1" ? "s/rad" : servo.torque_unit + " s/rad";
-  Identification result{.method = "pd",
-                        .relation = "torque(t) = kp (target - angle)(t - delay) - kd speed(t - delay) + offset",
-                        .r2 = at_delay.r2,
-                        .rmse = at_delay.rmse,
-                        .unit = servo.torque_unit,
-                        .rows = at_delay.rows};
-  // Noise of the angle is in error, speed and delay columns: what it does to the values is known from its variances,
-  // X'X/n holds too much of them. Taken out, and since noise is known to about half, half of what was taken out is
-  // added to the intervals.
-  GS_ASSIGN(const int joint, DrivenJoint(input.model, options.joint));
-  const Eigen::MatrixXd x = MakeRows(servo, delay, reading, true, at_delay.value).X();
+  return late;
+}
+
+// Values of a regression with noise of the angle taken out of them.
+struct Corrected {
+  Eigen::VectorXd value, moved;  // moved: by the correction
+  bool trusted = true;           // false: nothing was taken out, the noise is too large for it
+};
+
+// Noise of the angle is in error, speed and delay columns: what it does to the values is known from its variances,
+// X'X/n holds too much of them.
+Corrected WithoutNoise(const IdentifyInput& input, int joint, const IdentifyOptions& options, const Regression& fit,
+                       const Eigen::MatrixXd& x, double dt) {
   const Eigen::MatrixXd moments = x.transpose() * x / static_cast<double>(x.rows());
   const double q = NoiseVariance(input, joint, 0, options), v = NoiseVariance(input, joint, 1, options),
                acceleration = NoiseVariance(input, joint, 2, options), kp = fit.value[0], kd = fit.value[1];
@@ -282,57 +280,89 @@ Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOpti
   if (!trusted) corrected = fit.value;
   // The scan has the delay already; a linear step farther than a row is a flat cost, not a better delay.
   if (std::abs(corrected[delay_column]) > dt) corrected[delay_column] = 0;
-  const Eigen::VectorXd moved = corrected - fit.value;
-  const auto about = [&](Eigen::Index i, double start) {
-    const double half = fit.high[i] - fit.value[i] + 0.5 * std::abs(moved[i]);
-    const double value = start + corrected[i];
-    return Estimate{.name = "", .unit = "", .value = value, .low = value - half, .high = value + half};
+  return {.value = corrected, .moved = corrected - fit.value, .trusted = trusted};
+}
+
+// The law's values: since noise is known to about half, half of what was taken out is added to the intervals.
+void AddLaw(const Servo& servo, const Regression& fit, const Corrected& corrected, double delay_s,
+            Identification* result) {
+  const bool duty = servo.torque_unit == "1";
+  const auto add = [&](const char* name, const std::string& unit, Eigen::Index i, double start) {
+    const double half = fit.high[i] - fit.value[i] + 0.5 * std::abs(corrected.moved[i]);
+    const double value = start + corrected.value[i];
+    result->values.push_back({.name = name, .unit = unit, .value = value, .low = value - half, .high = value + half});
   };
-  const auto add = [&](std::string name, std::string unit, Estimate estimate) {
-    estimate.name = std::move(name), estimate.unit = std::move(unit);
-    result.values.push_back(std::move(estimate));
-  };
-  add("kp", gain, about(0, 0));
-  add("kd", damping, about(1, 0));
-  add("delay", "s", about(delay_column, delay));
-  add("offset", servo.torque_unit, about(2, 0));
-  if (servo.has_feedforward) add("feedforward_gain", "1", about(3, 0));
-  if (result.values[2].value < 1.5 * dt) {
-    // One inertia and nothing else: kp (q(t - d)) and kd dq(t - d) are, to first order in d, the same law with smaller
-    // gains. Only the target's row tells.
-    for (int i = 0; i < 2; ++i) {
-      result.values[static_cast<std::size_t>(i)].low =
-          std::min(result.values[static_cast<std::size_t>(i)].low, direct.low[i]);
-      result.values[static_cast<std::size_t>(i)].high =
-          std::max(result.values[static_cast<std::size_t>(i)].high, direct.high[i]);
-    }
-    result.values[2].low = std::min(result.values[2].low, 0.0);
-    result.remarks.push_back(
-        "a delay below about one row cannot be told from smaller gains: the intervals reach to the values without "
-        "delay");
+  add("kp", duty ? "1/rad" : servo.torque_unit + "/rad", 0, 0);
+  add("kd", duty ? "s/rad" : servo.torque_unit + " s/rad", 1, 0);
+  add("delay", "s", static_cast<Eigen::Index>(fit.value.size()) - 1, delay_s);
+  add("offset", servo.torque_unit, 2, 0);
+  if (servo.has_feedforward) add("feedforward_gain", "1", 3, 0);
+}
+
+// One inertia and nothing else: kp (q(t - d)) and kd dq(t - d) are, to first order in d, the same law with smaller
+// gains. Only the target's row tells, so below about one row of delay the intervals reach to the values without.
+void WidenBelowOneRow(const Regression& direct, double dt, Identification* result) {
+  Estimate *gains = result->values.data(), &delay = result->values[2];
+  if (!(delay.value < 1.5 * dt)) return;
+  for (int i = 0; i < 2; ++i) {
+    gains[i].low = std::min(gains[i].low, direct.low[i]);
+    gains[i].high = std::max(gains[i].high, direct.high[i]);
   }
+  delay.low = std::min(delay.low, 0.0);
+  result->remarks.push_back(
+      "a delay below about one row cannot be told from smaller gains: the intervals reach to the values without "
+      "delay");
+}
+
+void RemarkClippedRows(const Servo& servo, Identification* result) {
+  std::size_t clipped = 0, total = 0;
+  for (const auto& rows : servo.clipped)
+    clipped += static_cast<std::size_t>(std::count(rows.begin(), rows.end(), 1)), total += rows.size();
+  if (clipped > 0)
+    result->remarks.push_back(std::to_string(100 * clipped / total) + " % of the rows are at a limit and left out");
+}
+
+}  // namespace
+
+Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOptions& options) {
+  GS_ASSIGN(Servo servo, LoadServo(input, options));
+  const double dt = servo.smooth.front().dt_s();
+  GS_ASSIGN(const Regression direct, Regress(MakeRows(servo, 0, Reading::kStamped, false, {}), dt));
+  GS_ASSIGN(Lateness late, FindLateness(input, options, &servo));
+  GS_ASSIGN(const Regression at_delay, Regress(MakeRows(servo, late.delay_s, late.reading, false, {}), dt));
+  // The delay as one more column: its interval, and what not knowing it costs the gains.
+  const Rows rows = MakeRows(servo, late.delay_s, late.reading, true, at_delay.value);
+  GS_ASSIGN(const Regression fit, Regress(rows, dt));
+  GS_ASSIGN(const int joint, DrivenJoint(input.model, options.joint));
+  const Corrected corrected = WithoutNoise(input, joint, options, fit, rows.X(), dt);
+
+  Identification result{.method = "pd",
+                        .relation = "torque(t) = kp (target - angle)(t - delay) - kd speed(t - delay) + offset",
+                        .r2 = at_delay.r2,
+                        .rmse = at_delay.rmse,
+                        .unit = servo.torque_unit,
+                        .rows = at_delay.rows};
+  AddLaw(servo, fit, corrected, late.delay_s, &result);
+  const std::string gain = result.values[0].unit, damping = result.values[1].unit;
+  WidenBelowOneRow(direct, dt, &result);
   result.values.push_back(ToEstimate(direct, 0, "kp_without_delay", gain));
   result.values.push_back(ToEstimate(direct, 1, "kd_without_delay", damping));
   result.values.push_back({.name = "r2_without_delay", .unit = "1", .value = direct.r2, .low = NAN, .high = NAN});
-  if (!trusted)
+  if (!corrected.trusted)
     result.remarks.push_back(
         "noise of the angle moves the values by more than can be corrected: a larger motion, or a lower --cutoff");
-  result.tables = {std::move(scan), ByErrorSize(servo, delay, reading, dt)};
+  result.tables = {std::move(late.scan), ByErrorSize(servo, late.delay_s, late.reading, dt)};
   if (result.r2 < 0.9)
     result.remarks.push_back(
         "the law explains less than 90 % of the torque's variance: dry friction, a limit or another law");
-  if (delay > options.longest_delay_s - dt)
+  if (late.delay_s > options.longest_delay_s - dt)
     result.remarks.push_back("the delay is at the end of the scan: raise --longest-delay");
   const PointTable& parts = result.tables.back();
   if (parts.rows.size() == 3 && std::abs(parts.rows[0][2] - at_delay.value[0]) > 0.1 * std::abs(at_delay.value[0])) {
     result.remarks.push_back(
         "with small errors the gain comes out by more than a tenth different: excite with larger errors");
   }
-  std::size_t clipped = 0, total = 0;
-  for (const auto& rows : servo.clipped)
-    clipped += static_cast<std::size_t>(std::count(rows.begin(), rows.end(), 1)), total += rows.size();
-  if (clipped > 0)
-    result.remarks.push_back(std::to_string(100 * clipped / total) + " % of the rows are at a limit and left out");
+  RemarkClippedRows(servo, &result);
   return result;
 }
 

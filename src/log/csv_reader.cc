@@ -71,7 +71,6 @@ class BodyReader {
   template <bool kBlankDelimiter>
   Status ReadLines() {
     const char* p = bytes_.data() + dialect_.body_offset;
-    const char delimiter = dialect_.delimiter;
     while (p < end_) {
       const char* line_start = p;
       p = SkipBlanks<kBlankDelimiter>(p);
@@ -88,62 +87,73 @@ class BodyReader {
           continue;
         }
       }
-      std::size_t c = 0;
-      const std::size_t columns = columns_.size();
-      bool skip_line = false;
-      while (true) {
-        if (c == columns) return WrongCount(line_start);
-        double value = 0;
-        auto [q, failure] = std::from_chars(p, end_, value);
-        const char* stop = q;
-        if (failure == std::errc{}) stop = SkipBlanks<kBlankDelimiter>(q);
-        const bool closed = stop == end_ || IsEnd(*stop) || (kBlankDelimiter ? stop != q : *stop == delimiter);
-        if (failure == std::errc{} && closed && std::isfinite(value)) [[likely]] {
-          columns_[c]->push_back(value);
-          ++values_;
-          p = stop;
-        } else if (const char* comma_stop = DecimalComma<kBlankDelimiter>(p, q, &value)) {
-          columns_[c]->push_back(value);
-          ++values_;
-          decimal_comma_.Add(row_, line_);
-          p = comma_stop;
-        } else {
-          const std::string_view rest(p, static_cast<std::size_t>(end_ - p));
-          const FieldText field = FieldAt(rest, 0, delimiter);
-          if (c == 0 && IsHeaderAgain(line_start)) {
-            skip_line = true;
-            break;
-          }
-          GS_RETURN_IF_ERROR(SlowField(field, c));
-          p = SkipBlanks<kBlankDelimiter>(p + field.end);
-        }
-        ++c;
-        if (p == end_ || IsEnd(*p)) break;
-        if constexpr (!kBlankDelimiter) p = SkipBlanks<kBlankDelimiter>(p + 1);  // the delimiter
-        // A line that ends with its delimiter has one more, empty field.
-        if (!kBlankDelimiter && (p == end_ || IsEnd(*p))) {
-          if (c == columns) {
-            trailing_.Add(row_, line_);
-          } else {
-            columns_[c]->push_back(kNaN);
-            missing_[c].Add(row_, line_);
-            ++c;
-          }
-          break;
-        }
-      }
-      if (skip_line) {
+      bool header = false;
+      GS_RETURN_IF_ERROR(ReadRow<kBlankDelimiter>(line_start, &p, &header));
+      if (header) {
         headers_.Add(row_, line_);
         p = NextLine(LineEnd(line_start));
         continue;
       }
-      if (c != columns) return WrongCount(line_start);
       if (log_->lines.empty() || line_ != log_->lines.back().line + (row_ - log_->lines.back().row)) {
         log_->lines.push_back({row_, line_});
       }
       ++row_;
       if (p < end_) p = NextLine(p);
     }
+    return Ok();
+  }
+
+  // The fields of one line, `*at` at the first; it becomes the line's end. `header`: the line is the header once more,
+  // and no row.
+  template <bool kBlankDelimiter>
+  Status ReadRow(const char* line_start, const char** at, bool* header) {
+    const char* p = *at;
+    const char delimiter = dialect_.delimiter;
+    std::size_t c = 0;
+    const std::size_t columns = columns_.size();
+    while (true) {
+      if (c == columns) return WrongCount(line_start);
+      double value = 0;
+      auto [q, failure] = std::from_chars(p, end_, value);
+      const char* stop = q;
+      if (failure == std::errc{}) stop = SkipBlanks<kBlankDelimiter>(q);
+      const bool closed = stop == end_ || IsEnd(*stop) || (kBlankDelimiter ? stop != q : *stop == delimiter);
+      if (failure == std::errc{} && closed && std::isfinite(value)) [[likely]] {
+        columns_[c]->push_back(value);
+        ++values_;
+        p = stop;
+      } else if (const char* comma_stop = DecimalComma<kBlankDelimiter>(p, q, &value)) {
+        columns_[c]->push_back(value);
+        ++values_;
+        decimal_comma_.Add(row_, line_);
+        p = comma_stop;
+      } else {
+        const std::string_view rest(p, static_cast<std::size_t>(end_ - p));
+        const FieldText field = FieldAt(rest, 0, delimiter);
+        if (c == 0 && IsHeaderAgain(line_start)) {
+          *header = true;
+          return Ok();
+        }
+        GS_RETURN_IF_ERROR(SlowField(field, c));
+        p = SkipBlanks<kBlankDelimiter>(p + field.end);
+      }
+      ++c;
+      if (p == end_ || IsEnd(*p)) break;
+      if constexpr (!kBlankDelimiter) p = SkipBlanks<kBlankDelimiter>(p + 1);  // the delimiter
+      // A line that ends with its delimiter has one more, empty field.
+      if (!kBlankDelimiter && (p == end_ || IsEnd(*p))) {
+        if (c == columns) {
+          trailing_.Add(row_, line_);
+        } else {
+          columns_[c]->push_back(kNaN);
+          missing_[c].Add(row_, line_);
+          ++c;
+        }
+        break;
+      }
+    }
+    if (c != columns) return WrongCount(line_start);
+    *at = p;
     return Ok();
   }
 

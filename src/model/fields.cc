@@ -68,10 +68,16 @@ Field Single(const mjModel& model, std::initializer_list<std::pair<const mjtNum*
   return field;
 }
 
-std::vector<std::string> NamesOf(const mjModel& model, mjtObj type, int count) {
+// Of the elements that fields belong to.
+std::vector<std::string> NamesOf(const mjModel& m, mjtObj type) {
+  const auto count = type == mjOBJ_JOINT      ? m.njnt
+                     : type == mjOBJ_BODY     ? m.nbody
+                     : type == mjOBJ_TENDON   ? m.ntendon
+                     : type == mjOBJ_ACTUATOR ? m.nactuator
+                                              : m.nnumeric;
   std::vector<std::string> names;
-  for (int i = 0; i < count; ++i) {
-    if (const char* name = mj_id2name(&model, type, i)) names.emplace_back(name);
+  for (int i = 0; i < static_cast<int>(count); ++i) {
+    if (const char* name = mj_id2name(&m, type, i)) names.emplace_back(name);
   }
   return names;
 }
@@ -129,6 +135,59 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
                 {"kp", "kv", "gain", "bias0", "bias1", "bias2", "gear", "delay", "forcerange", "ctrlrange"}, where);
 }
 
+Result<int> IdOf(const mjModel& m, mjtObj type, const char* kind, const std::string& name, const std::string& where) {
+  const int id = mj_name2id(&m, type, name.c_str());
+  if (id >= 0) return id;
+  return NoSuch(std::string("no such ") + kind + " in the MJCF", name, NamesOf(m, type), where);
+}
+
+Field Gravity(const mjModel& m) {
+  Field result{.components = {}, .derived = true};
+  for (int i = 0; i < 3; ++i) {
+    const auto offset = reinterpret_cast<const char*>(m.opt.gravity + i) - reinterpret_cast<const char*>(&m.opt);
+    result.components.push_back({{.offset = offset, .in_options = true}});
+  }
+  return result;
+}
+
+// `name`: all that follows the kind, since a numeric has no fields.
+Result<Field> NumericField(const mjModel& m, const std::string& name, const std::string& where) {
+  GS_ASSIGN(const int id, IdOf(m, mjOBJ_NUMERIC, "numeric", name, where));
+  Field result;
+  for (int i = 0; i < m.numeric_size[id]; ++i)
+    result.components.push_back({{.offset = OffsetOf(m, m.numeric_data + m.numeric_adr[id] + i)}});
+  return result;
+}
+
+Result<Field> JointField(const mjModel& m, const std::string& name, const std::string& field,
+                         const std::string& where) {
+  GS_ASSIGN(const int id, IdOf(m, mjOBJ_JOINT, "joint", name, where));
+  if (m.jnt_type[id] != mjJNT_HINGE && m.jnt_type[id] != mjJNT_SLIDE) {
+    return Error{.what = "the joint '" + name + "' is neither hinge nor slide", .where = where};
+  }
+  if (field == "springref") return Single(m, {{m.qpos_spring + m.jnt_qposadr[id], 1}});
+  if (const auto found = JointFields().find(field); found != JointFields().end()) return ArrayAt(m, found->second, id);
+  if (const auto found = DofFields().find(field); found != DofFields().end())
+    return ArrayAt(m, found->second, m.jnt_dofadr[id]);
+  std::vector<std::string> names = Keys(DofFields());
+  names.insert(names.end(), {"stiffness", "springref"});
+  return NoSuch("unknown field of a joint", field, names, where);
+}
+
+Result<Field> BodyField(const mjModel& m, const std::string& name, const std::string& field, const std::string& where) {
+  GS_ASSIGN(const int id, IdOf(m, mjOBJ_BODY, "body", name, where));
+  if (const auto found = BodyFields().find(field); found != BodyFields().end()) return ArrayAt(m, found->second, id);
+  return NoSuch("unknown field of a body", field, Keys(BodyFields()), where);
+}
+
+Result<Field> TendonField(const mjModel& m, const std::string& name, const std::string& field,
+                          const std::string& where) {
+  GS_ASSIGN(const int id, IdOf(m, mjOBJ_TENDON, "tendon", name, where));
+  if (const auto found = TendonFields().find(field); found != TendonFields().end())
+    return ArrayAt(m, found->second, id);
+  return NoSuch("unknown field of a tendon", field, Keys(TendonFields()), where);
+}
+
 }  // namespace
 
 Result<Field> ResolveField(const mjModel& m, const std::string& text, const std::string& where) {
@@ -142,60 +201,13 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
   }
   const std::string name = text.substr(first + 1, last > first ? last - first - 1 : std::string::npos);
   const std::string field = last > first ? text.substr(last + 1) : "";
-  if (kind == "option" && name == "gravity") {
-    Field result{.components = {}, .derived = true};
-    for (int i = 0; i < 3; ++i) {
-      const auto offset = reinterpret_cast<const char*>(m.opt.gravity + i) - reinterpret_cast<const char*>(&m.opt);
-      result.components.push_back({{.offset = offset, .in_options = true}});
-    }
-    return result;
-  }
-  if (kind == "numeric") {
-    const int id = mj_name2id(&m, mjOBJ_NUMERIC, name.c_str());
-    if (id < 0 || !field.empty())
-      return NoSuch("no such numeric in the MJCF", text.substr(first + 1),
-                    NamesOf(m, mjOBJ_NUMERIC, static_cast<int>(m.nnumeric)), where);
-    Field result;
-    for (int i = 0; i < m.numeric_size[id]; ++i)
-      result.components.push_back({{.offset = OffsetOf(m, m.numeric_data + m.numeric_adr[id] + i)}});
-    return result;
-  }
-  if (kind == "joint") {
-    const int id = mj_name2id(&m, mjOBJ_JOINT, name.c_str());
-    if (id < 0)
-      return NoSuch("no such joint in the MJCF", name, NamesOf(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), where);
-    if (m.jnt_type[id] != mjJNT_HINGE && m.jnt_type[id] != mjJNT_SLIDE) {
-      return Error{.what = "the joint '" + name + "' is neither hinge nor slide", .where = where};
-    }
-    if (field == "springref") return Single(m, {{m.qpos_spring + m.jnt_qposadr[id], 1}});
-    if (const auto found = JointFields().find(field); found != JointFields().end())
-      return ArrayAt(m, found->second, id);
-    if (const auto found = DofFields().find(field); found != DofFields().end())
-      return ArrayAt(m, found->second, m.jnt_dofadr[id]);
-    std::vector<std::string> names = Keys(DofFields());
-    names.insert(names.end(), {"stiffness", "springref"});
-    return NoSuch("unknown field of a joint", field, names, where);
-  }
-  if (kind == "body") {
-    const int id = mj_name2id(&m, mjOBJ_BODY, name.c_str());
-    if (id < 0)
-      return NoSuch("no such body in the MJCF", name, NamesOf(m, mjOBJ_BODY, static_cast<int>(m.nbody)), where);
-    if (const auto found = BodyFields().find(field); found != BodyFields().end()) return ArrayAt(m, found->second, id);
-    return NoSuch("unknown field of a body", field, Keys(BodyFields()), where);
-  }
-  if (kind == "tendon") {
-    const int id = mj_name2id(&m, mjOBJ_TENDON, name.c_str());
-    if (id < 0)
-      return NoSuch("no such tendon in the MJCF", name, NamesOf(m, mjOBJ_TENDON, static_cast<int>(m.ntendon)), where);
-    if (const auto found = TendonFields().find(field); found != TendonFields().end())
-      return ArrayAt(m, found->second, id);
-    return NoSuch("unknown field of a tendon", field, Keys(TendonFields()), where);
-  }
+  if (kind == "option" && name == "gravity") return Gravity(m);
+  if (kind == "numeric") return NumericField(m, text.substr(first + 1), where);
+  if (kind == "joint") return JointField(m, name, field, where);
+  if (kind == "body") return BodyField(m, name, field, where);
+  if (kind == "tendon") return TendonField(m, name, field, where);
   if (kind == "actuator") {
-    const int id = mj_name2id(&m, mjOBJ_ACTUATOR, name.c_str());
-    if (id < 0)
-      return NoSuch("no such actuator in the MJCF", name, NamesOf(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)),
-                    where);
+    GS_ASSIGN(const int id, IdOf(m, mjOBJ_ACTUATOR, "actuator", name, where));
     return ActuatorField(m, id, field, where);
   }
   return NoSuch("unknown kind of field", kind, {"joint", "body", "actuator", "tendon", "numeric", "option"}, where);

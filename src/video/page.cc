@@ -192,85 +192,89 @@ double Page::XOf(double time_s) const {
   return left + (right - left) * (time_s - options_.from_s) / (options_.to_s - options_.from_s);
 }
 
-void Page::DrawScale(Canvas& c, double top, double height, const std::string& name, const std::string& unit, double low,
-                     double high) const {
+void Page::DrawScale(Canvas& c, const Row& row, const std::string& name, const std::string& unit) const {
   const double left = XOf(options_.from_s), right = XOf(options_.to_s);
   c.Ink({0.972, 0.976, 0.982});
-  cairo_rectangle(c.cr, left, top, right - left, height);
+  cairo_rectangle(c.cr, left, row.top, right - left, row.height);
   cairo_fill(c.cr);
-  if (low < 0 && high > 0) {
+  if (row.low < 0 && row.high > 0) {
     c.Ink(kGrid);
     cairo_set_line_width(c.cr, unit_);
-    const double y = top + height * high / (high - low);
+    const double y = row.top + row.height * row.high / (row.high - row.low);
     cairo_move_to(c.cr, left, y);
     cairo_line_to(c.cr, right, y);
     cairo_stroke(c.cr);
   }
   c.Ink(kInk);
   c.Font(13 * unit_, true);
-  c.Text(c.Fit(name, (kGutter - 20) * unit_), 12 * unit_, top + height / 2 - 1 * unit_);
+  c.Text(c.Fit(name, (kGutter - 20) * unit_), 12 * unit_, row.top + row.height / 2 - 1 * unit_);
   c.Ink(kFaint);
   c.Font(11.5 * unit_);
-  c.Text(unit, 12 * unit_, top + height / 2 + 14 * unit_);
-  c.Text(Short(high), right + 8 * unit_, top + 11 * unit_);
-  c.Text(Short(low), right + 8 * unit_, top + height - 3 * unit_);
+  c.Text(unit, 12 * unit_, row.top + row.height / 2 + 14 * unit_);
+  c.Text(Short(row.high), right + 8 * unit_, row.top + 11 * unit_);
+  c.Text(Short(row.low), right + 8 * unit_, row.top + row.height - 3 * unit_);
 }
 
-void Page::DrawTraces(Canvas& c, bool past) const {
-  c.Ink(kPaper);
-  cairo_paint(c.cr);
+void Page::DrawLine(Canvas& c, const Row& row, const std::vector<double>& values, bool steps) const {
   const auto& time = traces_.time_s;
-  const double strength = past ? 1 : 0.28;
   const std::size_t first =
       static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), options_.from_s) - time.begin());
   const std::size_t last =
       static_cast<std::size_t>(std::upper_bound(time.begin(), time.end(), options_.to_s) - time.begin());
   const std::size_t begin = first > 0 ? first - 1 : 0, end = std::min(last + 1, time.size());
-  const auto line = [&](const Row& row, const std::vector<double>& values, bool steps) {
-    const std::span<const double> part(values.data() + begin, end - begin);
-    const std::span<const double> parts[] = {part};
-    bool pen_down = false;
-    double y_before = 0;
-    for (const std::size_t r : ExtremeRows(parts, static_cast<std::size_t>(options_.width))) {
-      if (!std::isfinite(part[r])) {
-        pen_down = false;
-        continue;
-      }
-      const double x = XOf(time[begin + r]), y = row.top + row.height * (row.high - part[r]) / (row.high - row.low);
-      if (pen_down && steps) cairo_line_to(c.cr, x, y_before);
-      pen_down ? cairo_line_to(c.cr, x, y) : cairo_move_to(c.cr, x, y);
-      pen_down = true;
-      y_before = y;
+  const std::span<const double> part(values.data() + begin, end - begin);
+  const std::span<const double> parts[] = {part};
+  bool pen_down = false;
+  double y_before = 0;
+  for (const std::size_t r : ExtremeRows(parts, static_cast<std::size_t>(options_.width))) {
+    if (!std::isfinite(part[r])) {
+      pen_down = false;
+      continue;
     }
-    cairo_stroke(c.cr);
-  };
+    const double x = XOf(time[begin + r]), y = row.top + row.height * (row.high - part[r]) / (row.high - row.low);
+    if (pen_down && steps) cairo_line_to(c.cr, x, y_before);
+    pen_down ? cairo_line_to(c.cr, x, y) : cairo_move_to(c.cr, x, y);
+    pen_down = true;
+    y_before = y;
+  }
+  cairo_stroke(c.cr);
+}
+
+void Page::DrawTraces(Canvas& c, bool past) const {
+  c.Ink(kPaper);
+  cairo_paint(c.cr);
+  const double strength = past ? 1 : 0.28;
   for (std::size_t s = 0; s < rows_.size(); ++s) {
     const Row& row = rows_[s];
     const bool command = s >= traces_.signals.size();
-    const std::string& name = command ? traces_.commands.front().name : traces_.signals[s].name;
-    DrawScale(c, row.top, row.height, name, command ? traces_.commands.front().unit : traces_.signals[s].unit, row.low,
-              row.high);
+    if (command) {
+      DrawScale(c, row, traces_.commands.front().name, traces_.commands.front().unit);
+    } else {
+      DrawScale(c, row, traces_.signals[s].name, traces_.signals[s].unit);
+    }
     cairo_save(c.cr);
     cairo_rectangle(c.cr, XOf(options_.from_s), row.top, XOf(options_.to_s) - XOf(options_.from_s), row.height);
     cairo_clip(c.cr);
     if (command) {
       c.Ink(kFaint, past ? 1 : 0.45);
       cairo_set_line_width(c.cr, 1.3 * unit_);
-      line(row, traces_.commands.front().values, true);
+      DrawLine(c, row, traces_.commands.front().values, true);
     } else {
       c.Ink(kMeasured, strength);
       cairo_set_line_width(c.cr, 3.4 * unit_);
-      line(row, traces_.signals[s].measured, false);
+      DrawLine(c, row, traces_.signals[s].measured, false);
       for (std::size_t m = 0; m < models_.size(); ++m) {
         c.Ink(OfModel(m), strength);
         cairo_set_line_width(c.cr, 1.6 * unit_);
-        line(row, traces_.signals[s].predicted[m], false);
+        DrawLine(c, row, traces_.signals[s].predicted[m], false);
       }
     }
     cairo_restore(c.cr);
   }
-  // Time axis.
-  const double bottom = rows_.back().top + rows_.back().height;
+  DrawTimeAxis(c, rows_.back().top + rows_.back().height);
+}
+
+void Page::DrawTimeAxis(Canvas& c, double bottom) const {
   const double step = NiceStep(options_.to_s - options_.from_s, 10);
   c.Font(11.5 * unit_);
   for (double t = std::ceil(options_.from_s / step - 1e-9) * step; t <= options_.to_s + 1e-9 * step; t += step) {

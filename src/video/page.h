@@ -63,9 +63,15 @@ class Page {
 
  private:
   struct Canvas;
+  struct Row {
+    double top, height, low, high;  // in pixels; in the signal's unit
+  };
   void DrawTraces(Canvas& canvas, bool past) const;
-  void DrawScale(Canvas& canvas, double top, double height, const std::string& name, const std::string& unit,
-                 double low, double high) const;
+  // Paper, name, unit and range of a row.
+  void DrawScale(Canvas& canvas, const Row& row, const std::string& name, const std::string& unit) const;
+  // `steps`: held from stamp to stamp.
+  void DrawLine(Canvas& canvas, const Row& row, const std::vector<double>& values, bool steps) const;
+  void DrawTimeAxis(Canvas& canvas, double bottom) const;
   void DrawCursor(Canvas& canvas, double time_s) const;
   void DrawPanel(Canvas& canvas, std::size_t panel, double time_s) const;
   void DrawClock(Canvas& canvas, double time_s) const;
@@ -77,9 +83,6 @@ class Page {
   double unit_ = 1;  // one pixel of a picture 720 high
   int scene_width_ = 0, scene_height_ = 0;
   std::size_t panels_ = 1;
-  struct Row {
-    double top, height, low, high;  // in pixels; in the signal's unit
-  };
   std::vector<Row> rows_;  // signals, then the first command
   Picture future_, past_;  // the traces' part, pale and full
 };

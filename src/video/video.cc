@@ -208,6 +208,102 @@ Status PaintAll(const Stage& stage, const std::vector<double>& times, const Vide
   return Ok();
 }
 
+// What can be asked of a recording: `to_s` becomes its end where it is later, or not given.
+Status Validate(const Recording& recording, VideoOptions* options) {
+  const std::string extension = std::filesystem::path(options->out).extension().string();
+  if (extension != ".png" && extension != ".mp4" && extension != ".gif")
+    return Error{.what = "unknown kind of picture",
+                 .where = "--out " + options->out,
+                 .actual = "'" + extension + "'",
+                 .allowed = ".mp4, .gif, .png"};
+  if (std::none_of(recording.measured.begin(), recording.measured.end(),
+                   [](const auto& q) { return q.spec.kind == SignalKind::kPosition; })) {
+    return Error{.what = "no position is measured: there is no real mechanism to draw", .where = recording.log_path};
+  }
+  const double end = recording.time_s.back();
+  if (options->to_s < 0) options->to_s = end;
+  options->to_s = std::min(options->to_s, end);
+  if (!(options->from_s >= 0 && options->from_s < options->to_s)) {
+    return Error{.what = "nothing of the log lies between --from and --to",
+                 .where = recording.log_path,
+                 .actual = fmt::format("{:g} .. {:g} s", options->from_s, options->to_s),
+                 .allowed = fmt::format("within 0 .. {:g} s", end)};
+  }
+  if ((options->to_s - options->from_s) / options->speed * options->frames_per_s > kMaxFrames)
+    return Error{.what = "more than a million frames",
+                 .where = options->out,
+                 .cure = "raise --speed, or cut with --from and --to"};
+  return Ok();
+}
+
+Result<std::vector<Actor>> RehearseAll(const Recording& recording, const std::vector<VideoModel>& models,
+                                       const VideoOptions& options, ThreadPool& pool) {
+  std::vector<Actor> actors;
+  for (const auto& model : models) {
+    GS_ASSIGN(Actor actor, Rehearse(recording, model, options, pool));
+    actors.push_back(std::move(actor));
+  }
+  return actors;
+}
+
+Page ComposePage(const Recording& recording, const std::vector<VideoModel>& models, const std::vector<Actor>& actors,
+                 const VideoOptions& options, PageTraces traces) {
+  const PageOptions page{.width = options.width,
+                         .height = options.height,
+                         .from_s = options.from_s,
+                         .to_s = options.to_s,
+                         .speed = options.speed,
+                         .title = std::filesystem::path(recording.log_path).filename().string(),
+                         .side_by_side = options.layout == Layout::kSide};
+  std::vector<PageModel> labels;
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const LogReplay& replay = actors[m].replay;
+    labels.push_back({.label = models[m].label,
+                      .error = actors[m].error,
+                      .diverged_at_s = replay.outcome == Outcome::kDiverged ? replay.diverged_at_s : -1});
+  }
+  return Page(page, std::move(traces), std::move(labels));
+}
+
+Framing FrameActors(const std::vector<Actor>& actors, const Page& page, View view) {
+  std::vector<const PoseTrack*> tracks;
+  for (const Actor& actor : actors) tracks.insert(tracks.end(), {&actor.measured, &actor.predicted});
+  // Models may differ in joints, not in what is drawn: the first one's frames all.
+  if (std::any_of(actors.begin(), actors.end(),
+                  [&](const Actor& a) { return a.drawn->nq != actors.front().drawn->nq; }))
+    tracks.resize(2);
+  return FrameMotion(*actors.front().drawn, tracks, view,
+                     static_cast<double>(page.scene_width()) / page.scene_height());
+}
+
+Status WriteStill(const Stage& stage, double at_s, const VideoOptions& options, ThreadPool& pool,
+                  VideoSummary* summary) {
+  Picture picture;
+  GS_RETURN_IF_ERROR(PaintAll(stage, {at_s}, options, pool, [&](const Picture& frame) {
+    picture = frame;
+    return Ok();
+  }));
+  GS_RETURN_IF_ERROR(WritePng(options.out, picture));
+  summary->frames = 1;
+  summary->first_s = summary->last_s = at_s;
+  return Ok();
+}
+
+Status WriteFilm(const Stage& stage, const VideoOptions& options, ThreadPool& pool, VideoSummary* summary) {
+  const std::vector<double> times = FrameTimes(options);
+  GS_ASSIGN(const auto encoder,
+            Encoder::Start(options.out, options.out.ends_with(".gif") ? VideoFormat::kGif : VideoFormat::kMp4,
+                           options.width, options.height, options.frames_per_s));
+  GS_RETURN_IF_ERROR(
+      PaintAll(stage, times, options, pool, [&](const Picture& frame) { return encoder->Write(frame); }));
+  GS_RETURN_IF_ERROR(encoder->Finish());
+  summary->frames = times.size();
+  summary->first_s = times.front();
+  summary->last_s = times.back();
+  summary->length_s = static_cast<double>(times.size()) / options.frames_per_s;
+  return Ok();
+}
+
 }  // namespace
 
 template <>
@@ -233,85 +329,21 @@ Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<V
   const auto begin = std::chrono::steady_clock::now();
   GS_CHECK(!models.empty());
   VideoOptions options = asked;
-  const std::string extension = std::filesystem::path(options.out).extension().string();
-  const bool still = extension == ".png";
-  if (!still && extension != ".mp4" && extension != ".gif")
-    return Error{.what = "unknown kind of picture",
-                 .where = "--out " + options.out,
-                 .actual = "'" + extension + "'",
-                 .allowed = ".mp4, .gif, .png"};
-  if (std::none_of(recording.measured.begin(), recording.measured.end(),
-                   [](const auto& q) { return q.spec.kind == SignalKind::kPosition; })) {
-    return Error{.what = "no position is measured: there is no real mechanism to draw", .where = recording.log_path};
-  }
-  const double end = recording.time_s.back();
-  if (options.to_s < 0) options.to_s = end;
-  options.to_s = std::min(options.to_s, end);
-  if (!(options.from_s >= 0 && options.from_s < options.to_s)) {
-    return Error{.what = "nothing of the log lies between --from and --to",
-                 .where = recording.log_path,
-                 .actual = fmt::format("{:g} .. {:g} s", options.from_s, options.to_s),
-                 .allowed = fmt::format("within 0 .. {:g} s", end)};
-  }
-  if ((options.to_s - options.from_s) / options.speed * options.frames_per_s > kMaxFrames)
-    return Error{.what = "more than a million frames",
-                 .where = options.out,
-                 .cure = "raise --speed, or cut with --from and --to"};
+  GS_RETURN_IF_ERROR(Validate(recording, &options));
   VideoSummary summary;
   GS_ASSIGN(summary.gl, OpenGl(options.gl, pool.workers(), &summary.note));
-
-  std::vector<Actor> actors;
-  PageOptions page{.width = options.width,
-                   .height = options.height,
-                   .from_s = options.from_s,
-                   .to_s = options.to_s,
-                   .speed = options.speed,
-                   .title = std::filesystem::path(recording.log_path).filename().string(),
-                   .side_by_side = options.layout == Layout::kSide};
-  std::vector<PageModel> labels;
-  for (const auto& model : models) {
-    GS_ASSIGN(Actor actor, Rehearse(recording, model, options, pool));
-    labels.push_back({.label = model.label,
-                      .error = actor.error,
-                      .diverged_at_s = actor.replay.outcome == Outcome::kDiverged ? actor.replay.diverged_at_s : -1});
-    summary.errors.push_back(actor.error);
-    actors.push_back(std::move(actor));
-  }
+  GS_ASSIGN(const std::vector<Actor> actors, RehearseAll(recording, models, options, pool));
+  for (const Actor& actor : actors) summary.errors.push_back(actor.error);
   PageTraces traces = TracesOf(recording, models.front().model->experiment(), actors);
-  const double at =
-      options.at_s >= 0 ? std::min(options.at_s, end) : TimeOfGreatestError(traces, options.from_s, options.to_s);
-  const Page composed(page, std::move(traces), labels);
-  std::vector<const PoseTrack*> tracks;
-  for (const Actor& actor : actors) tracks.insert(tracks.end(), {&actor.measured, &actor.predicted});
-  // Models may differ in joints, not in what is drawn: the first one's frames all.
-  if (std::any_of(actors.begin(), actors.end(),
-                  [&](const Actor& a) { return a.drawn->nq != actors.front().drawn->nq; }))
-    tracks.resize(2);
-  const Framing framing = FrameMotion(*actors.front().drawn, tracks, options.view,
-                                      static_cast<double>(composed.scene_width()) / composed.scene_height());
-  const Stage stage{actors, composed, framing, options.layout};
-
-  if (still) {
-    Picture picture;
-    GS_RETURN_IF_ERROR(PaintAll(stage, {at}, options, pool, [&](const Picture& frame) {
-      picture = frame;
-      return Ok();
-    }));
-    GS_RETURN_IF_ERROR(WritePng(options.out, picture));
-    summary.frames = 1;
-    summary.first_s = summary.last_s = at;
+  const double at = options.at_s >= 0 ? std::min(options.at_s, recording.time_s.back())
+                                      : TimeOfGreatestError(traces, options.from_s, options.to_s);
+  const Page page = ComposePage(recording, models, actors, options, std::move(traces));
+  const Framing framing = FrameActors(actors, page, options.view);
+  const Stage stage{actors, page, framing, options.layout};
+  if (options.out.ends_with(".png")) {
+    GS_RETURN_IF_ERROR(WriteStill(stage, at, options, pool, &summary));
   } else {
-    const std::vector<double> times = FrameTimes(options);
-    GS_ASSIGN(const auto encoder,
-              Encoder::Start(options.out, extension == ".gif" ? VideoFormat::kGif : VideoFormat::kMp4, options.width,
-                             options.height, options.frames_per_s));
-    GS_RETURN_IF_ERROR(
-        PaintAll(stage, times, options, pool, [&](const Picture& frame) { return encoder->Write(frame); }));
-    GS_RETURN_IF_ERROR(encoder->Finish());
-    summary.frames = times.size();
-    summary.first_s = times.front();
-    summary.last_s = times.back();
-    summary.length_s = static_cast<double>(times.size()) / options.frames_per_s;
+    GS_RETURN_IF_ERROR(WriteFilm(stage, options, pool, &summary));
   }
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return summary;

@@ -151,19 +151,54 @@ double Motor::Load(const mjModel* m, double torque, const Limits& limits, double
   return ceiling > 0 ? std::min(1.0, std::abs(torque) / ceiling) : 0;
 }
 
+Motor::Stage Motor::Open(const mjModel* m, mjData* d) const {
+  Stage at{.m = m, .d = d, .slots = d->plugin_state + state_, .staged = Staged(m), .later = false, .prime = false};
+  const double opened = at.slots[MotorState::kStepTime];
+  // A new step, or the same one again after the host changed something; else a later stage of RK4.
+  at.later = at.staged && at.slots[MotorState::kStepOpen] != 0 && d->time > opened &&
+             d->time <= opened + m->opt.timestep * (1 + 1e-9);
+  if (!at.later) {
+    at.slots[MotorState::kStepOpen] = 1;
+    at.slots[MotorState::kStepTime] = d->time;
+  }
+  at.prime = at.slots[MotorState::kPrimed] == 0 && !at.later;
+  return at;
+}
+
+Motion Motor::Late(const Stage& at, Motion present, const double* command, double* late) const {
+  const double step = at.m->opt.timestep, now = at.d->time;
+  History history(at.slots + MotorState::kSlots, capacity_, config_.inputs);
+  if (!at.later) history.Open(now, present.q, present.qdot, command);
+  const double torque_delay = std::min(Parameter(at.m, kTorqueDelay), config_.max_delay_s);
+  const double command_delay = std::max(0.0, Parameter(at.m, kCommandDelay)) + std::max(0.0, torque_delay);
+  history.MeanCommand(std::min(command_delay, config_.max_delay_s), step, late);
+  return history.MotionAt(torque_delay, now, present, step);
+}
+
+double Motor::Limited(const Stage& at, double torque, double speed, double supply, double ceiling) const {
+  const Limits limits = LimitsAt(at.m, torque, speed);
+  torque = softness_
+               ? SoftLimit(torque, ceiling * (torque > 0 ? limits.high : -limits.low), Parameter(at.m, kLimitSoftness))
+               : mju_clip(torque, limits.low * ceiling, limits.high * ceiling);
+  if (sag_ >= 0) {
+    const double step = at.m->opt.timestep;
+    const Lag lag(std::max(Parameter(at.m, kSagTimeConstant), step), step, at.staged);
+    at.d->act_dot[sag_] = lag.Derivative(at.d->act[sag_], Load(at.m, torque, limits, supply));
+  }
+  return torque;
+}
+
+double Motor::Delivered(const mjModel* m, double torque, double speed) const {
+  if (droop_)
+    torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference), Parameter(m, kDroopExponent));
+  if (asymmetry_) torque *= 1 + (torque > 0 ? 1 : -1) * Parameter(m, kAsymmetry);
+  if (efficiency_) torque *= Parameter(m, torque * speed < 0 ? kEfficiencyBackdrive : kEfficiencyDrive);
+  return torque;
+}
+
 void Motor::Compute(const mjModel* m, mjData* d, int) const {
   if (inert_ || Disabled(m, first_)) return;
-  double* slots = d->plugin_state + state_;
-  const double step = m->opt.timestep, now = d->time;
-  const bool staged = Staged(m);
-
-  // A new step, or the same one again after the host changed something; else a later stage of RK4.
-  const bool later = staged && slots[MotorState::kStepOpen] != 0 && now > slots[MotorState::kStepTime] &&
-                     now <= slots[MotorState::kStepTime] + step * (1 + 1e-9);
-  if (!later) {
-    slots[MotorState::kStepOpen] = 1;
-    slots[MotorState::kStepTime] = now;
-  }
+  const Stage at = Open(m, d);
 
   // What is sent now, and what the drive knows of it.
   double command[kRoles], late[kRoles];
@@ -174,37 +209,31 @@ void Motor::Compute(const mjModel* m, mjData* d, int) const {
   Motion seen = present;
   const double supply_now = supply_ ? Input(command, kSupply, Parameter(m, kSupplyV)) : 0;
   if (history_) {
-    History history(slots + MotorState::kSlots, capacity_, config_.inputs);
-    if (!later) history.Open(now, present.q, present.qdot, command);
-    const double torque_delay = std::min(Parameter(m, kTorqueDelay), config_.max_delay_s);
-    const double command_delay = std::max(0.0, Parameter(m, kCommandDelay)) + std::max(0.0, torque_delay);
-    history.MeanCommand(std::min(command_delay, config_.max_delay_s), step, late);
-    seen = history.MotionAt(torque_delay, now, present, step);
+    seen = Late(at, present, command, late);
     inputs = late;
   }
   const double enable = enable_ ? mju_clip(inputs[config_.input_of[kEnable]], 0, 1) : 1;
 
   // A step of one lag: its output for `target`.
-  const auto lagged = [&](int act, MotorParameter constant, double target, double request, bool first) {
-    if (first) d->act[act] = target;
-    const Lag lag(Parameter(m, constant), step, staged);
+  const auto lagged = [&](int act, MotorParameter constant, double target, double request) {
+    if (at.prime) d->act[act] = target;
+    const Lag lag(Parameter(m, constant), m->opt.timestep, at.staged);
     d->act_dot[act] = lag.Derivative(d->act[act], target);
     return lag.Output(d->act[act], request);
   };
-  const bool prime = slots[MotorState::kPrimed] == 0 && !later;
   // On a voltage drive the second pole is the amplifier's, before the winding: the back-EMF does not pass it.
   double filtered[kRoles];
   const bool amplifier = second_lag_ >= 0 && (config_.law == MotorLaw::kVoltage ||
                                               (config_.law == MotorLaw::kAffine && Parameter(m, kBias1) == 0));
   if (amplifier) {
     std::copy_n(inputs, config_.inputs, filtered);
-    filtered[config_.command] =
-        lagged(second_lag_, kSecondTimeConstant, inputs[config_.command], inputs[config_.command], prime);
+    const double sent = inputs[config_.command];
+    filtered[config_.command] = lagged(second_lag_, kSecondTimeConstant, sent, sent);
     inputs = filtered;
   }
 
   // At rest after a reset: no load on the supply yet known, so the law comes first with a full one.
-  if (sag_ >= 0 && prime) {
+  if (sag_ >= 0 && at.prime) {
     const double wanted = enable * Request(m, inputs, seen, speed, supply_now);
     const double load = Load(m, wanted, LimitsAt(m, wanted, speed), supply_now);
     d->act[sag_] = std::min(load, 1 / (1 + Parameter(m, kSagFraction)));
@@ -215,30 +244,15 @@ void Motor::Compute(const mjModel* m, mjData* d, int) const {
   double torque = Request(m, inputs, seen, speed, supply_now * ceiling);
   for (const auto& [act, constant] : {std::pair{lag_, kTimeConstant}, std::pair{second_lag_, kSecondTimeConstant}}) {
     if (act < 0 || (act == second_lag_ && amplifier)) continue;
-    torque = lagged(act, constant, enable * torque, torque, prime);
+    torque = lagged(act, constant, enable * torque, torque);
   }
   torque *= enable;
 
-  // What the drive cannot or does not do.
+  // What the drive cannot or does not do, what it estimates, and what it does not know.
   if (dead_zone_ && !config_.dead_zone_on_command) torque = DeadZone(torque, Parameter(m, kDeadZone));
-  if (limits_) {
-    const Limits limits = LimitsAt(m, torque, speed);
-    torque = softness_
-                 ? SoftLimit(torque, ceiling * (torque > 0 ? limits.high : -limits.low), Parameter(m, kLimitSoftness))
-                 : mju_clip(torque, limits.low * ceiling, limits.high * ceiling);
-    if (sag_ >= 0) {
-      const Lag lag(std::max(Parameter(m, kSagTimeConstant), step), step, staged);
-      d->act_dot[sag_] = lag.Derivative(d->act[sag_], Load(m, torque, limits, supply_now));
-    }
-  }
-  if (!later) slots[MotorState::kEstimate] = torque;
-
-  // What it does not know.
-  if (droop_)
-    torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference), Parameter(m, kDroopExponent));
-  if (asymmetry_) torque *= 1 + (torque > 0 ? 1 : -1) * Parameter(m, kAsymmetry);
-  if (efficiency_) torque *= Parameter(m, torque * speed < 0 ? kEfficiencyBackdrive : kEfficiencyDrive);
-  d->actuator_force[output_] = torque;
+  if (limits_) torque = Limited(at, torque, speed, supply_now, ceiling);
+  if (!at.later) at.slots[MotorState::kEstimate] = torque;
+  d->actuator_force[output_] = Delivered(m, torque, speed);
 }
 
 void Motor::Advance(const mjModel*, mjData* d) const {

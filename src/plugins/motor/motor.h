@@ -35,11 +35,24 @@ class Motor {
     double low, high;
   };
 
+  // One evaluation of the forces.
+  struct Stage {
+    const mjModel* m;
+    mjData* d;
+    double* slots;  // of plugin_state
+    bool staged;    // the integrator evaluates forces within a step
+    bool later;     // and this one is not the step's first
+    bool prime;     // the first one after a reset
+  };
+
+  Stage Open(const mjModel* m, mjData* d) const;
   double Parameter(const mjModel* m, MotorParameter p) const { return config_.live(m, p); }
   double Input(const double* inputs, MotorRole role, double otherwise) const {
     return config_.input_of[role] >= 0 ? inputs[config_.input_of[role]] : otherwise;
   }
   void ReadCommands(const mjModel* m, const mjData* d, double* command) const;
+  // What the servo's computer knows, delays behind: of the motion, and in `late` of the commands.
+  Motion Late(const Stage& at, Motion present, const double* command, double* late) const;
   // The law. `inputs` and `seen` are what the servo's computer has, maybe late; `speed` and `supply` are there now.
   double Request(const mjModel* m, const double* inputs, Motion seen, double speed, double supply) const;
   double Winding(const mjModel* m, double voltage, double speed) const;
@@ -47,6 +60,11 @@ class Motor {
   Limits LimitsAt(const mjModel* m, double torque, double speed) const;
   // |torque| as a share of the drive's ceiling, 0..1.
   double Load(const mjModel* m, double torque, const Limits& limits, double supply) const;
+
+  // The torque within the limits, which sag to `ceiling` of theirs; the sag's derivative is written.
+  double Limited(const Stage& at, double torque, double speed, double supply, double ceiling) const;
+  // What of an estimated torque reaches the joint.
+  double Delivered(const mjModel* m, double torque, double speed) const;
 
   MotorConfig config_;
   bool inert_ = false;

@@ -12,9 +12,17 @@
 namespace gapscope {
 namespace {
 
-// One log. False after a divergence; `sent` and predictions are NaN from there on.
+// What becomes of one log.
+struct LoopTraces {
+  LogReplay* log;
+  std::vector<double>* sent;
+  std::size_t* steps;
+};
+
+// One log. False after a divergence; what was sent and predictions are NaN from there on.
 bool RunLoop(const Model& model, const Recording& recording, Controller& controller, const ReplayOptions& options,
-             LogReplay* log, std::vector<double>* sent, std::size_t* steps) {
+             LoopTraces out) {
+  const auto& [log, sent, steps] = out;
   const std::vector<double> values = options.values.empty() ? model.Nominal() : options.values;
   Simulator simulator(model, options.time_step_s);
   sent->assign(recording.rows(), kNaN);
@@ -126,7 +134,7 @@ Result<ClosedLoopResult> ReplayClosedLoop(const Model& model, const std::vector<
   pool.ForEach(recordings.size(), [&](std::size_t i, int) {
     LogReplay& log = closed.result.logs[i];
     log.windows = 1;
-    if (RunLoop(model, recordings[i], controllers[i], options, &log, &closed.sent[i], &steps[i])) return;
+    if (RunLoop(model, recordings[i], controllers[i], options, {&log, &closed.sent[i], &steps[i]})) return;
     log.outcome = Outcome::kDiverged;
     log.diverged_windows = 1;
   });

@@ -195,6 +195,38 @@ Result<ControllerSpec> LoadController(const Experiment& experiment) {
   return spec;
 }
 
+// What a text of the spec stands for: a number, or a column of the log, which is read when the first one asks for it.
+class Controller::Binder {
+ public:
+  Binder(const Experiment& experiment, const Recording& recording) : experiment_(experiment), recording_(recording) {}
+
+  // `what` names the text in an error.
+  Result<Source> Bind(const std::string& text, const std::string& what) {
+    Source source;
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), source.constant);
+    if (parsed.ec == std::errc() && parsed.ptr == text.data() + text.size() && std::isfinite(source.constant))
+      return source;
+    if (!log_) {
+      GS_ASSIGN(log_, ReadLog(recording_.log_path, experiment_.read));
+    }
+    const Column* column = log_->Find(text);
+    if (!column)
+      return Error{.what = what + " is neither a column of the log nor a number",
+                   .where = recording_.log_path,
+                   .actual = "'" + text + "'",
+                   .cure = "see 'controller:' in " + experiment_.path};
+    GS_ASSIGN(source.column,
+              ExtractColumn(*log_, recording_.timeline, *column,
+                            {.factor = 1, .offset = 0, .missing = experiment_.timeline.missing}, nullptr));
+    return source;
+  }
+
+ private:
+  const Experiment& experiment_;
+  const Recording& recording_;
+  std::optional<Log> log_;
+};
+
 Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment& experiment,
                                     const Recording& recording) {
   Controller controller;
@@ -203,26 +235,7 @@ Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     if (recording.commands[c].actuator == spec.actuator) controller.command_ = c;
   }
-  std::optional<Log> log;
-  const auto bind = [&](const std::string& text, const std::string& what) -> Result<Source> {
-    Source source;
-    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), source.constant);
-    if (parsed.ec == std::errc() && parsed.ptr == text.data() + text.size() && std::isfinite(source.constant))
-      return source;
-    if (!log) {
-      GS_ASSIGN(log, ReadLog(recording.log_path, experiment.read));
-    }
-    const Column* column = log->Find(text);
-    if (!column)
-      return Error{.what = what + " is neither a column of the log nor a number",
-                   .where = recording.log_path,
-                   .actual = "'" + text + "'",
-                   .cure = "see 'controller:' in " + experiment.path};
-    GS_ASSIGN(source.column,
-              ExtractColumn(*log, recording.timeline, *column,
-                            {.factor = 1, .offset = 0, .missing = experiment.timeline.missing}, nullptr));
-    return source;
-  };
+  Binder binder(experiment, recording);
   for (const auto& input : spec.inputs) {
     const auto signal = std::find_if(recording.measured.begin(), recording.measured.end(),
                                      [&](const auto& m) { return m.spec.signal == input.signal; });
@@ -235,7 +248,7 @@ Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment
                 .offset = input.offset,
                 .reference = {}};
     if (const auto reference = spec.references.find(input.name); reference != spec.references.end()) {
-      GS_ASSIGN(bound.reference, bind(reference->second, "the reference of '" + input.name + "'"));
+      GS_ASSIGN(bound.reference, binder.Bind(reference->second, "the reference of '" + input.name + "'"));
     }
     controller.inputs_.push_back(std::move(bound));
   }
@@ -246,7 +259,7 @@ Result<Controller> Controller::Make(const ControllerSpec& spec, const Experiment
   };
   for (const auto& term : spec.terms) controller.terms_.push_back(bound(term));
   if (!spec.feedforward.empty()) {
-    GS_ASSIGN(controller.feedforward_, bind(spec.feedforward, "the feedforward"));
+    GS_ASSIGN(controller.feedforward_, binder.Bind(spec.feedforward, "the feedforward"));
   }
   if (spec.swing_up) {
     controller.swing_input_ = IndexOf(spec.inputs, spec.swing_up->input);

@@ -89,6 +89,8 @@ class Controller {
     int to = -1;
     double last_error = 0, derivative = 0, integral = 0;
   };
+  class Binder;  // texts of a spec to sources
+
   Controller() = default;
   double Evaluate(Term& term, double error, double period_s) const;
   // Outer loops first: what they ask for moves the inner references.

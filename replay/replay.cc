@@ -42,6 +42,57 @@ double LogError(const LogReplay& log) {
   return signals == 0 ? kNaN : std::sqrt(sum / signals);
 }
 
+// What one worker keeps from window to window.
+struct Replayer {
+  std::unique_ptr<Simulator> simulator;
+  std::size_t last_log = std::numeric_limits<std::size_t>::max();
+  bool valid = true;  // the values make a model for the last log
+  std::vector<double> predicted, poses;
+};
+
+// One replay: what all of its windows share.
+struct Replays {
+  const Model& model;
+  const std::vector<Recording>& recordings;
+  const ReplayOptions& options;
+  const std::vector<double> values;
+  double time_step_s;
+
+  // Simulates a window, and writes it into its log's replay.
+  RunResult Run(const Job& job, Replayer& worker, LogReplay* log) const {
+    const Recording& recording = recordings[job.log];
+    if (!worker.simulator) worker.simulator = std::make_unique<Simulator>(model, time_step_s);
+    if (worker.last_log != job.log) {
+      worker.valid = worker.simulator->SetParameters(values, recording);
+      worker.last_log = job.log;
+    }
+    const std::size_t signals = recording.measured.size(), nq = static_cast<std::size_t>(model.compiled().nq);
+    std::vector<double>& buffer = worker.predicted;
+    if (buffer.size() < job.window.rows() * signals) buffer.resize(job.window.rows() * signals);
+    RunResult run;
+    if (worker.valid) {
+      worker.poses.resize(options.keep_poses ? job.window.rows() * nq : 0);
+      run = worker.simulator->Run(recording, job.window, InitialStateAt(model, recording, job.window.begin, values),
+                                  buffer, worker.poses);
+      // Windows share a stamp: the later one begins there, and its own pose is the one that counts.
+      const std::size_t last = job.window.end == recording.rows() ? job.window.rows() : job.window.rows() - 1;
+      if (options.keep_poses)
+        std::copy_n(worker.poses.begin(), last * nq,
+                    log->qpos.begin() + static_cast<std::ptrdiff_t>(job.window.begin * nq));
+    } else {
+      run.outcome = Outcome::kDiverged;
+      std::fill(buffer.begin(), buffer.end(), kNaN);
+    }
+    // A window's first row is its initial state: it says nothing about the model.
+    const std::size_t first = job.window.begin == 0 && options.mode == ReplayMode::kFreeRun ? 0 : 1;
+    for (std::size_t s = 0; s < signals; ++s) {
+      auto& predicted = log->signals[s].predicted;
+      for (std::size_t r = first; r < job.window.rows(); ++r) predicted[job.window.begin + r] = buffer[r * signals + s];
+    }
+    return run;
+  }
+};
+
 }  // namespace
 
 LogReplay EmptyTraces(const Recording& recording) {
@@ -94,7 +145,6 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
                     ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
   ReplayResult result{.mode = options.mode};
-  const std::vector<double> values = options.values.empty() ? model.Nominal() : options.values;
   if (options.time_step_s > 0) {
     result.time_step_s = options.time_step_s;
     result.time_step_error = kNaN;
@@ -103,49 +153,23 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
     result.time_step_s = chosen.step_s;
     result.time_step_error = chosen.error_change;
   }
-  const std::size_t nq = static_cast<std::size_t>(model.compiled().nq);
   std::vector<Job> jobs;
   for (std::size_t log = 0; log < recordings.size(); ++log) {
     result.logs.push_back(EmptyTraces(recordings[log]));
-    if (options.keep_poses) result.logs.back().qpos.assign(recordings[log].rows() * nq, kNaN);
+    if (options.keep_poses)
+      result.logs.back().qpos.assign(recordings[log].rows() * static_cast<std::size_t>(model.compiled().nq), kNaN);
     for (const Window& window : MakeWindows(recordings[log], options.mode, options.window_s))
       jobs.push_back({log, window});
   }
-  std::vector<std::unique_ptr<Simulator>> simulators(pool.workers());
-  std::vector<std::size_t> last_log(pool.workers(), std::numeric_limits<std::size_t>::max());
-  std::vector<std::vector<double>> buffers(pool.workers()), poses(pool.workers());
-  std::vector<char> valid(pool.workers(), 1);
+  const Replays replays{.model = model,
+                        .recordings = recordings,
+                        .options = options,
+                        .values = options.values.empty() ? model.Nominal() : options.values,
+                        .time_step_s = result.time_step_s};
+  std::vector<Replayer> workers(pool.workers());
   std::vector<RunResult> runs(jobs.size());
   pool.ForEach(jobs.size(), [&](std::size_t index, int worker) {
-    const Job& job = jobs[index];
-    const Recording& recording = recordings[job.log];
-    if (!simulators[worker]) simulators[worker] = std::make_unique<Simulator>(model, result.time_step_s);
-    if (last_log[worker] != job.log) {
-      valid[worker] = simulators[worker]->SetParameters(values, recording) ? 1 : 0;
-      last_log[worker] = job.log;
-    }
-    const std::size_t signals = recording.measured.size();
-    auto& buffer = buffers[worker];
-    if (buffer.size() < job.window.rows() * signals) buffer.resize(job.window.rows() * signals);
-    if (valid[worker]) {
-      poses[worker].resize(options.keep_poses ? job.window.rows() * nq : 0);
-      runs[index] = simulators[worker]->Run(
-          recording, job.window, InitialStateAt(model, recording, job.window.begin, values), buffer, poses[worker]);
-      // Windows share a stamp: the later one begins there, and its own pose is the one that counts.
-      const std::size_t last = job.window.end == recording.rows() ? job.window.rows() : job.window.rows() - 1;
-      if (options.keep_poses)
-        std::copy_n(poses[worker].begin(), last * nq,
-                    result.logs[job.log].qpos.begin() + static_cast<std::ptrdiff_t>(job.window.begin * nq));
-    } else {
-      runs[index].outcome = Outcome::kDiverged;
-      std::fill(buffer.begin(), buffer.end(), kNaN);
-    }
-    // A window's first row is its initial state: it says nothing about the model.
-    const std::size_t first = job.window.begin == 0 && options.mode == ReplayMode::kFreeRun ? 0 : 1;
-    for (std::size_t s = 0; s < signals; ++s) {
-      auto& predicted = result.logs[job.log].signals[s].predicted;
-      for (std::size_t r = first; r < job.window.rows(); ++r) predicted[job.window.begin + r] = buffer[r * signals + s];
-    }
+    runs[index] = replays.Run(jobs[index], workers[worker], &result.logs[jobs[index].log]);
   });
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     LogReplay& log = result.logs[jobs[i].log];

@@ -87,6 +87,56 @@ float Apart(const mjvGeom& a, const mjvGeom& b) {
   return std::sqrt(centres) + size * std::sqrt(turn / 2);
 }
 
+struct CameraAxes {
+  Vector right, up, forward;
+};
+
+CameraAxes AxesOf(const Framing& framing) {
+  const double azimuth = framing.azimuth_deg * mjPI / 180, elevation = framing.elevation_deg * mjPI / 180;
+  const Vector forward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                          std::sin(elevation)};
+  const Vector right = {std::sin(azimuth), -std::cos(azimuth), 0};
+  const Vector up = {right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2],
+                     right[0] * forward[1] - right[1] * forward[0]};
+  return {.right = right, .up = up, .forward = forward};
+}
+
+// Corners of what moves in the camera's axes, of poses along the tracks. `about_centre`: about the middle of each pose,
+// where a camera that follows looks; `first` becomes that of the first pose.
+std::vector<Vector> CornersSeen(const mjModel& model, mjData& d, std::span<const PoseTrack* const> tracks,
+                                bool about_centre, const CameraAxes& axes, Vector* first) {
+  std::vector<Vector> seen;
+  std::vector<double> qpos(static_cast<std::size_t>(model.nq));
+  for (const PoseTrack* track : tracks) {
+    if (track->time_s.empty()) continue;
+    for (int k = 0; k < kSampledPoses; ++k) {
+      const double t = track->time_s.front() + (track->time_s.back() - track->time_s.front()) * k / (kSampledPoses - 1);
+      if (!PoseAt(model, *track, t, qpos)) continue;
+      SetPose(model, d, qpos);
+      const Vector about = about_centre ? MovingCentre(model, d) : Vector{};
+      if (seen.empty()) *first = about;
+      for (int g = 0; g < model.ngeom; ++g) {
+        if (!Moves(model, g)) continue;
+        ForEachCorner(model, d, g, [&](const Vector& p) {
+          const Vector q = {p[0] - about[0], p[1] - about[1], p[2] - about[2]};
+          seen.push_back({Dot(q, axes.right), Dot(q, axes.up), Dot(q, axes.forward)});
+        });
+      }
+    }
+  }
+  return seen;
+}
+
+// How far what is drawn reaches about a point on the ground: a table of that size holds all of the mechanism.
+double ReachAbout(const mjModel& model, const mjData& d, double x, double y) {
+  double reach = 0;
+  for (int g = 0; g < model.ngeom; ++g) {
+    if (model.geom_type[g] == mjGEOM_PLANE || model.geom_type[g] == mjGEOM_HFIELD) continue;
+    ForEachCorner(model, d, g, [&](const Vector& p) { reach = std::max(reach, std::hypot(p[0] - x, p[1] - y)); });
+  }
+  return reach;
+}
+
 }  // namespace
 
 template <>
@@ -102,34 +152,9 @@ Framing FrameMotion(const mjModel& model, std::span<const PoseTrack* const> trac
   mjData& d = *data;
   SetPose(model, d, std::span<const double>(model.qpos0, static_cast<std::size_t>(model.nq)));
   PointCamera(model, d, framing);
-  const double azimuth = framing.azimuth_deg * mjPI / 180, elevation = framing.elevation_deg * mjPI / 180;
-  const Vector forward = {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
-                          std::sin(elevation)};
-  const Vector right = {std::sin(azimuth), -std::cos(azimuth), 0};
-  const Vector up = {right[1] * forward[2] - right[2] * forward[1], right[2] * forward[0] - right[0] * forward[2],
-                     right[0] * forward[1] - right[1] * forward[0]};
-
-  // Corners of what moves in the camera's axes; kTracking: about the middle of each pose, where the camera looks.
-  std::vector<Vector> seen;
+  const CameraAxes axes = AxesOf(framing);
   Vector first{};
-  std::vector<double> qpos(static_cast<std::size_t>(model.nq));
-  for (const PoseTrack* track : tracks) {
-    if (track->time_s.empty()) continue;
-    for (int k = 0; k < kSampledPoses; ++k) {
-      const double t = track->time_s.front() + (track->time_s.back() - track->time_s.front()) * k / (kSampledPoses - 1);
-      if (!PoseAt(model, *track, t, qpos)) continue;
-      SetPose(model, d, qpos);
-      const Vector about = view == View::kTracking ? MovingCentre(model, d) : Vector{};
-      if (seen.empty()) first = about;
-      for (int g = 0; g < model.ngeom; ++g) {
-        if (!Moves(model, g)) continue;
-        ForEachCorner(model, d, g, [&](const Vector& p) {
-          const Vector q = {p[0] - about[0], p[1] - about[1], p[2] - about[2]};
-          seen.push_back({Dot(q, right), Dot(q, up), Dot(q, forward)});
-        });
-      }
-    }
-  }
+  const std::vector<Vector> seen = CornersSeen(model, d, tracks, view == View::kTracking, axes, &first);
   if (seen.empty()) {
     for (int i = 0; i < 3; ++i) framing.centre[static_cast<std::size_t>(i)] = model.stat.center[i];
     framing.distance_m = 1.5 * model.stat.extent;
@@ -151,17 +176,8 @@ Framing FrameMotion(const mjModel& model, std::span<const PoseTrack* const> trac
         distance, std::max(std::abs(p[0] - middle[0]) / wide, std::abs(p[1] - middle[1]) / tall) - (p[2] - middle[2]));
   framing.distance_m = distance * (view == View::kTracking ? kTrackingZoom : 1);
   for (std::size_t i = 0; i < 3; ++i)
-    framing.centre[i] = first[i] + middle[0] * right[i] + middle[1] * up[i] + middle[2] * forward[i];
-
-  // A table that all of the mechanism stands on.
-  double reach = 0;
-  for (int g = 0; g < model.ngeom; ++g) {
-    if (model.geom_type[g] == mjGEOM_PLANE || model.geom_type[g] == mjGEOM_HFIELD) continue;
-    ForEachCorner(model, d, g, [&](const Vector& p) {
-      reach = std::max(reach, std::hypot(p[0] - framing.centre[0], p[1] - framing.centre[1]));
-    });
-  }
-  framing.ground_m = 1.7 * reach;
+    framing.centre[i] = first[i] + middle[0] * axes.right[i] + middle[1] * axes.up[i] + middle[2] * axes.forward[i];
+  framing.ground_m = 1.7 * ReachAbout(model, d, framing.centre[0], framing.centre[1]);
   return framing;
 }
 

@@ -165,14 +165,9 @@ double Simulator::Read(const SignalSource& source) const {
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
-RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,
-                         std::span<double> predicted, std::span<double> qpos) {
-  mjModel* m = mujoco_.get();
+void Simulator::Begin(const Recording& recording, Window window, const InitialState& start) {
+  const mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  const std::size_t signals = recording.measured.size();
-  GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= window.rows() * signals);
-  const std::size_t nq = static_cast<std::size_t>(m->nq);
-  GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
   mj_resetData(m, d);
   std::fill(held_.begin(), held_.end(), window.begin);
   from_nothing_ = false;
@@ -193,11 +188,34 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     d->qvel[m->jnt_dofadr[joint]] += apart_[i].second;
   }
   d->time = recording.time_s[window.begin];
-
   // Torques cost a pass over the actuators at each stamp: only when this log has one.
   reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(),
                               [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
+}
 
+int Simulator::StepToNext(const Recording& recording, std::size_t row) {
+  mjModel* m = mujoco_.get();
+  const double now = recording.time_s[row], interval = recording.time_s[row + 1] - now;
+  const int steps = StepsOver(interval, max_step_s_);
+  m->opt.timestep = interval / steps;
+  if (command_delay_s_ == 0) SetCommands(recording, row, now, now);
+  for (int step = 0; step < steps; ++step) {
+    if (command_delay_s_ != 0)
+      SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
+    mj_step(m, data_.get());
+  }
+  return steps;
+}
+
+RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,
+                         std::span<double> predicted, std::span<double> qpos) {
+  const mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  const std::size_t signals = recording.measured.size();
+  GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= window.rows() * signals);
+  const std::size_t nq = static_cast<std::size_t>(m->nq);
+  GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
+  Begin(recording, window, start);
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];
@@ -216,16 +234,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       std::copy(d->qpos, d->qpos + nq, qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin) * nq));
     if (row + 1 == window.end) break;
 
-    const double interval = recording.time_s[row + 1] - now;
-    const int steps = StepsOver(interval, max_step_s_);
-    m->opt.timestep = interval / steps;
-    if (command_delay_s_ == 0) SetCommands(recording, row, now, now);
-    for (int step = 0; step < steps; ++step) {
-      if (command_delay_s_ != 0)
-        SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
-      mj_step(m, d);
-    }
-    result.steps += static_cast<std::size_t>(steps);
+    result.steps += static_cast<std::size_t>(StepToNext(recording, row));
     if (!IsSane(*m, *d)) {
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;

@@ -63,6 +63,10 @@ class Simulator {
   mjData& data() { return *data_; }
 
  private:
+  // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp.
+  void Begin(const Recording& recording, Window window, const InitialState& start);
+  // From a row's stamp to the next one's, under its commands. Returns the steps that it took.
+  int StepToNext(const Recording& recording, std::size_t row);
   void PreRoll(const Recording& recording, Window window);
   // How far back the states of a run remember.
   double Past() const;

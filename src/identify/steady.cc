@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/plateaus.h"
 #include "src/identify/regression.h"

@@ -17,8 +17,8 @@ double Quantile(std::vector<double> values, double share);
 // The middle value, of an even number the upper of the two; NaN of none.
 double Median(std::vector<double> values);
 
-// 97.5 % quantile of Student's t with `freedom` degrees of freedom (Abramowitz & Stegun 26.7.5 with three terms; up to 3
-// the value of the next whole number).
+// 97.5 % quantile of Student's t with `freedom` degrees of freedom (Abramowitz & Stegun 26.7.5 with three terms; up to
+// 3 the value of the next whole number).
 double StudentQuantile(double freedom);
 
 }  // namespace gapscope

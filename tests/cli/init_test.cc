@@ -20,7 +20,8 @@ constexpr const char* kArm = R"(<mujoco model="two_link">
       <body name="fore" pos="0.3 0 0">
         <joint name="elbow" axis="0 0 1" damping="0.2" armature="0.01"/>
         <inertial pos="0.1 0 0" mass="0.5" diaginertia="0.004 0.004 0.004"/>
-        <body name="hand" pos="0.2 0 0"><joint name="wrist" type="slide" axis="1 0 0" damping="5" stiffness="100"/><inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/></body>
+        <body name="hand" pos="0.2 0 0"><joint name="wrist" type="slide" axis="1 0 0" damping="5" stiffness="100"/>
+          <inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/></body>
       </body>
     </body>
   </worldbody>

@@ -17,7 +17,8 @@ commands:
   - {actuator: motor, column: u, unit: mV, add: 0.5}
   - {actuator: aux, default: log.kp * 2}
 measured:
-  - {signal: q, column: q, joint: hinge, unit: deg, scale: -1, resolution: 0.001, wrap: 6.283185307179586, offset: hinge.offset}
+  - {signal: q, column: q, joint: hinge, unit: deg, scale: -1, resolution: 0.001, wrap: 6.283185307179586,)"
+                                               R"( offset: hinge.offset}
   - {signal: w, columns: [speed, w], kind: velocity, joint: hinge, optional: true, score: false}
   - {signal: tau, column: tau, kind: torque, actuator: motor, unit: N m, optional: true}
 parameters:

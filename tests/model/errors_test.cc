@@ -10,8 +10,10 @@ namespace {
 constexpr const char* kRobot = R"(<mujoco>
   <option><flag contact="disable"/></option>
   <worldbody>
-    <body name="bar"><joint name="hinge" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
-    <body name="ball" pos="1 0 0"><joint name="ball" type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
+    <body name="bar"><joint name="hinge" axis="0 1 0"/>
+      <inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
+    <body name="ball" pos="1 0 0"><joint name="ball" type="ball"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
   </worldbody>
   <actuator><motor name="motor" joint="hinge"/></actuator>
 </mujoco>)";

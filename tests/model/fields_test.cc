@@ -17,7 +17,8 @@ constexpr const char* kRobot = R"(<mujoco>
   <custom><numeric name="any" data="1 2"/></custom>
   <worldbody>
     <body name="arm" pos="0 0 1">
-      <joint name="hinge" type="hinge" axis="0 1 0" damping="0.1 0.05" frictionloss="0.02" armature="0.01" stiffness="0.3" springref="0.1"/>
+      <joint name="hinge" type="hinge" axis="0 1 0" damping="0.1 0.05" frictionloss="0.02" armature="0.01"
+        stiffness="0.3" springref="0.1"/>
       <inertial pos="0.2 0 0" mass="0.5" diaginertia="0.002 0.003 0.002"/>
       <body name="sled" pos="0.4 0 0">
         <joint name="slide" type="slide" axis="1 0 0" damping="2" stiffness="50"/>
@@ -27,7 +28,8 @@ constexpr const char* kRobot = R"(<mujoco>
     <body name="free" pos="3 0 1"><freejoint name="free"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>
   </worldbody>
   <tendon>
-    <fixed name="belt" stiffness="3" damping="0.2" springlength="0.01 0.02" limited="true" range="-0.6 0.6"><joint joint="hinge" coef="1"/><joint joint="slide" coef="2"/></fixed>
+    <fixed name="belt" stiffness="3" damping="0.2" springlength="0.01 0.02" limited="true" range="-0.6 0.6">
+      <joint joint="hinge" coef="1"/><joint joint="slide" coef="2"/></fixed>
   </tendon>
   <actuator>
     <position name="servo" joint="hinge" kp="4" kv="0.3" forcerange="-3 3"/>

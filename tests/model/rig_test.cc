@@ -16,18 +16,23 @@ constexpr const char* kMjcf = R"(<mujoco>
   <compiler angle="radian"/>
   <extension>
     <plugin plugin="gapscope.motor">
-      <instance name="duty"><config key="law" value="duty"/><config key="duty_gain" value="2"/><config key="kt" value="1"/>
+      <instance name="duty"><config key="law" value="duty"/><config key="duty_gain" value="2"/>
+        <config key="kt" value="1"/>
         <config key="ke" value="1"/><config key="resistance" value="1"/><config key="supply_v" value="5"/></instance>
       <instance name="slack"><config key="kp" value="0"/></instance>
       <instance name="torque"><config key="law" value="torque"/></instance>
     </plugin>
   </extension>
   <worldbody>
-    <body name="a"><joint name="sprung" axis="0 0 1" stiffness="0.3"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
-    <body name="b"><joint name="rough" axis="0 0 1" frictionloss="0.1"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
-    <body name="c"><joint name="slide" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
+    <body name="a"><joint name="sprung" axis="0 0 1" stiffness="0.3"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
+    <body name="b"><joint name="rough" axis="0 0 1" frictionloss="0.1"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
+    <body name="c"><joint name="slide" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/>
+      </body>
     <body name="d"><joint name="ball" type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
-    <body name="e"><joint name="free_one" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/></body>
+    <body name="e"><joint name="free_one" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/>
+      </body>
   </worldbody>
   <actuator>
     <position name="servo" joint="sprung" kp="2"/>

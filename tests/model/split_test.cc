@@ -18,7 +18,8 @@ constexpr const char* kRobot = R"(<mujoco>
     <body name="arm">
       <joint name="hinge" axis="0 0 1" pos="0.05 0 0" armature="0.004" damping="0.02"/>
       <inertial pos="0.35 0.4 0" mass="2" diaginertia="0.03 0.02 0.01" euler="0 1.5707963267948966 0"/>
-      <body name="tip" pos="0.5 0 0"><joint name="slide" type="slide" axis="1 0 0" damping="1" stiffness="40"/><inertial pos="0 0 0" mass="0.3" diaginertia="0.001 0.001 0.001"/></body>
+      <body name="tip" pos="0.5 0 0"><joint name="slide" type="slide" axis="1 0 0" damping="1" stiffness="40"/>
+        <inertial pos="0 0 0" mass="0.3" diaginertia="0.001 0.001 0.001"/></body>
     </body>
   </worldbody>
   <actuator><motor name="motor" joint="hinge"/><motor name="pusher" joint="slide"/></actuator>
@@ -116,8 +117,10 @@ struct Disc {
   Disc() {
     experiment = MakeExperiment(
         scratch,
-        R"(<mujoco><compiler angle="radian"/><option timestep="0.0002" gravity="0 0 0" integrator="RK4"><flag contact="disable"/></option>
-<worldbody><body><joint name="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody>
+        R"(<mujoco><compiler angle="radian"/><option timestep="0.0002" gravity="0 0 0" integrator="RK4">
+          <flag contact="disable"/></option>
+<worldbody><body><joint name="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
+  </body></worldbody>
 <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>)",
         "commands:\n  - {actuator: motor, column: u, unit: N m}\nmeasured:\n  - {signal: q, column: q, joint: hinge, "
         "unit: rad}\n");

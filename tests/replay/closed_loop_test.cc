@@ -249,14 +249,16 @@ class SwingUpTest : public ClosedLoopTest {
 
 TEST_F(SwingUpTest, EnergyLawIsCaughtAndHeld) {
   ExpectHeldUpright(
-      R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8, gain: -2000, inertia_kg_m2: 1.33e-4, torque_n_m: 0.01519, filter_rad_per_s: 200, limit: 6,
+      R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8, gain: -2000, inertia_kg_m2: 1.33e-4,
+    torque_n_m: 0.01519, filter_rad_per_s: 200, limit: 6,
     arm: theta, arm_speed: 0.042, terms: [{input: theta, proportional: 8, derivative: 0.2, filter_rad_per_s: 50}]}
 )");
 }
 
 TEST_F(SwingUpTest, StateFeedbackIsCaughtAndHeld) {
   ExpectHeldUpright(R"(  swing_up: {input: alpha, catch_rad: 0.35, drop_rad: 0.8,
-    terms: [{input: alpha, derivative: -0.12, to: theta}, {input: theta, proportional: 6, derivative: 0.3, filter_rad_per_s: 50}]}
+    terms: [{input: alpha, derivative: -0.12, to: theta},
+            {input: theta, proportional: 6, derivative: 0.3, filter_rad_per_s: 50}]}
 )");
 }
 

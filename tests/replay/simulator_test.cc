@@ -276,9 +276,11 @@ TEST(SimulatorMemoryTest, AMotorRemembersBesideAnActuatorWithoutControls) {
   const Scratch scratch;
   const auto predicted = [&](const std::string& beside) {
     const std::string mjcf =
-        R"(<mujoco><option timestep="0.001" gravity="0 0 0"/><extension><plugin plugin="gapscope.motor"><instance name="drive">
+        R"(<mujoco><option timestep="0.001" gravity="0 0 0"/><extension><plugin plugin="gapscope.motor">
+          <instance name="drive">
           <config key="law" value="torque"/><config key="torque_delay_s" value="0.02"/></instance></plugin></extension>
-        <worldbody><body><joint name="hinge" damping="0.05"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body>
+        <worldbody><body><joint name="hinge" damping="0.05"/>
+          <inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body>
           <body><joint name="other"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>
         <actuator>)" +
         beside + R"(<plugin name="motor" joint="hinge" plugin="gapscope.motor" instance="drive"/></actuator></mujoco>)";

@@ -313,20 +313,5 @@ TEST(MostTellingTest, KeepsWhatIsClearOfItsTimeAndSortsIt) {
   EXPECT_TRUE(MostTelling({}).empty());
 }
 
-TEST(ConditionsTest, Quick) {
-  const TestLog log = WithNoise(Sine(), 1);
-  double best_ms = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < 5; ++round) {
-    const auto start = std::chrono::steady_clock::now();
-    const auto shares = LocateError(log.Input());
-    const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
-    best_ms = std::min(best_ms, wall.count());
-  }
-  printf("5000 rows: %.2f ms\n", best_ms);
-#if defined(__OPTIMIZE__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  EXPECT_LT(best_ms, 50);
-#endif
-}
-
 }  // namespace
 }  // namespace gapscope

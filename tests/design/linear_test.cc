@@ -67,8 +67,12 @@ TEST(LqrTest, RefusesWhatCannotBeStabilised) {
   MatrixXd a(2, 2), b(2, 1);
   a << 1, 0, 0, -1;
   b << 0, 1;  // the unstable mode is out of reach
-  EXPECT_FALSE(Lqr(a, b, MatrixXd::Identity(2, 2), MatrixXd::Identity(1, 1)).ok());
-  EXPECT_FALSE(Lqr(a, b, MatrixXd::Identity(2, 2), -MatrixXd::Identity(1, 1)).ok());
+  const auto out_of_reach = Lqr(a, b, MatrixXd::Identity(2, 2), MatrixXd::Identity(1, 1));
+  ASSERT_FALSE(out_of_reach.ok());
+  EXPECT_EQ(out_of_reach.error().what, "no stabilising feedback exists");
+  const auto negative = Lqr(a, b, MatrixXd::Identity(2, 2), -MatrixXd::Identity(1, 1));
+  ASSERT_FALSE(negative.ok());
+  EXPECT_EQ(negative.error().what, "the weights are not positive");
 }
 
 TEST(PlacePolesTest, PutsThemWhereAsked) {
@@ -87,7 +91,9 @@ TEST(PlacePolesTest, PutsThemWhereAsked) {
   ASSERT_TRUE(two.ok());
   EXPECT_NEAR(two.value().gain(0, 0), 25, 1e-9);
   EXPECT_NEAR(two.value().gain(0, 1), 6, 1e-9);
-  EXPECT_FALSE(PlacePoles(a2, b2, {{-3, 4}, {-3, 4}}).ok());
+  const auto alone = PlacePoles(a2, b2, {{-3, 4}, {-3, 4}});
+  ASSERT_FALSE(alone.ok());
+  EXPECT_EQ(alone.error().what, "complex poles come in pairs");
   EXPECT_FALSE(PlacePoles(a2, b2, {{-3, 0}}).ok());
   MatrixXd unreachable(2, 1);
   unreachable << 1, 0;

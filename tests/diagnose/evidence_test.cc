@@ -38,7 +38,14 @@ TEST(EvidenceTest, SharedMisfitDoesNotHideAGain) {
   std::vector<double> a(40, 2.0), b(40, 1.0);
   a[7] = b[7] = 5e4;
   a[8] = 4e4, b[8] = 4.1e4;
-  EXPECT_GT(Compare(WithBlocks(a, a), WithBlocks(b, b)).z, 5);
+  // Of 80 ratios 76 are log(3/2), two are zero and two slightly against it: sums that far from chance count as ten.
+  const Evidence all = Compare(WithBlocks(a, a), WithBlocks(b, b));
+  EXPECT_NEAR(all.log_ratio, 76 * std::log(1.5) + 2 * std::log(40001.0 / 41001.0), 1e-9);
+  EXPECT_DOUBLE_EQ(all.z, 10);
+  // Ratios log(3/2), 0, log(3/2), 0: their sum is 2 log(3/2), its standard deviation sqrt(4/3) log(3/2).
+  const Evidence few = Compare(WithBlocks({2, 5e4}, {2, 5e4}), WithBlocks({1, 5e4}, {1, 5e4}));
+  EXPECT_NEAR(few.log_ratio, 2 * std::log(1.5), 1e-12);
+  EXPECT_NEAR(few.z, std::sqrt(3.0), 1e-12);
 }
 
 TEST(EvidenceTest, ChanceIsNotConvincing) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/dense.h"
 #include "src/core/names.h"
 #include "src/model/parameter_writer.h"
 
@@ -21,9 +22,7 @@ Eigen::MatrixXd SolveLyapunov(const Eigen::MatrixXd& a, const Eigen::MatrixXd& q
       }
     }
   }
-  const Eigen::VectorXd right = -Eigen::Map<const Eigen::VectorXd>(q.data(), n * n),
-                        solution = system.fullPivLu().solve(right);
-  const Eigen::MatrixXd x = Eigen::Map<const Eigen::MatrixXd>(solution.data(), n, n);
+  const Eigen::MatrixXd x = SolveLu(system, -q.reshaped()).reshaped(n, n);
   return 0.5 * (x + x.transpose());
 }
 
@@ -38,7 +37,7 @@ std::string PoleText(const std::vector<std::complex<double>>& poles) {
 }  // namespace
 
 std::vector<std::complex<double>> SortedPoles(const Eigen::MatrixXd& a) {
-  const Eigen::VectorXcd values = a.eigenvalues();
+  const Eigen::VectorXcd values = Eigenvalues(a);
   std::vector<std::complex<double>> poles(values.data(), values.data() + values.size());
   std::sort(poles.begin(), poles.end(), [](const auto& x, const auto& y) {
     return std::pair(-x.real(), x.imag()) < std::pair(-y.real(), y.imag());
@@ -109,19 +108,25 @@ Result<Feedback> Lqr(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const E
   const Eigen::Index n = a.rows();
   GS_CHECK(a.cols() == n && b.rows() == n && q.rows() == n && q.cols() == n && r.rows() == b.cols() &&
            r.cols() == b.cols());
-  if (!(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(r).eigenvalues().minCoeff() > 0) ||
-      !(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(q).eigenvalues().minCoeff() >= -1e-12 * q.norm())) {
+  if (!(SymmetricEigen(r).values.minCoeff() > 0) || !(SymmetricEigen(q).values.minCoeff() >= -1e-12 * q.norm())) {
     return Error{.what = "the weights are not positive", .where = "--q, --r", .allowed = "r above zero, q not below"};
   }
-  const Eigen::MatrixXd g = b * r.ldlt().solve(b.transpose());
+  const Ldlt weight(r);
+  const Eigen::MatrixXd g = b * weight.Solve(b.transpose());
   Eigen::MatrixXd hamiltonian(2 * n, 2 * n);
   hamiltonian << a, -g, -q, -a.transpose();
-  const Eigen::EigenSolver<Eigen::MatrixXd> eigen(hamiltonian);
-  Eigen::MatrixXcd stable(2 * n, n);
+  const GeneralEigen eigen(hamiltonian);
+  // Real and imaginary part of a pair's vectors span what the pair does.
+  Eigen::MatrixXd stable(2 * n, n);
   Eigen::Index found = 0;
-  const double size = eigen.eigenvalues().cwiseAbs().maxCoeff();
+  const double size = eigen.values.cwiseAbs().maxCoeff();
   for (Eigen::Index i = 0; i < 2 * n; ++i) {
-    if (eigen.eigenvalues()[i].real() < -1e-10 * size && found < n) stable.col(found++) = eigen.eigenvectors().col(i);
+    if (!(eigen.values[i].real() < -1e-10 * size) || found == n) continue;
+    if (eigen.values[i].imag() < 0) {
+      stable.col(found++) = eigen.vectors.col(i).imag();
+    } else {
+      stable.col(found++) = eigen.vectors.col(i).real();
+    }
   }
   const auto no_solution = [] {
     return Error{.what = "no stabilising feedback exists",
@@ -129,15 +134,15 @@ Result<Feedback> Lqr(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, const E
                  .cure = "weigh every position that does not come back by itself"};
   };
   if (found < n) return no_solution();
-  Eigen::MatrixXd p = (stable.bottomRows(n) * stable.topRows(n).fullPivLu().inverse()).real();
+  Eigen::MatrixXd p = SolveLu(stable.topRows(n).transpose(), stable.bottomRows(n).transpose());
   p = 0.5 * (p + p.transpose()).eval();
   // Newton's iteration on the Riccati equation takes what rounding left.
   for (int i = 0; i < 3; ++i) {
-    const Eigen::MatrixXd k = r.ldlt().solve(b.transpose() * p), closed = a - b * k;
-    if (!(closed.eigenvalues().real().maxCoeff() < 0)) return no_solution();
+    const Eigen::MatrixXd k = weight.Solve(b.transpose() * p), closed = a - b * k;
+    if (!(Eigenvalues(closed).real().maxCoeff() < 0)) return no_solution();
     p = SolveLyapunov(closed, q + k.transpose() * r * k);
   }
-  Feedback feedback{.gain = r.ldlt().solve(b.transpose() * p), .cost = p, .poles = {}};
+  Feedback feedback{.gain = weight.Solve(b.transpose() * p), .cost = p, .poles = {}};
   if (!feedback.gain.allFinite()) return no_solution();
   feedback.poles = SortedPoles(a - b * feedback.gain);
   if (!(feedback.poles.front().real() < 0)) return no_solution();
@@ -165,23 +170,22 @@ Result<Feedback> PlacePoles(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b,
   if (imaginary > 1e-9 * size)
     return Error{.what = "complex poles come in pairs", .where = "--poles", .actual = PoleText(poles)};
   // Time in units of the system's own speed keeps the powers of A of one size.
-  const double fastest = a.eigenvalues().cwiseAbs().maxCoeff(), rate = fastest > 0 ? fastest : 1;
+  const double fastest = Eigenvalues(a).cwiseAbs().maxCoeff(), rate = fastest > 0 ? fastest : 1;
   const Eigen::MatrixXd slow = a / rate;
   Eigen::MatrixXd controllability(n, n);
   Eigen::VectorXd column = b;
   for (Eigen::Index i = 0; i < n; ++i) controllability.col(i) = column, column = slow * column;
   const Eigen::VectorXd lengths = controllability.colwise().norm();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(controllability * lengths.cwiseInverse().asDiagonal());
-  if (!(lengths.minCoeff() > 0) || svd.singularValues()[n - 1] < 1e-10 * svd.singularValues()[0])
+  const Eigen::VectorXd sizes = SingularValues(controllability * lengths.cwiseInverse().asDiagonal());
+  if (!(lengths.minCoeff() > 0) || sizes[n - 1] < 1e-10 * sizes[0])
     return Error{.what = "the system is not controllable from this input", .where = "--poles"};
   Eigen::MatrixXd value = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t i = 0; i < polynomial.size(); ++i)
     value = value * slow +
             Eigen::MatrixXd::Identity(n, n) * (polynomial[i].real() / std::pow(rate, static_cast<double>(i)));
-  Eigen::RowVectorXd last = Eigen::RowVectorXd::Zero(n);
-  last[n - 1] = 1;
+  const Eigen::VectorXd last = Eigen::VectorXd::Unit(n, n - 1);
   Feedback feedback;
-  feedback.gain = rate * controllability.transpose().fullPivLu().solve(last.transpose()).transpose() * value;
+  feedback.gain = rate * SolveLu(controllability.transpose(), last).transpose() * value;
   feedback.poles = SortedPoles(a - b * feedback.gain);
   return feedback;
 }

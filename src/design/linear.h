@@ -2,7 +2,7 @@
 #ifndef GAPSCOPE_DESIGN_LINEAR_H_
 #define GAPSCOPE_DESIGN_LINEAR_H_
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <complex>
 #include <map>
 #include <string>

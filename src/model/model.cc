@@ -182,4 +182,12 @@ std::vector<double> Model::Nominal() const {
   return values;
 }
 
+std::vector<int> Model::FreeParameters() const {
+  std::vector<int> free;
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    if (!parameters_[i].frozen && parameters_[i].low < parameters_[i].high) free.push_back(static_cast<int>(i));
+  }
+  return free;
+}
+
 }  // namespace gapscope

@@ -48,6 +48,8 @@ class Model {
   // As IndexOf; error with the nearest name.
   Result<int> Find(const std::string& name, const std::string& where) const;
   std::vector<double> Nominal() const;
+  // What a fit moves unless told otherwise: indices of the parameters that are not frozen and have bounds.
+  std::vector<int> FreeParameters() const;
 
   const std::vector<int>& command_actuators() const { return command_ctrl_; }  // ctrl address per experiment command
   const SignalSource& source(std::size_t measured) const {

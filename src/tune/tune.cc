@@ -221,11 +221,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - when).count();
   };
   TuneOptions options = asked;
-  std::vector<int> free = options.free;
-  for (std::size_t i = 0; i < model.parameters().size() && options.free.empty(); ++i) {
-    if (!model.parameters()[i].frozen && model.parameters()[i].low < model.parameters()[i].high)
-      free.push_back(static_cast<int>(i));
-  }
+  const std::vector<int> free = options.free.empty() ? model.FreeParameters() : options.free;
   if (free.empty())
     return Error{.what = "no parameter is free", .where = model.experiment().path, .cure = "use --free NAME"};
   TuneSummary summary{.optimizer = options.solve.optimizer, .values = start, .split = data.how};

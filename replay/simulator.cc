@@ -81,12 +81,15 @@ LocalFit FitLater(const Recording& recording, const Recording::Measured& measure
 
 }  // namespace
 
+InitialState AtRest(const Model& model) {
+  const mjModel& m = model.compiled();
+  return {.qpos = {m.qpos0, m.qpos0 + m.nq}, .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
+}
+
 InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row,
                             std::span<const double> values) {
   const mjModel& m = model.compiled();
-  InitialState state;
-  state.qpos.assign(m.qpos0, m.qpos0 + m.nq);
-  state.qvel.assign(m.nv, 0.0);
+  InitialState state = AtRest(model);
   std::vector<bool> known(m.nv, false);
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);

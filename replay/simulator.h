@@ -32,6 +32,9 @@ struct InitialState {
   std::vector<double> qpos, qvel;
 };
 
+// The model's initial pose, at rest.
+InitialState AtRest(const Model& model);
+
 // Half width of the fit that gives the initial state from a log (see FitLocally).
 inline constexpr double kInitialFitHalfWidth_s = 0.02;
 

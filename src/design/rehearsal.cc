@@ -133,15 +133,11 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
 Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, const std::vector<double>& values) {
   Rehearsal rehearsal{.recording = std::move(input)};
   Recording& recording = rehearsal.recording;
-  const mjModel& m = model.compiled();
-  InitialState rest;
-  rest.qpos.assign(m.qpos0, m.qpos0 + m.nq);
-  rest.qvel.assign(m.nv, 0.0);
   const std::size_t signals = recording.measured.size();
   std::vector<double> predicted(recording.rows() * signals, kNan);
   const bool simulated =
       simulator.SetParameters(values, recording) &&
-      simulator.Run(recording, {0, recording.rows()}, rest, predicted).outcome == Outcome::kCompleted;
+      simulator.Run(recording, {0, recording.rows()}, AtRest(model), predicted).outcome == Outcome::kCompleted;
   for (std::size_t s = 0; s < signals; ++s) {
     for (std::size_t r = 0; r < recording.rows(); ++r) recording.measured[s].values[r] = predicted[r * signals + s];
   }

@@ -6,6 +6,7 @@
 #include "src/core/statistics.h"
 #include "src/diagnose/rules.h"
 #include "src/diagnose/score_test.h"
+#include "src/fit/policy.h"
 
 namespace gapscope {
 
@@ -20,10 +21,6 @@ bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
   });
 }
 
-// Base parameters are known to about +-20 % and their bounds lie at nominal / 1.6 and nominal * 1.6.
-constexpr double kPriorShare = 0.15;
-// Sensors are zeroed by hand or at start: what a rest angle could explain as well is the rest angle's.
-constexpr double kPriorOffset_rad = 0.03;
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known
 // beforehand.
 constexpr double kCorrelated = 10;
@@ -42,19 +39,14 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
                      .time_step_s = time_step_s,
                      .shift_range_s = sample_s,
                      .weights = weights,
-                     .prior_share = kPriorShare / std::sqrt(kCorrelated),
-                     .prior_offset_rad = kPriorOffset_rad / std::sqrt(kCorrelated),
+                     .prior_share = kFitPolicy.known_share / std::sqrt(kCorrelated),
+                     .prior_offset_rad = kFitPolicy.known_offset_rad / std::sqrt(kCorrelated),
                      .linear_terms = true,
                      .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
-  if (train) {
-    for (std::size_t i = 0; i < model.parameters().size(); ++i) {
-      const Parameter& p = model.parameters()[i];
-      if (!p.frozen && p.low < p.high) options.free.push_back(static_cast<int>(i));
-    }
-  }
+  if (train) options.free = model.FreeParameters();
   return options;
 }
 

@@ -87,7 +87,7 @@ class FitProblem::Differences {
     }
   }
 
-  // An offset moves its own prediction, and the start the other way.
+  // An offset moves its own prediction, and a start that the log gave the other way.
   void Offsets(Eigen::Index first_state) {
     const auto& signals = layout_.signals[window_.log];
     const Eigen::Index scored = window_.scored();
@@ -95,7 +95,9 @@ class FitProblem::Differences {
       const SignalLayout& signal = signals[s];
       if (signal.offset < 0) continue;
       auto column = jacobian_.col(signal.offset);
-      if (signal.joint_state >= 0) {
+      if (problem_.options_.start == WindowStart::kRest) {
+        column.setZero();
+      } else if (signal.joint_state >= 0) {
         column = -signal.deviation * jacobian_.col(first_state + signal.joint_state);
       } else {
         FitPoint other = point_;

@@ -78,17 +78,20 @@ void FitProblem::PlaceStart(Worker& worker, const FitWindow& window, const FitPo
   const Recording& recording = recordings_[window.log];
   const std::vector<double>& first = space_.start();
   // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
-  const bool late = std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) {
-    return source.delay >= 0 && values[source.delay] != first[source.delay];
-  });
+  const bool from_log = options_.start == WindowStart::kLog;
+  const bool late =
+      from_log && std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) {
+        return source.delay >= 0 && values[source.delay] != first[source.delay];
+      });
   InitialState& start = worker.start;
   start = late ? InitialStateAt(model_, recording, window.rows.begin, values) : window.start;
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {
     const SignalLayout& signal = layout_.signals[window.log][s];
     const SignalSource& source = model_.source(recording.measured[s].index);
     if (source.kind != SignalKind::kPosition) continue;
-    if (source.offset >= 0 && !late) start.qpos[source.qpos] += first[source.offset] - values[source.offset];
-    start.qpos[source.qpos] -= layout_.Offset(point.y, window.log, s);
+    if (source.offset >= 0 && from_log && !late)
+      start.qpos[source.qpos] += first[source.offset] - values[source.offset];
+    if (from_log) start.qpos[source.qpos] -= layout_.Offset(point.y, window.log, s);
     if (signal.joint_state >= 0) {
       start.qpos[source.qpos] += state[signal.joint_state];
       start.qvel[source.dof] += state[signal.joint_state + 1];

@@ -17,9 +17,13 @@ enum class Normalization { kDeviation, kRootMeanSquare };
 // Whether the residuals are those of windows that each start from the log, of one free run per log, or of both.
 enum class ObjectiveKind { kWindows, kFreeRun, kBoth };
 
+// Where a window starts: where the log says, which zero offsets move, or at rest at the model's initial pose.
+enum class WindowStart { kLog, kRest };
+
 struct FitOptions {
   std::vector<int> free;  // indices of tuned parameters
   ObjectiveKind objective = ObjectiveKind::kWindows;
+  WindowStart start = WindowStart::kLog;
   double window_s = 1.0;
   double lead_in_s = 0.05;  // start of a window that is not scored
   Fold fold = Fold::kAll;
@@ -36,6 +40,7 @@ struct FitOptions {
   // Standard deviation of what is known of the base parameters beforehand, as a share of their range; 0: nothing.
   double prior_share = 0;
   double prior_offset_rad = 0;       // likewise of zero offsets, around zero; 0: nothing
+  double prior_shift_s = 0;          // likewise of the shift
   std::vector<double> prior_centre;  // values that base parameters are known to lie around; empty: the start
   double prior_scale = 1;            // multiplies what is known, as the variance of the residuals does that of the data
   // Torques and stiffnesses of effects as logarithms, those of zero excepted: a factor common to all torques is then a

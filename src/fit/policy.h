@@ -25,6 +25,10 @@ struct FitPolicy {
   // Finite differences of the command shift in samples, of a zero offset in standard deviations of its signal, of a
   // window's state as a share of what the log leaves open.
   double shift_step = 0.2, offset_step = 0.01, state_step = 0.02;
+  // Where a fit is told what is known beforehand (FitOptions::prior_share, prior_offset_rad): base parameters lie
+  // within about +-20 % of nominal, and their bounds at nominal / 1.6 and nominal * 1.6; sensors are zeroed by hand or
+  // at start, and what a rest angle could explain as well is the rest angle's.
+  double known_share = 0.15, known_offset_rad = 0.03;
   // Length of a block of residuals that is judged as one: longer than sensors' noise and slow residuals remember.
   double block_s = 0.5;
 };

@@ -24,6 +24,8 @@ Eigen::VectorXd Knowledge(const SearchSpace& space, const FitLayout& layout, con
         weight[signal.offset] = std::pow(signal.deviation / options.prior_offset_rad, 2);
     }
   }
+  if (layout.shift() >= 0 && options.prior_shift_s > 0)
+    weight[layout.shift()] = std::pow(layout.shift_scale_s / options.prior_shift_s, 2);
   return weight;
 }
 

@@ -22,6 +22,11 @@ Coordinate MakeCoordinate(const Parameter& p, int index, double value, bool loga
     c.low = c.ToSearch(kFitPolicy.least_size_share * value);
     c.high = c.ToSearch(value > 0 ? p.high : p.low);
   }
+  // A start beyond the bounds was asked for: they grow to hold it.
+  if (!c.logarithmic || c.scale * value > 0) {
+    c.low = std::min(c.low, c.ToSearch(value));
+    c.high = std::max(c.high, c.ToSearch(value));
+  }
   return c;
 }
 

@@ -22,7 +22,8 @@ struct Coordinate {
 
 class SearchSpace {
  public:
-  // `free`: indices in `parameters`, which must outlive the space. `values`: all parameters, where the search starts.
+  // `free`: indices in `parameters`, which must outlive the space. `values`: all parameters, where the search starts;
+  // bounds grow to hold that.
   SearchSpace(const std::vector<Parameter>& parameters, const std::vector<int>& free, std::vector<double> values,
               bool logarithmic_effects, bool linear_terms);
 

@@ -49,7 +49,9 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
         windows.push_back({.log = l,
                            .rows = all[i],
                            .first_scored = FirstScored(recording, all[i], lead_in_s),
-                           .start = InitialStateAt(model, recording, all[i].begin, values),
+                           .start = options.start == WindowStart::kRest
+                                        ? AtRest(model)
+                                        : InitialStateAt(model, recording, all[i].begin, values),
                            .prior = layout.state_priors[l]});
       }
     };

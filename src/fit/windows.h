@@ -20,7 +20,7 @@ struct FitWindow {
   std::size_t log = 0;
   Window rows;
   std::size_t first_scored = 0;  // row in the window
-  InitialState start;            // from the log, without offsets
+  InitialState start;            // FitOptions::start; from the log: without offsets
   Eigen::VectorXd prior;         // weight of each number of the state
   Eigen::Index scored() const { return static_cast<Eigen::Index>(rows.rows() - first_scored); }
 };

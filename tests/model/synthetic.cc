@@ -71,12 +71,6 @@ std::vector<double> ValuesWith(const Model& model, const std::map<std::string, d
   return values;
 }
 
-InitialState AtRest(const Model& model) {
-  const mjModel& m = model.compiled();
-  return {.qpos = std::vector<double>(m.qpos0, m.qpos0 + m.nq),
-          .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
-}
-
 std::vector<std::vector<double>> Predict(const Model& model, const Recording& recording,
                                          const std::map<std::string, double>& set, const InitialState* start,
                                          double max_step_s) {

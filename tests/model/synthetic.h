@@ -39,7 +39,6 @@ std::vector<std::vector<double>> Predict(const Model& model, const Recording& re
                                          const InitialState* start = nullptr, double max_step_s = 0);
 // Nominal values with `set` written over them; fails the test on an unknown name.
 std::vector<double> ValuesWith(const Model& model, const std::map<std::string, double>& set);
-InitialState AtRest(const Model& model);
 
 double LargestDifference(const std::vector<double>& a, const std::vector<double>& b);
 double Largest(const std::vector<double>& a);

@@ -48,14 +48,7 @@ Result<Hypothesis> MakeRival(const Rig& rig, const EffectUse& use, const ScaleTa
   }
   GS_RETURN_IF_ERROR(OverrideValues(*model, {}, own, &values));
   for (const auto& p : placed) assumed->push_back(fmt::format("{}={:.6g}", p.name, values[model->IndexOf(p.name)]));
-  Hypothesis rival = MakeHypothesis(use.Text(), model, values);
-  // A value outside the catalogue's range for this rig is the user's to choose: the range grows to hold it.
-  for (std::size_t i = 0; i < rival.free.size(); ++i) {
-    const double x = rival.ToSearch(i, values[rival.free[i].parameter]);
-    rival.free[i].low = std::min(rival.free[i].low, x);
-    rival.free[i].high = std::max(rival.free[i].high, x);
-  }
-  return rival;
+  return Hypothesis{.name = use.Text(), .model = model, .values = std::move(values)};
 }
 
 std::string ReproducingCommand(const OptimalFlags& flags, const InputScore& best) {
@@ -120,7 +113,7 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
                                .duration_s = flags.rig.duration_s,
                                .margin = flags.rig.margin,
                                .amplitude = flags.rig.amplitude};
-  const Hypothesis base = MakeHypothesis("none", rig.model, rig.values);
+  const Hypothesis base{.name = "none", .model = rig.model, .values = rig.values};
   OptimalDesign design;
   if (!flags.parameters.empty()) {
     std::vector<int> indices;

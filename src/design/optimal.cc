@@ -3,113 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 namespace gapscope {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kOffset_rad = 0.01;  // of a sensor's zero, known beforehand
-constexpr double kShiftHalfSamples = 1;
-
-// Inverse variances of what is known beforehand, in the order of a Jacobian's columns.
-Eigen::VectorXd PriorWeights(const Hypothesis& hypothesis, Eigen::Index columns) {
-  Eigen::VectorXd weights = Eigen::VectorXd::Zero(columns);
-  const Eigen::Index parameters = static_cast<Eigen::Index>(hypothesis.free.size());
-  for (Eigen::Index i = 0; i < parameters; ++i) {
-    const double prior = hypothesis.free[static_cast<std::size_t>(i)].prior;
-    if (prior > 0) weights[i] = 1 / (prior * prior);
-  }
-  weights[parameters] = 1 / (kShiftHalfSamples * kShiftHalfSamples);
-  weights.tail(columns - parameters - 1).setConstant(1 / (kOffset_rad * kOffset_rad));
-  return weights;
-}
-
-double RootMeanSquare(const Eigen::VectorXd& residual) {
-  return std::sqrt(residual.squaredNorm() / static_cast<double>(residual.size()));
-}
-
-// How far the imitation stays from `truth`, root mean square in floors, after Gauss-Newton steps. `jacobians`: how many
-// are made by replays; steps beyond that use the last one with Broyden's rank-one corrections (Broyden, "A class of
-// methods for solving nonlinear simultaneous equations", Math. Comp. 19, 1965).
-double Imitate(const Hypothesis& rival, Predictor& predictor, const Recording& input, const Eigen::VectorXd& truth,
-               const std::vector<double>& floors, double rows_per_sample, int jacobians) {
-  constexpr int kSteps = 10;
-  std::vector<double> values = rival.values;
-  double shift_s = 0;
-  Eigen::VectorXd at = predictor.Predict(input, values, shift_s, floors);
-  if (at.size() != truth.size()) return kInfinity;
-  const Eigen::Index parameters = static_cast<Eigen::Index>(rival.free.size());
-  const double half_sample = 0.5 * input.timeline.median_step_s;
-  Eigen::MatrixXd jacobian = predictor.Jacobian(input, values, shift_s, floors, at);
-  double best = RootMeanSquare(at - truth), damping = 1e-3;
-  if (jacobian.size() == 0) return best;
-  const Eigen::VectorXd weights = PriorWeights(rival, jacobian.cols());
-  const Eigen::Index zeros = jacobian.cols() - parameters - 1;
-  Eigen::VectorXd offsets = Eigen::VectorXd::Zero(zeros);
-  int made = 1, failures = 0;
-  for (int iteration = 0; iteration < kSteps; ++iteration) {
-    // What the priors already hold against moving farther.
-    Eigen::VectorXd moved(jacobian.cols());
-    for (Eigen::Index i = 0; i < parameters; ++i) {
-      const std::size_t k = static_cast<std::size_t>(i);
-      moved[i] =
-          rival.ToSearch(k, values[rival.free[k].parameter]) - rival.ToSearch(k, rival.values[rival.free[k].parameter]);
-    }
-    moved[parameters] = shift_s / half_sample;
-    moved.tail(zeros) = offsets;
-    const Eigen::VectorXd residual = at + jacobian.rightCols(zeros) * offsets - truth;
-    const Eigen::MatrixXd normal = jacobian.transpose() * jacobian / rows_per_sample;
-    const Eigen::VectorXd right = jacobian.transpose() * residual / rows_per_sample + weights.cwiseProduct(moved);
-    Eigen::MatrixXd damped = normal;
-    damped.diagonal() += weights + damping * normal.diagonal() +
-                         Eigen::VectorXd::Constant(normal.rows(), 1e-12 * normal.diagonal().maxCoeff());
-    Eigen::VectorXd step = -damped.ldlt().solve(right);
-    if (!step.allFinite()) return best;
-    // Bounds: what would leave them stops there.
-    std::vector<double> next = values;
-    for (Eigen::Index i = 0; i < parameters; ++i) {
-      const std::size_t k = static_cast<std::size_t>(i);
-      const auto& free = rival.free[k];
-      const double x = rival.ToSearch(k, values[free.parameter]);
-      step[i] = std::clamp(x + step[i], free.low, free.high) - x;
-      next[free.parameter] = rival.ToValue(k, x + step[i]);
-    }
-    step[parameters] =
-        std::clamp(moved[parameters] + step[parameters], -kShiftHalfSamples, kShiftHalfSamples) - moved[parameters];
-    const double next_shift = shift_s + step[parameters] * half_sample;
-    const Eigen::VectorXd next_offsets = offsets + step.tail(zeros);
-    const Eigen::VectorXd predicted = predictor.Predict(input, next, next_shift, floors);
-    const double distance = predicted.size() == truth.size()
-                                ? RootMeanSquare(predicted + jacobian.rightCols(zeros) * next_offsets - truth)
-                                : kInfinity;
-    if (predicted.size() == at.size()) {
-      // The zero offsets' columns are exact: only the rest is corrected.
-      const Eigen::VectorXd replayed = step.head(parameters + 1);
-      if (replayed.squaredNorm() > 0)
-        jacobian.leftCols(parameters + 1) += (predicted - at - jacobian.leftCols(parameters + 1) * replayed) *
-                                             replayed.transpose() / replayed.squaredNorm();
-    }
-    if (distance < best) {
-      const bool done = distance > 0.99 * best;
-      values = next, shift_s = next_shift, offsets = next_offsets, at = predicted, best = distance;
-      damping = std::max(damping * 0.1, 1e-6);
-      failures = 0;
-      if (!done) continue;
-      if (made >= jacobians) break;
-    } else if (++failures < 3) {
-      damping = std::max(damping * 30, 1e-2);
-      continue;
-    } else if (made >= jacobians) {
-      break;
-    }
-    jacobian = predictor.Jacobian(input, values, shift_s, floors, at);
-    if (jacobian.size() == 0) return best;
-    ++made, failures = 0, damping = 1e-3;
-  }
-  return best;
-}
+constexpr int kRoughJacobians = 2, kJacobians = 8;  // of an imitation: each is a replay per parameter
 
 // Library inputs made as large as all models' limits allow. An entry without a value keeps no limit at any amplitude.
 Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<const Hypothesis*>& models,
@@ -164,8 +64,20 @@ Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<cons
   return sized;
 }
 
-double RowsPerSample(const OptimalOptions& options) {
-  return std::max(1.0, kNoiseCorrelation_s * options.rehearsal.rate_hz);
+// A fit with more Jacobians only lowers a score: the best input is found once no rougher score is above it. Those that
+// still are, highest first, at most `count`.
+std::vector<InputScore*> WorthRefining(std::vector<std::optional<InputScore>>& sized, std::size_t count) {
+  double best = -kInfinity;
+  for (const auto& score : sized) {
+    if (score && score->refined) best = std::max(best, score->score);
+  }
+  std::vector<InputScore*> worth;
+  for (auto& score : sized) {
+    if (score && !score->refined && score->score > best) worth.push_back(&*score);
+  }
+  std::stable_sort(worth.begin(), worth.end(), [](const auto* a, const auto* b) { return a->score > b->score; });
+  worth.resize(std::min(worth.size(), count));
+  return worth;
 }
 
 void SortByScore(std::vector<std::optional<InputScore>>& sized, OptimalDesign* design) {
@@ -175,6 +87,34 @@ void SortByScore(std::vector<std::optional<InputScore>>& sized, OptimalDesign* d
   std::stable_sort(design->inputs.begin(), design->inputs.end(), [](const InputScore& a, const InputScore& b) {
     return a.refined != b.refined ? a.refined : a.score > b.score;
   });
+}
+
+// A deviation of coordinate k as a share of its value, or of its range where the value is zero.
+double Relative(const SearchSpace& space, std::size_t k, double deviation) {
+  const Coordinate& c = space.coordinates()[k];
+  if (c.logarithmic) return deviation;
+  const double value = space.start()[static_cast<std::size_t>(c.parameter)];
+  return value != 0 ? deviation * c.scale / std::abs(value) : deviation / (c.high - c.low);
+}
+
+// Each rival's log on this input, imitated by every other one.
+void Separate(const std::vector<Hypothesis>& rivals, int jacobians, InputScore* score) {
+  const Recording& input = score->rehearsal.recording;
+  const std::vector<double> floors = FloorsOf(input);
+  score->per_target.clear();
+  score->score = kInfinity;
+  for (const Hypothesis& truth : rivals) {
+    Simulator simulator(*truth.model, 0);
+    const Rehearsal foretold = Rehearse(*truth.model, simulator, input, truth.values);
+    for (const Hypothesis& imitation : rivals) {
+      if (&truth == &imitation) continue;
+      const double distance =
+          foretold.worst < kInfinity ? ForetoldFit(imitation, foretold.recording, floors).Misfit(jacobians) : kInfinity;
+      // What cannot be simulated separates nothing.
+      score->per_target.push_back(std::isfinite(distance) ? distance : 0);
+      score->score = std::min(score->score, score->per_target.back());
+    }
+  }
 }
 
 }  // namespace
@@ -200,51 +140,34 @@ std::vector<LibraryInput> InputLibrary(double duration_s, double rate_hz) {
 Result<OptimalDesign> DesignForParameters(const Hypothesis& base, const std::vector<int>& parameters,
                                           const OptimalOptions& options, ThreadPool& pool) {
   OptimalDesign design;
-  std::vector<Eigen::Index> columns;
+  const std::vector<int> free = base.model->FreeParameters();
+  std::vector<std::size_t> wanted;  // in `free`
   for (const int index : parameters) {
-    const auto found =
-        std::find_if(base.free.begin(), base.free.end(), [&](const auto& f) { return f.parameter == index; });
+    const auto found = std::find(free.begin(), free.end(), index);
     const Parameter& p = base.model->parameters()[static_cast<std::size_t>(index)];
-    if (found == base.free.end())
+    if (found == free.end())
       return Error{.what = "the parameter is frozen",
                    .where = "--parameter " + p.name,
                    .cure = "give it bounds and no 'frozen: true' in " + base.model->experiment().path};
-    columns.push_back(found - base.free.begin());
+    wanted.push_back(static_cast<std::size_t>(found - free.begin()));
     design.targets.push_back(p.name);
   }
   GS_ASSIGN(auto sized, SizeInputs({&base}, options, pool));
   pool.ForEach(sized.size(), [&](std::size_t i, int) {
     if (!sized[i]) return;
-    Predictor predictor(base, 0);
-    const Recording& input = sized[i]->rehearsal.recording;
-    const std::vector<double> floors = FloorsOf(input);
-    const Eigen::VectorXd at = predictor.Predict(input, base.values, 0, floors);
-    const Eigen::MatrixXd jacobian =
-        at.size() > 0 ? predictor.Jacobian(input, base.values, 0, floors, at) : Eigen::MatrixXd();
-    if (jacobian.size() == 0) {
+    const Recording& log = sized[i]->rehearsal.recording;
+    ForetoldFit fit(base, log, FloorsOf(log));
+    const std::vector<double> deviations = fit.Deviations(wanted);
+    if (deviations.empty()) {
       sized[i].reset();
       return;
     }
-    Eigen::MatrixXd information = jacobian.transpose() * jacobian / RowsPerSample(options);
-    Eigen::VectorXd weights = PriorWeights(base, jacobian.cols());
-    for (const Eigen::Index c : columns) weights[c] = 0;  // what is asked for is not assumed
-    information.diagonal() += weights;
-    // A direction that the input does not show at all gets a very small information instead of none.
-    information.diagonal().array() += 1e-9;
-    const Eigen::MatrixXd covariance =
-        information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
     double sum = 0;
-    for (const Eigen::Index c : columns) {
-      const auto& free = base.free[static_cast<std::size_t>(c)];
-      const double value = base.values[free.parameter];
-      const double deviation = std::sqrt(std::max(covariance(c, c), 0.0));
-      const double relative = free.logarithmic ? deviation
-                              : value != 0     ? deviation / std::abs(value)
-                                               : deviation / (free.high - free.low);
-      sized[i]->per_target.push_back(relative);
-      sum += std::log(relative);
+    for (const std::size_t k : wanted) {
+      sized[i]->per_target.push_back(Relative(fit.problem().space(), k, deviations[k]));
+      sum += std::log(sized[i]->per_target.back());
     }
-    sized[i]->score = -sum / static_cast<double>(columns.size());
+    sized[i]->score = -sum / static_cast<double>(wanted.size());
     sized[i]->refined = true;
   });
   SortByScore(sized, &design);
@@ -258,47 +181,22 @@ Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<
   GS_CHECK(rivals.size() >= 2);
   OptimalDesign design;
   std::vector<const Hypothesis*> models = {&base};
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;  // truth, imitation
-  for (std::size_t i = 0; i < rivals.size(); ++i) {
-    models.push_back(&rivals[i]);
-    for (std::size_t j = 0; j < rivals.size(); ++j) {
-      if (i == j) continue;
-      pairs.emplace_back(i, j);
-      design.targets.push_back(rivals[i].name + " against " + rivals[j].name);
+  for (const Hypothesis& truth : rivals) {
+    models.push_back(&truth);
+    for (const Hypothesis& imitation : rivals) {
+      if (&truth != &imitation) design.targets.push_back(truth.name + " against " + imitation.name);
     }
   }
   GS_ASSIGN(auto sized, SizeInputs(models, options, pool));
-  const auto separate = [&](InputScore& score, bool refine) {
-    const Recording& input = score.rehearsal.recording;
-    const std::vector<double> floors = FloorsOf(input);
-    std::vector<std::unique_ptr<Predictor>> predictors;
-    std::vector<Eigen::VectorXd> truths;
-    for (const auto& rival : rivals) {
-      predictors.push_back(std::make_unique<Predictor>(rival, 0));
-      truths.push_back(predictors.back()->Predict(input, rival.values, 0, floors));
-    }
-    score.per_target.clear();
-    score.score = kInfinity;
-    for (const auto& [truth, imitation] : pairs) {
-      const double distance = truths[truth].size() == 0
-                                  ? 0
-                                  : Imitate(rivals[imitation], *predictors[imitation], input, truths[truth], floors,
-                                            RowsPerSample(options), refine ? 4 : 1);
-      score.per_target.push_back(std::isfinite(distance) ? distance : 0);
-      score.score = std::min(score.score, score.per_target.back());
-    }
-    score.refined = refine;
-  };
   pool.ForEach(sized.size(), [&](std::size_t i, int) {
-    if (sized[i]) separate(*sized[i], false);
+    if (sized[i]) Separate(rivals, kRoughJacobians, &*sized[i]);
   });
-  std::vector<std::size_t> order(sized.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::erase_if(order, [&](std::size_t i) { return !sized[i]; });
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return sized[a]->score > sized[b]->score; });
-  order.resize(std::min(order.size(), options.refined));
-  pool.ForEach(order.size(), [&](std::size_t i, int) { separate(*sized[order[i]], true); });
+  for (auto next = WorthRefining(sized, options.batch); !next.empty(); next = WorthRefining(sized, options.batch)) {
+    pool.ForEach(next.size(), [&](std::size_t i, int) {
+      Separate(rivals, kJacobians, next[i]);
+      next[i]->refined = true;
+    });
+  }
   SortByScore(sized, &design);
   return design;
 }

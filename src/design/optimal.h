@@ -1,19 +1,18 @@
 // The next experiment: of a library of inputs, each as large as the rig's limits allow, the one that says most about
 // named parameters, or that tells named effects apart.
 //
-// Parameters: Fisher information of the predicted signals, F = J' J / (floor^2 n_c), n_c rows to a correlation time of
-// the noise; the other free parameters, a command shift and zero offsets are nuisances with what is known of them
-// beforehand. The covariance's block of the named ones is the Cramer-Rao bound; the input with the smallest mean
-// logarithm of their standard deviations (D-optimal for one parameter) wins. Goodwin and Payne, "Dynamic System
-// Identification", 1977, ch. 6.
+// Parameters: the covariance that a fit of the predicted log would have (ForetoldFit): its block of the named ones is
+// the Cramer-Rao bound, with the other free parameters, a command shift and zero offsets as nuisances. The input with
+// the smallest mean logarithm of their standard deviations (D-optimal for one parameter) wins. Goodwin and Payne,
+// "Dynamic System Identification", 1977, ch. 6.
 //
-// Effects: each rival's prediction is imitated by every other one (Gauss-Newton over its effect, base parameters,
-// shift, offsets). What is left, in sensor floors, is how well the input separates the two; the input whose least
-// separated pair is farthest apart wins (Hunter and Reiner, "Designs for discriminating between two rival models",
-// Technometrics 7, 1965).
+// Effects: each rival's prediction is imitated by every other one, as `tune` would fit it. What is left, in sensor
+// floors, is how well the input separates the two; the input whose least separated pair is farthest apart wins (Hunter
+// and Reiner, "Designs for discriminating between two rival models", Technometrics 7, 1965).
 #ifndef GAPSCOPE_DESIGN_OPTIMAL_H_
 #define GAPSCOPE_DESIGN_OPTIMAL_H_
 
+#include "src/design/rehearsal.h"
 #include "src/design/sensitivity.h"
 #include "src/design/waveform.h"
 
@@ -22,10 +21,11 @@ namespace gapscope {
 struct OptimalOptions {
   RehearsalOptions rehearsal;
   double duration_s = 6;
-  double margin = 0.9;      // share of every limit that may be used
-  double amplitude = 0;     // largest command, SI; 0: the command's limit
-  std::size_t refined = 2;  // inputs whose rivals are fitted with several Jacobians by replays; the rest with one and
-                            // Broyden's corrections
+  double margin = 0.9;   // share of every limit that may be used
+  double amplitude = 0;  // largest command, SI; 0: the command's limit
+  // Inputs are first scored by rough fits. The best ones, so many at a time, by full ones until none is left that could
+  // be better.
+  std::size_t batch = 2;
 };
 
 struct InputScore {

@@ -2,37 +2,52 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include "src/core/dense.h"
+#include "src/fit/policy.h"
 
 namespace gapscope {
+namespace {
 
-double Hypothesis::ToSearch(std::size_t i, double value) const {
-  const Free& f = free[i];
-  return f.logarithmic ? std::log(value) : value;
-}
-
-double Hypothesis::ToValue(std::size_t i, double search) const {
-  const Free& f = free[i];
-  const double bounded = std::clamp(search, f.low, f.high);
-  return f.logarithmic ? std::exp(bounded) : bounded;
-}
-
-Hypothesis MakeHypothesis(std::string name, std::shared_ptr<const Model> model, std::vector<double> values) {
-  Hypothesis hypothesis{.name = std::move(name), .model = std::move(model), .values = std::move(values), .free = {}};
-  const auto& parameters = hypothesis.model->parameters();
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const Parameter& p = parameters[i];
-    if (p.frozen || !(p.high > p.low)) continue;
-    const bool of_effect = p.owner != Parameter::Owner::kBase, logarithmic = p.low > 0;
-    Hypothesis::Free free{.parameter = static_cast<int>(i), .logarithmic = logarithmic};
-    free.low = logarithmic ? std::log(p.low) : p.low;
-    free.high = logarithmic ? std::log(p.high) : p.high;
-    free.step = logarithmic ? 0.05 : 0.01 * (free.high - free.low);
-    if (!of_effect) free.prior = logarithmic ? kNominalShare : 0.25 * (free.high - free.low);
-    hypothesis.free.push_back(free);
+// The scored signals alone. One that stands still over the log is still known to its floor.
+std::vector<Recording> ScoredLog(Recording log, const std::vector<double>& floors) {
+  std::vector<Recording::Measured> scored;
+  for (std::size_t s = 0; s < log.measured.size(); ++s) {
+    if (!log.measured[s].spec.scored) continue;
+    scored.push_back(std::move(log.measured[s]));
+    scored.back().spec.resolution = std::max(scored.back().spec.resolution, floors[s]);
   }
-  return hypothesis;
+  log.measured = std::move(scored);
+  return {std::move(log)};
 }
+
+// Residual weights per signal of the experiment.
+std::vector<double> WeightsOf(const Recording& log, std::size_t signals, const std::vector<double>& floors,
+                              double rows_per_reading) {
+  std::vector<double> weights(signals, 0.0);
+  for (std::size_t s = 0; s < log.measured.size(); ++s)
+    weights[log.measured[s].index] = 1 / (floors[s] * std::sqrt(rows_per_reading));
+  return weights;
+}
+
+FitOptions OptionsOf(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
+                     double rows_per_reading) {
+  const double half_sample_s = 0.5 * log.timeline.median_step_s;
+  return {.free = hypothesis.model->FreeParameters(),
+          .objective = ObjectiveKind::kFreeRun,
+          .start = WindowStart::kRest,
+          .fit_states = false,
+          .shift_range_s = half_sample_s,
+          .weights = WeightsOf(log, hypothesis.model->sources().size(), floors, rows_per_reading),
+          .prior_share = kFitPolicy.known_share,
+          .prior_offset_rad = kFitPolicy.known_offset_rad,
+          .prior_shift_s = half_sample_s,
+          .linear_terms = true};
+}
+
+double RowsPerReading(const Recording& log) { return std::max(1.0, kNoiseCorrelation_s / log.timeline.median_step_s); }
+
+}  // namespace
 
 double FloorOf(const MeasuredSpec& spec, const std::vector<double>& values) {
   constexpr double kPosition = 5e-4, kSpeed = 0.02, kTorqueShare = 0.01;
@@ -58,71 +73,36 @@ std::vector<double> FloorsOf(const Recording& predicted) {
   return floors;
 }
 
-Predictor::Predictor(const Hypothesis& hypothesis, double time_step_s)
-    : hypothesis_(hypothesis), simulator_(*hypothesis.model, time_step_s) {}
+ForetoldFit::ForetoldFit(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors)
+    : rows_per_reading_(RowsPerReading(log)),
+      model_(hypothesis.model),
+      logs_(ScoredLog(log, floors)),
+      problem_(*model_, logs_, OptionsOf(hypothesis, log, floors, rows_per_reading_), hypothesis.values, pool_) {}
 
-Eigen::VectorXd Predictor::Predict(const Recording& input, const std::vector<double>& values, double shift_s,
-                                   const std::vector<double>& floors) {
-  const mjModel& m = hypothesis_.model->compiled();
-  InitialState rest;
-  rest.qpos.assign(m.qpos0, m.qpos0 + m.nq);
-  rest.qvel.assign(m.nv, 0.0);
-  const std::size_t signals = input.measured.size(), rows = input.rows();
-  buffer_.resize(rows * signals);
-  simulator_.set_shift_s(shift_s);
-  if (!simulator_.SetParameters(values, input) ||
-      simulator_.Run(input, {0, rows}, rest, buffer_).outcome != Outcome::kCompleted)
-    return {};
-  std::size_t scored = 0;
-  for (const auto& measured : input.measured) scored += measured.spec.scored ? 1 : 0;
-  Eigen::VectorXd out(static_cast<Eigen::Index>(rows * scored));
-  Eigen::Index at = 0;
-  for (std::size_t s = 0; s < signals; ++s) {
-    if (!input.measured[s].spec.scored) continue;
-    for (std::size_t r = 0; r < rows; ++r) out[at++] = buffer_[r * signals + s] / floors[s];
+std::vector<double> ForetoldFit::Deviations(const std::vector<std::size_t>& wanted) {
+  const Linearization at = Linearize(
+      problem_, problem_.Start(), {.step = SolveOptions().fine_step, .columns = DifferenceOptions::Columns::kCentral});
+  if (!at.valid) return {};
+  Eigen::MatrixXd information = at.hessian;
+  for (const std::size_t i : wanted) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const double range = problem_.layout().high[k] - problem_.layout().low[k];
+    information(k, k) += 1 / (range * range) - problem_.prior().weight[k];
   }
-  return out.allFinite() ? out : Eigen::VectorXd();
+  const Eigen::VectorXd variances =
+      Ldlt(information).Solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())).diagonal();
+  std::vector<double> deviations;
+  for (Eigen::Index i = 0; i < problem_.space().size(); ++i)
+    deviations.push_back(std::sqrt(std::max(0.0, variances[i])));
+  return deviations;
 }
 
-Eigen::MatrixXd Predictor::Jacobian(const Recording& input, const std::vector<double>& values, double shift_s,
-                                    const std::vector<double>& floors, const Eigen::VectorXd& at) {
-  std::vector<std::size_t> positions;  // block of each scored position signal
-  std::size_t scored = 0;
-  for (const auto& measured : input.measured) {
-    if (!measured.spec.scored) continue;
-    if (measured.spec.kind == SignalKind::kPosition) positions.push_back(scored);
-    ++scored;
-  }
-  const Eigen::Index rows = static_cast<Eigen::Index>(input.rows()),
-                     parameters = static_cast<Eigen::Index>(hypothesis_.free.size());
-  Eigen::MatrixXd jacobian =
-      Eigen::MatrixXd::Zero(at.size(), parameters + 1 + static_cast<Eigen::Index>(positions.size()));
-  std::vector<double> moved(values);
-  for (Eigen::Index i = 0; i < parameters; ++i) {
-    const auto& free = hypothesis_.free[static_cast<std::size_t>(i)];
-    const double x = hypothesis_.ToSearch(static_cast<std::size_t>(i), values[free.parameter]);
-    const double step = x + free.step <= free.high ? free.step : -free.step;
-    moved[free.parameter] = hypothesis_.ToValue(static_cast<std::size_t>(i), x + step);
-    const Eigen::VectorXd out = Predict(input, moved, shift_s, floors);
-    moved[free.parameter] = values[free.parameter];
-    if (out.size() != at.size()) return {};
-    jacobian.col(i) = (out - at) / step;
-  }
-  const double half_sample = 0.5 * input.timeline.median_step_s;
-  const Eigen::VectorXd late = Predict(input, values, shift_s + half_sample, floors);
-  if (late.size() != at.size()) return {};
-  jacobian.col(parameters) = late - at;
-  std::size_t column = 0;
-  std::vector<double> scored_floors;
-  for (std::size_t s = 0; s < input.measured.size(); ++s) {
-    if (input.measured[s].spec.scored) scored_floors.push_back(floors[s]);
-  }
-  for (const std::size_t block : positions) {
-    jacobian.col(parameters + 1 + static_cast<Eigen::Index>(column++))
-        .segment(static_cast<Eigen::Index>(block) * rows, rows)
-        .setConstant(1 / scored_floors[block]);
-  }
-  return jacobian;
+double ForetoldFit::Misfit(int jacobians) {
+  const SolveResult solved =
+      Solve(problem_, problem_.Start(),
+            {.max_iterations = jacobians, .tolerance = 0.01, .coarse_step = SolveOptions().fine_step});
+  const double squares = 2 * (solved.cost - problem_.prior().Cost(solved.point.y));
+  return std::sqrt(std::max(0.0, squares) * rows_per_reading_ / static_cast<double>(problem_.residuals()));
 }
 
 }  // namespace gapscope

@@ -78,9 +78,13 @@ TEST(DiagnoseTest, NamesATorqueBias) {
 }
 
 TEST(DiagnoseTest, NamesATorqueSpeedCurve) {
-  const Diagnosis d = DiagnoseLogs(MakeLogs("qube", twin::Kind::kSingle, "torque_speed_curve@motor", 32));
+  const Logs logs = MakeLogs("qube", twin::Kind::kSingle, "torque_speed_curve@motor", 32);
+  const Diagnosis d = DiagnoseLogs(logs);
   ASSERT_FALSE(d.effects.empty()) << d.explanation;
   EXPECT_EQ(d.effects[0].use.Text(), "torque_speed_curve@motor") << d.explanation;
+  // The power from which the torque falls; the scale common to all torques is only known to +-20 %.
+  ASSERT_EQ(logs.effects.size(), 1u);
+  EXPECT_NEAR(d.effects[0].parameters[0].value / logs.effects[0].parameters.front().second, 1, 0.25);
 }
 
 TEST(DiagnoseTest, NamesNothingWhereNothingIsMissing) {

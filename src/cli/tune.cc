@@ -54,11 +54,8 @@ Status AddActuatorEffects(const TuneFlags& flags, ModelFlags* model) {
 
 // Indices of the parameters that are tuned.
 Result<std::vector<int>> FreeParameters(const TuneFlags& flags, const Session& session) {
-  std::set<int> free;
-  for (std::size_t i = 0; i < session.model->parameters().size(); ++i) {
-    const Parameter& p = session.model->parameters()[i];
-    if (!p.frozen && p.low < p.high) free.insert(static_cast<int>(i));
-  }
+  const std::vector<int> usual = session.model->FreeParameters();
+  std::set<int> free(usual.begin(), usual.end());
   for (const auto& name : flags.free) {
     GS_ASSIGN(const int index, session.model->Find(name, "--free"));
     const Parameter& p = session.model->parameters()[index];
@@ -215,7 +212,8 @@ std::vector<Option> SolveOptionsOf(TuneFlags& flags) {
            .unit = "s",
            .range = Above(0, 0),
            .unset = "until it has converged",
-           .help = "Time; the best so far is reported when it is spent"},
+           .help = "Time for the search; the best so far is reported when it is spent",
+           .more = "Intervals and scores come after it: some replays more of every log"},
           {.flag = "--resume",
            .value = &flags.resume,
            .help = "Go on with the interrupted run in --out, to the same result",

@@ -57,22 +57,30 @@ class Projected {
     return last_.at.valid;
   }
 
-  // The cost and the equations at y, the states near their optimum; null: it cannot be simulated there.
+  // The cost and the equations at y, the states near their optimum; null: it cannot be simulated there. A window whose
+  // motion tips over at the least touch of its state keeps the better of two.
   const Known* At(const Eigen::VectorXd& y) {
-    Known least;
-    for (int step = 0; step < kPolicy.state_steps; ++step) {
-      const FitPoint point = Move(problem_, last_.point, last_.at, y - last_.point.y);
-      Evaluation there = problem_.Evaluate(point, Keep::kResiduals);
-      Count(there.work);
-      if (!std::isfinite(there.cost)) break;
-      UpdateSecant(problem_, last_.derivatives, last_.point, point, there.residuals);
-      last_.point = point;
-      last_.at = Reduce(problem_, point, last_.derivatives, Blocks::kNone);
-      if (last_.cost() < least.cost()) least = last_;
-      if (last_.cost() - last_.at.reduced_cost < kPolicy.state_share * last_.cost()) break;
+    FitPoint point = Move(problem_, last_.point, last_.at, y - last_.point.y);
+    Evaluation there = Evaluate(point);
+    if (!(there.cost < best_.cost())) {
+      const FitPoint still{.y = point.y, .states = best_.point.states};
+      Evaluation others = Evaluate(still);
+      there.cost = TakeBetterStates(problem_, point, there.residuals, still, others.residuals);
     }
-    if (!least.at.valid) return nullptr;
-    last_ = std::move(least);
+    if (!std::isfinite(there.cost)) return nullptr;
+    Follow(point, std::move(there.residuals));
+    for (int step = 1; step < kPolicy.state_steps; ++step) {
+      const double before = last_.cost();
+      if (before - last_.at.reduced_cost < kPolicy.state_share * before) break;
+      const FitPoint from = last_.point;
+      Residuals residuals = last_.derivatives.residuals;
+      point = Move(problem_, from, last_.at, Eigen::VectorXd::Zero(y.size()));
+      there = Evaluate(point);
+      there.cost = TakeBetterStates(problem_, point, there.residuals, from, residuals);
+      Follow(point, std::move(there.residuals));
+      if (before - last_.cost() < kPolicy.state_share * before) break;
+    }
+    if (!last_.at.valid) return nullptr;
     if (last_.cost() < best_.cost()) best_ = last_;
     return &last_;
   }
@@ -82,6 +90,17 @@ class Projected {
   bool Late() const { return IsLate(options_.deadline); }
 
  private:
+  Evaluation Evaluate(const FitPoint& point) {
+    Evaluation there = problem_.Evaluate(point, Keep::kResiduals);
+    Count(there.work);
+    return there;
+  }
+  // To a point whose residuals are known, by Broyden's update.
+  void Follow(const FitPoint& point, Residuals residuals) {
+    UpdateSecant(problem_, last_.derivatives, last_.point, point, std::move(residuals));
+    last_.point = point;
+    last_.at = Reduce(problem_, point, last_.derivatives, Blocks::kNone);
+  }
   void Count(const Work& work) {
     work_ += work;
     if (options_.progress)

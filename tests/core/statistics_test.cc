@@ -1,0 +1,28 @@
+// Medians and quantiles against values counted by hand, Student's t against printed tables.
+#include "src/core/statistics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace gapscope {
+namespace {
+
+TEST(StatisticsTest, QuantilesAreOfTheNearestRank) {
+  EXPECT_EQ(Median({3, 1, 2}), 2);
+  EXPECT_EQ(Median({4, 1, 2, 3}), 3) << "of an even number the upper one";
+  EXPECT_EQ(Quantile({5, 1, 4, 2, 3}, 0), 1);
+  EXPECT_EQ(Quantile({5, 1, 4, 2, 3}, 0.3), 2) << "rank 1.2";
+  EXPECT_EQ(Quantile({5, 1, 4, 2, 3}, 0.4), 3) << "rank 1.6";
+  EXPECT_EQ(Quantile({5, 1, 4, 2, 3}, 1), 5);
+  EXPECT_TRUE(std::isnan(Median({})));
+}
+
+TEST(StatisticsTest, StudentQuantilesAreThoseOfTheTables) {
+  // Two-sided 95 %: 4.303, 2.776, 2.228, 2.042, 1.960.
+  for (const auto& [n, t] : {std::pair{2.0, 4.303}, {4.0, 2.776}, {10.0, 2.228}, {30.0, 2.042}, {1e6, 1.960}})
+    EXPECT_NEAR(StudentQuantile(n), t, 0.01 * t) << n;
+}
+
+}  // namespace
+}  // namespace gapscope

@@ -123,10 +123,11 @@ std::optional<Found> FitBoth(const Fit& fit, const Eigen::VectorXd& y) {
   both.work += first.work;
   both.result.cost = kInfinity;
   if (!std::isfinite(first.cost)) return both;
-  // Windows come log by log, each log's free run last: their states are found again from the log.
-  if (fit.options.fit_states) problem.WeighStates(problem.Evaluate(joint, Keep::kResiduals).residuals);
+  // Windows come log by log, each log's free run last: their states are found again from the log. What is left once
+  // they are found is the model's; before, it is mostly a free run's start, which a prior of that size would hold where
+  // it is.
   joint = SolveStates(problem, both.stage->objective(), joint, 3, &both.work);
-  problem.SetHuberThreshold(problem.Evaluate(joint, Keep::kResiduals).residuals);
+  Reweigh(fit.options, joint, &problem);
   both.result = both.stage->SolveFrom(joint, fit.options.solve);
   both.work += both.result.work;
   return both;
@@ -206,6 +207,9 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   fit.shift_s = shift_s.value_or(0);
   FitProblem problem(model, recordings, fit, values, pool);
   FitPoint point = problem.Start();
+  ProblemObjective objective(problem);
+  Work work;
+  point = SolveStates(problem, objective, point, 3, &work);
   const Evaluation start = problem.Evaluate(point, Keep::kResiduals);
   if (std::isfinite(start.cost)) {
     problem.WeighStates(start.residuals);

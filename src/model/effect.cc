@@ -39,6 +39,15 @@ std::vector<std::string> EffectNames() {
   return names;
 }
 
+std::string EffectTitle(const std::string& name) {
+  for (const Effect& effect : Catalogue()) {
+    if (effect.name == name && !effect.title.empty()) return effect.title;
+  }
+  std::string title = name;
+  std::replace(title.begin(), title.end(), '_', ' ');
+  return title;
+}
+
 double ScaleOf(ScaleKind kind, const Scales& s) {
   switch (kind) {
     case ScaleKind::kOne:

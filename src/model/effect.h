@@ -89,6 +89,7 @@ struct StartsFrom {
 
 struct Effect {
   std::string name;
+  std::string title = "";  // as people write it: "Coulomb friction"; empty: the name without underscores
   EffectPlace place;
   std::vector<EffectParameter> parameters;
   std::string meaning;     // one line for the user
@@ -111,6 +112,8 @@ struct Effect {
 // All effects, sorted by name; a name that acts differently on motors and joints stands twice.
 const std::vector<Effect>& Catalogue();
 std::vector<std::string> EffectNames();  // each once
+// The title of an effect; of a name that the catalogue lacks (another version's result), what it would be by default.
+std::string EffectTitle(const std::string& name);
 
 // The rig's own size at a place, a parameter that expressions of effects there may use.
 enum class RigSize { kTorque, kInertia };  // Scales::torque_n_m, Scales::inertia_kg_m2

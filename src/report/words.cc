@@ -17,15 +17,6 @@ std::string WholePercent(double share) {
   return std::isfinite(share) ? fmt::format("{:.0f} %", std::floor(100 * share + 0.5)) : kUnknown;
 }
 
-// "Coulomb friction": without underscores, and people's names as people write them.
-std::string TitleOf(std::string name) {
-  std::replace(name.begin(), name.end(), '_', ' ');
-  for (const char* who : {"coulomb", "stribeck"}) {
-    if (const std::size_t at = name.find(who); at != std::string::npos) name[at] = static_cast<char>(name[at] - 32);
-  }
-  return name;
-}
-
 // What happened to the error from one stage to the next.
 std::string ChangeText(double before, double after) {
   const double change = after / before - 1;
@@ -86,7 +77,7 @@ std::string TitleOf(const Diagnosis& d, const std::string& found) {
       std::vector<std::string> groups;
       for (const auto& group : d.ambiguous) {
         std::vector<std::string> names;
-        for (const auto& use : group) names.push_back(TitleOf(use.effect));
+        for (const auto& use : group) names.push_back(EffectTitle(use.effect));
         groups.push_back(Listed(names, "or"));
       }
       return "The model lacks " + Listed(groups) + ": these logs cannot tell which.";
@@ -112,7 +103,7 @@ std::string ShortNumber(double value, int digits) {
   return {buffer, std::to_chars(buffer, buffer + sizeof buffer, number, format).ptr};
 }
 
-std::string Words(const EffectUse& use) { return TitleOf(use.effect) + " on " + use.on; }
+std::string Words(const EffectUse& use) { return EffectTitle(use.effect) + " on " + use.on; }
 std::string Words(const Explanation& explanation) { return explanation ? Words(*explanation) : "none"; }
 
 std::string Listed(const std::vector<std::string>& parts, const std::string& joiner) {

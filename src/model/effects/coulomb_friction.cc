@@ -5,6 +5,7 @@ namespace gapscope {
 Effect Effect_coulomb_friction() {
   return {
       .name = "coulomb_friction",
+      .title = "Coulomb friction",
       .place = EffectPlace::kJoint,
       .parameters =
           {

@@ -5,6 +5,7 @@ namespace gapscope {
 Effect Effect_stribeck_friction() {
   return {
       .name = "stribeck_friction",
+      .title = "Stribeck friction",
       .place = EffectPlace::kJoint,
       .parameters =
           {

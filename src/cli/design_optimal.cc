@@ -44,7 +44,8 @@ Result<Hypothesis> MakeRival(const Rig& rig, const EffectUse& use, const ScaleTa
   }
   std::vector<std::string> own;
   for (const auto& text : flags.set) {
-    if (text.starts_with(use.Text() + ".")) own.push_back(text);
+    GS_ASSIGN(const auto assignment, ParseAssignment(text, "--set"));
+    if (UseWithParameter(assignment.first, *rig.model->rig()) == use) own.push_back(text);
   }
   GS_RETURN_IF_ERROR(OverrideValues(*model, {}, own, &values));
   for (const auto& p : placed) assumed->push_back(fmt::format("{}={:.6g}", p.name, values[model->IndexOf(p.name)]));

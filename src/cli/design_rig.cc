@@ -55,7 +55,8 @@ Result<Rig> LoadRig(const RigFlags& flags) {
   rig.values = rig.model->Nominal();
   std::vector<std::string> base;
   for (const auto& text : flags.set) {
-    if (text.find('@') == std::string::npos) base.push_back(text);
+    GS_ASSIGN(const auto assignment, ParseAssignment(text, "--set"));
+    if (!UseWithParameter(assignment.first, *rig.model->rig())) base.push_back(text);
   }
   GS_RETURN_IF_ERROR(OverrideValues(*rig.model, flags.params, base, &rig.values));
   rig.rehearsal.actuator = flags.actuator;

@@ -75,6 +75,7 @@ struct Parameter {
   // Whose it is: the experiment's, an added effect's, or the rig's own size, which effects are scaled by: neither tuned
   // nor shown.
   enum class Owner { kBase, kEffect, kScale } owner = Owner::kBase;
+  bool of_torque = false;  // an effect's torque, or torque per something of the motion: stiffness, drag
 };
 
 // A field of the compiled model and the expressions of parameters and log values that give its components.

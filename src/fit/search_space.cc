@@ -15,8 +15,7 @@ Coordinate MakeCoordinate(const Parameter& p, int index, double value, bool loga
       c.logarithmic ? 1 : std::max({std::abs(p.nominal), 0.05 * (p.high - p.low), std::numeric_limits<double>::min()});
   c.low = c.ToSearch(p.low);
   c.high = c.ToSearch(p.high);
-  if (logarithmic_effects && !c.logarithmic && value != 0 && p.owner == Parameter::Owner::kEffect &&
-      p.unit.starts_with("N m")) {
+  if (logarithmic_effects && !c.logarithmic && value != 0 && p.of_torque) {
     c.logarithmic = true;
     c.scale = value > 0 ? 1 : -1;
     c.low = c.ToSearch(kFitPolicy.least_size_share * value);

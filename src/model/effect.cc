@@ -72,6 +72,11 @@ double ScaleOf(ScaleKind kind, const Scales& s) {
   return 1;
 }
 
+bool IsOfTorque(ScaleKind kind) {
+  using enum ScaleKind;
+  return kind == kTorque || kind == kStiffness || kind == kDrag || kind == kCubic;
+}
+
 std::string ScaleName(const std::string& on, RigSize size) {
   return "scale@" + on + (size == RigSize::kTorque ? ".torque_n_m" : ".inertia_kg_m2");
 }
@@ -187,19 +192,21 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
   const Scales scales = ScalesAt(use.on, rig, table);
   std::vector<PlacedParameter> placed;
   for (const EffectParameter& p : effect.parameters) {
-    double scale = ScaleOf(p.scale, scales);
+    ScaleKind kind = p.scale;
     std::string key = p.key, unit = p.unit;
-    if (p.scale == ScaleKind::kCommand) {
+    if (kind == ScaleKind::kCommand) {
       const CommandKind command = rig.KindOfCommand(use.on);
       const bool volts = command == CommandKind::kVoltage;
       key += volts ? "_v" : IsElectric(command) ? "_a" : "_n_m";
       unit = volts ? "V" : IsElectric(command) ? "A" : "N m";
-      if (!IsElectric(command)) scale = scales.torque_n_m;
+      if (!IsElectric(command)) kind = ScaleKind::kTorque;
     }
+    const double scale = ScaleOf(kind, scales);
     PlacedParameter out{.name = use.Text() + "." + key,
                         .key = key,
                         .unit = unit,
                         .role = p.role,
+                        .scale = kind,
                         .neutral = p.neutral * scale,
                         .low = p.low * scale,
                         .high = p.high * scale,
@@ -210,6 +217,15 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
     placed.push_back(std::move(out));
   }
   return placed;
+}
+
+std::optional<EffectUse> UseWithParameter(const std::string& name, const Rig& rig) {
+  for (const EffectUse& use : AllUses(rig)) {
+    for (const auto& p : PlacedParameters(use, rig, {})) {
+      if (p.name == name) return use;
+    }
+  }
+  return std::nullopt;
 }
 
 Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable& table) {
@@ -228,7 +244,8 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                             .frozen = false,
                             .with = with,
                             .size = with == Parameter::With::kNone ? "" : names.front(),
-                            .owner = Parameter::Owner::kEffect});
+                            .owner = Parameter::Owner::kEffect,
+                            .of_torque = IsOfTorque(p.scale)});
   }
   for (const auto& [size, value, unit] : {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"},
                                           std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {

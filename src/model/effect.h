@@ -5,6 +5,7 @@
 
 #include <compare>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,8 @@ struct Scales {
 // How a parameter scales with the rig.
 enum class ScaleKind { kOne, kTorque, kAngle, kSpeed, kStiffness, kDrag, kPower, kCommand, kCubic };
 double ScaleOf(ScaleKind kind, const Scales& scales);
+// Whether it scales a torque, or a torque per something of the motion: stiffness, drag.
+bool IsOfTorque(ScaleKind kind);
 
 // What a parameter of an effect says.
 enum class ParameterRole {
@@ -147,10 +150,13 @@ const Effect& EffectOf(const EffectUse& use, const Rig& rig);
 struct PlacedParameter {
   std::string name, key, unit;  // name in the model, key in results
   ParameterRole role = ParameterRole::kSize;
+  ScaleKind scale = ScaleKind::kOne;  // kCommand: of an electric drive; of others it is their torque
   double neutral, low, high, start;
   std::vector<double> trials;
 };
 std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& rig, const ScaleTable& scales);
+// The effect that would bring a parameter of that name to the rig; nothing: none would.
+std::optional<EffectUse> UseWithParameter(const std::string& name, const Rig& rig);
 
 }  // namespace gapscope
 

@@ -110,7 +110,8 @@ TEST_F(DesignCliTest, BadArgumentsAreBadInput) {
        {std::string("chirp"),
         std::string("chirp --inertia-kg-m2 nan --natural-frequency-hz 5 --damping-ratio 1 --speed-limit-rpm 100"),
         std::string("square nowhere.yaml"), "square " + rig + " --set link.stifness=1",
-        "square " + rig + " --period 0.001", "optimal " + rig, "optimal " + rig + " --separate cable_spring@base",
+        "square " + rig + " --set cable_spring@base.stifness=1", "square " + rig + " --period 0.001", "optimal " + rig,
+        "optimal " + rig + " --separate cable_spring@base",
         "optimal " + rig + " --separate cable_spring@base --separate cable_spring@base",
         "optimal " + rig + " --separate cable_spring@nowhere --separate none",
         "optimal " + rig + " --parameter motor.gear_ratio", "square " + Rig("xl330")}) {

@@ -19,7 +19,7 @@ InspectReport InspectRecording(const Recording& recording, const Experiment& exp
   std::vector<InspectChannel> channels;
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];
-    if (command.column == "constant") continue;
+    if (!command.column) continue;
     channels.push_back({.name = command.actuator,
                         .unit = experiment.commands[c].unit,
                         .role = ChannelRole::kCommand,

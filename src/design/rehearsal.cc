@@ -105,8 +105,8 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
   }
   for (std::size_t c = 0; c < experiment.commands.size(); ++c) {
     const CommandSpec& spec = experiment.commands[c];
-    Recording::Command command{.actuator = spec.actuator,
-                               .column = spec.columns.empty() ? "constant" : spec.columns.front()};
+    Recording::Command command{.actuator = spec.actuator};
+    if (!spec.columns.empty()) command.column = spec.columns.front();
     if (c == driven) {
       command.values = values;
     } else {
@@ -209,9 +209,9 @@ std::string InputCsv(const Experiment& experiment, const Rehearsal& rehearsal) {
   const double per_second = kPerSecond.at(experiment.timeline.time_unit);
   std::vector<std::size_t> commands;
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
-    if (recording.commands[c].column == "constant") continue;
+    if (!recording.commands[c].column) continue;
     commands.push_back(c);
-    text += "," + recording.commands[c].column;
+    text += "," + *recording.commands[c].column;
   }
   for (const auto& measured : recording.measured) {
     if (!IsLimitSignal(measured.spec)) text += ",predicted." + measured.spec.signal;

@@ -120,7 +120,7 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
   GS_ASSIGN(recording.values, BindValues(experiment, log));
 
   for (const auto& spec : experiment.commands) {
-    Recording::Command command{.actuator = spec.actuator, .column = "constant"};
+    Recording::Command command{.actuator = spec.actuator};
     if (const Column* column = FindFirst(log, spec.columns)) {
       command.column = column->name;
       const ColumnOptions options{.factor = spec.factor, .offset = spec.offset, .missing = experiment.timeline.missing};

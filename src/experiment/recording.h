@@ -3,6 +3,7 @@
 #define GAPSCOPE_EXPERIMENT_RECORDING_H_
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,8 @@ namespace gapscope {
 struct Recording {
   struct Command {
     std::string actuator;
-    std::string column;          // the log's column, or "constant"
-    std::vector<double> values;  // one per stamp, held to the next stamp
+    std::optional<std::string> column = {};  // the log's; nothing: it has none, and the command is a constant
+    std::vector<double> values;              // one per stamp, held to the next stamp
   };
   struct Measured {
     MeasuredSpec spec;

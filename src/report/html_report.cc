@@ -77,7 +77,7 @@ ordered_json Maps(const ReportSource& source, const Recording& recording) {
 ordered_json Responses(const Recording& recording, const LogReplay& replay) {
   ordered_json responses = ordered_json::array();
   for (std::size_t c = 0; c < recording.commands.size() && responses.size() < 4; ++c) {
-    if (recording.commands[c].column == "constant") continue;
+    if (!recording.commands[c].column) continue;
     for (const auto& signal : replay.signals) {
       if (!signal.scored || responses.size() >= 4) continue;
       const auto points =
@@ -139,7 +139,7 @@ ordered_json Traces(const ReportSource& source, std::size_t index, std::size_t m
   }
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];
-    if (command.column != "constant")
+    if (command.column)
       json["commands"].push_back({{"name", command.actuator},
                                   {"unit", source.experiment->commands[c].unit},
                                   {"values", Column(command.values, rows)}});

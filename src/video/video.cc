@@ -64,7 +64,7 @@ PageTraces TracesOf(const Recording& recording, const Experiment& experiment, co
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];
     // An input that nothing was logged for says nothing.
-    if (command.column != "constant")
+    if (command.column)
       traces.commands.push_back(
           {.name = command.actuator, .unit = experiment.commands[c].unit, .values = command.values});
   }

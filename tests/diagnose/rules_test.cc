@@ -84,7 +84,7 @@ TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {
   Recording servo;
   servo.measured.resize(1);
   servo.commands = {{.actuator = "motor", .column = "goal", .values = {0, 1, 0}},
-                    {.actuator = "motor.supply", .column = "constant", .values = {7, 7, 7}}};
+                    {.actuator = "motor.supply", .values = {7, 7, 7}}};
   EXPECT_TRUE(IsOneSignal({servo}));
   Recording supplied = servo;
   supplied.commands[1].values[2] = 6;

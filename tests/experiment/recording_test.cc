@@ -60,7 +60,7 @@ TEST_F(RecordingTest, OptionalColumnsMayBeMissing) {
   ASSERT_TRUE(loaded.ok()) << loaded.error().Text();
   const Recording& r = loaded.value();
   EXPECT_EQ(r.commands[0].column, "voltage");  // the second name
-  EXPECT_EQ(r.commands[1].column, "constant");
+  EXPECT_FALSE(r.commands[1].column);
   EXPECT_EQ(r.commands[1].values, (std::vector<double>{6, 6}));  // 2 log.kp, and log.kp is its default
   ASSERT_EQ(r.measured.size(), 1u);
   EXPECT_EQ(r.measured[0].spec.signal, "q");

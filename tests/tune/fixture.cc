@@ -87,9 +87,8 @@ Recording MakeRecording(const Rig& rig, std::vector<double> command, std::vector
   recording.commands.push_back(
       {.actuator = rig.experiment.commands.front().actuator, .column = "u", .values = std::move(command)});
   for (std::size_t c = 1; c < rig.experiment.commands.size(); ++c) {
-    recording.commands.push_back({.actuator = rig.experiment.commands[c].actuator,
-                                  .column = "constant",
-                                  .values = std::vector<double>(recording.rows(), 0.0)});
+    recording.commands.push_back(
+        {.actuator = rig.experiment.commands[c].actuator, .values = std::vector<double>(recording.rows(), 0.0)});
   }
   for (std::size_t s = 0; s < rig.experiment.measured.size(); ++s) {
     if (rig.experiment.measured[s].kind != SignalKind::kPosition) continue;

@@ -15,7 +15,7 @@ void WriteMeasuredJoints(const Model& model, std::span<const double> values, con
   const std::size_t nq = track.nq();
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {
     const SignalSource& source = model.source(recording.measured[s].index);
-    if (source.kind != SignalKind::kPosition) continue;
+    if (!TraitsOf(source.kind).gives_angle) continue;
     const double offset = source.offset >= 0 ? values[source.offset] : 0;
     const std::vector<double>& column = replay ? replay->signals[s].predicted : recording.measured[s].values;
     for (std::size_t row = 0; row < track.time_s.size(); ++row) {

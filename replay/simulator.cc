@@ -93,7 +93,7 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
   std::vector<bool> known(m.nv, false);
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
-    if (source.kind != SignalKind::kPosition) continue;
+    if (!TraitsOf(source.kind).gives_angle) continue;
     const LocalFit fit = FitLater(recording, measured, row, source.delay >= 0 ? values[source.delay] : 0);
     state.qpos[source.qpos] = fit.value - (source.offset >= 0 ? values[source.offset] : 0);
     state.qvel[source.dof] = fit.slope;
@@ -101,7 +101,7 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
   }
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
-    if (source.kind != SignalKind::kVelocity || known[source.dof]) continue;
+    if (!TraitsOf(source.kind).gives_speed || known[source.dof]) continue;
     state.qvel[source.dof] = FitLater(recording, measured, row, source.delay >= 0 ? values[source.delay] : 0).value;
   }
   for (const auto& [joint, from] : model.mirrored_joints()) {
@@ -134,7 +134,8 @@ Simulator::Simulator(const Model& model, double max_step_s)
   apart_.resize(model.mirrored_joints().size());
   remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nactuator,
                                               [](int plugin) { return plugin >= 0; });
-  for (const auto& source : model.sources()) reads_torque_ = reads_torque_ || source.kind == SignalKind::kTorque;
+  reads_forces_ = std::ranges::any_of(
+      model.sources(), [](const auto& source) { return TraitsOf(source.kind).stage == SignalStage::kForces; });
 }
 
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
@@ -191,9 +192,10 @@ void Simulator::Begin(const Recording& recording, Window window, const InitialSt
     d->qvel[m->jnt_dofadr[joint]] += apart_[i].second;
   }
   d->time = recording.time_s[window.begin];
-  // Torques cost a pass over the actuators at each stamp: only when this log has one.
-  reads_torque_ = std::any_of(recording.measured.begin(), recording.measured.end(),
-                              [&](const auto& q) { return model_.source(q.index).kind == SignalKind::kTorque; });
+  // Forces cost a pass over the actuators at each stamp: only when this log has one.
+  reads_forces_ = std::any_of(recording.measured.begin(), recording.measured.end(), [&](const auto& q) {
+    return TraitsOf(model_.source(q.index).kind).stage == SignalStage::kForces;
+  });
 }
 
 int Simulator::StepToNext(const Recording& recording, std::size_t row) {
@@ -223,7 +225,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];
     d->time = now;
-    if (reads_torque_) {
+    if (reads_forces_) {
       // The drive's torque at this stamp, still under the command that went before.
       const std::size_t before = row > 0 ? row - 1 : 0;
       SetCommands(recording, before, now, now);
@@ -294,7 +296,7 @@ double Simulator::Past() const {
 void Simulator::Follow(const Recording& recording, std::size_t row) {
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model_.source(measured.index);
-    if (source.kind != SignalKind::kPosition) continue;
+    if (!TraitsOf(source.kind).gives_angle) continue;
     const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
     data_->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
     data_->qvel[source.dof] = fit.slope;
@@ -320,7 +322,7 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   for (std::size_t c = 0; c < earlier_.size(); ++c) earlier_[c] = recording.commands[c].values.front();
   bool measured = false, still = true, commanded = false;
   for (const auto& signal : recording.measured) {
-    if (model_.source(signal.index).kind != SignalKind::kPosition) continue;
+    if (!TraitsOf(model_.source(signal.index).kind).gives_angle) continue;
     measured = true;
     still = still && FitLocally(recording, signal, 0, kInitialFitHalfWidth_s).slope == 0;
   }

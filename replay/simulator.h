@@ -89,7 +89,7 @@ class Simulator {
   ParameterWriter writer_;
   double max_step_s_;
   double shift_s_ = 0, command_delay_s_ = 0;
-  bool reads_torque_ = false;
+  bool reads_forces_ = false;
   bool remembers_ = false;  // has states beside position and speed
   std::vector<std::pair<double, double>>
       apart_;  // per mirrored joint: angle and speed beside its load at the start of a run

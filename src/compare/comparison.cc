@@ -7,12 +7,13 @@
 namespace gapscope {
 namespace {
 
-// Speed of a measured position, from the log itself: local fits, so that single counts are not reversals.
+// Speed of a joint that is measured, from the log itself: local fits, so that single counts are not reversals.
 std::vector<double> SmoothedSpeed(const Recording& recording, const Recording::Measured& measured) {
   std::vector<double> speed(recording.rows());
+  const bool given = TraitsOf(measured.spec.kind).gives_speed;
   for (std::size_t row = 0; row < recording.rows(); ++row) {
     const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
-    speed[row] = measured.spec.kind == SignalKind::kVelocity ? fit.value : fit.slope;
+    speed[row] = given ? fit.value : fit.slope;
   }
   return speed;
 }
@@ -29,11 +30,12 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
     ConditionInput input{
         .signal = trace.signal, .time_s = log.time_s, .measured = trace.measured, .predicted = trace.predicted};
     std::vector<double> speed;
-    if (trace.kind != SignalKind::kTorque) {
+    const SignalTraits& traits = TraitsOf(trace.kind);
+    if (traits.gives_angle || traits.gives_speed) {
       speed = SmoothedSpeed(recording, recording.measured[s]);
       input.speed = speed;
     }
-    if (trace.kind == SignalKind::kPosition) input.angle = trace.measured;
+    if (traits.gives_angle) input.angle = trace.measured;
     if (!recording.commands.empty()) input.command = recording.commands.front().values;
     for (auto& share : LocateError(input)) comparison.where.push_back(std::move(share));
   }

@@ -37,7 +37,7 @@ std::vector<ResidualTorque> EstimateResidualTorque(const Model& model, std::span
   std::vector<Joint> joints;
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
-    if (source.kind == SignalKind::kPosition) joints.push_back({&measured, &source});
+    if (TraitsOf(source.kind).gives_angle) joints.push_back({&measured, &source});
   }
   if (joints.size() != static_cast<std::size_t>(m.njnt) || m.nv != m.njnt || recording.rows() < 8) return {};
   Simulator simulator(model, 0);

@@ -14,13 +14,13 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kPrefix = "limit ";
 
-MeasuredSpec LimitSignal(const std::string& name, SignalKind kind, const std::string& on, const char* unit) {
+MeasuredSpec LimitSignal(const std::string& name, SignalKind kind, const std::string& on) {
   MeasuredSpec spec;
   spec.signal = kPrefix + name;
   spec.columns = {spec.signal};
   spec.kind = kind;
   spec.on = on;
-  spec.unit = unit;
+  spec.unit = TraitsOf(kind).units[0];
   spec.optional = true;
   spec.scored = false;
   return spec;
@@ -42,12 +42,9 @@ double LargestMagnitude(const std::vector<double>& values) {
 Experiment WithLimitSignals(Experiment experiment) {
   std::vector<MeasuredSpec> added;
   for (const auto& limit : experiment.limits) {
-    if (limit.position > 0)
-      added.push_back(LimitSignal(limit.joint + " angle", SignalKind::kPosition, limit.joint, "rad"));
-    if (limit.speed > 0)
-      added.push_back(LimitSignal(limit.joint + " speed", SignalKind::kVelocity, limit.joint, "rad/s"));
-    if (limit.torque > 0)
-      added.push_back(LimitSignal(limit.actuator + " torque", SignalKind::kTorque, limit.actuator, "N m"));
+    if (limit.position > 0) added.push_back(LimitSignal(limit.joint + " angle", SignalKind::kPosition, limit.joint));
+    if (limit.speed > 0) added.push_back(LimitSignal(limit.joint + " speed", SignalKind::kVelocity, limit.joint));
+    if (limit.torque > 0) added.push_back(LimitSignal(limit.actuator + " torque", SignalKind::kTorque, limit.actuator));
   }
   experiment.measured.insert(experiment.measured.end(), added.begin(), added.end());
   return experiment;

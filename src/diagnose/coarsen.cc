@@ -8,8 +8,9 @@ namespace gapscope {
 
 Recording Coarsen(const Recording& recording, double least_step_s) {
   // A drive's torque follows its command at once: under the mean of a few commands it would seem to be late.
-  const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(),
-                                  [](const auto& m) { return m.spec.scored && m.spec.kind == SignalKind::kTorque; });
+  const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
+    return m.spec.scored && TraitsOf(m.spec.kind).stage == SignalStage::kForces;
+  });
   if (torque) return recording;
   constexpr double kSlack = 0.95;  // of the step: stamps jitter
   std::vector<std::size_t> kept;

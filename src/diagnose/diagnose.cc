@@ -70,7 +70,7 @@ std::vector<ConditionShare> Locate(const Candidate& candidate, const std::vector
     ConditionInput input{
         .signal = trace.signal, .time_s = log.time_s, .measured = trace.measured, .predicted = trace.predicted};
     std::vector<double> speed;
-    if (trace.kind == SignalKind::kPosition) {
+    if (TraitsOf(trace.kind).gives_angle) {
       for (std::size_t row = 0; row < recording.rows(); ++row)
         speed.push_back(FitLocally(recording, recording.measured[s], row, kInitialFitHalfWidth_s).slope);
       input.speed = speed;

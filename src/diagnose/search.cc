@@ -184,8 +184,8 @@ Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const S
   SearchResult result;
   result.one_signal = IsOneSignal(bench.data.train) && IsOneSignal(bench.data.held_out);
   const auto& measured = bench.data.train.front().measured;
-  result.torque =
-      std::any_of(measured.begin(), measured.end(), [](const auto& m) { return m.spec.kind == SignalKind::kTorque; });
+  result.torque = std::any_of(measured.begin(), measured.end(),
+                              [](const auto& m) { return TraitsOf(m.spec.kind).stage == SignalStage::kForces; });
   say("refitting the baseline");
   GS_ASSIGN(Candidate nominal, MakeCandidate(bench, {}));
   result.base = std::make_unique<Candidate>();

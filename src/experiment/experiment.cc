@@ -1,11 +1,11 @@
 #include "src/experiment/experiment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <set>
+#include <stdexcept>
 
 #include "src/core/units.h"
 #include "src/experiment/yaml_reader.h"
@@ -133,19 +133,20 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     spec.signal = map.Text("signal");
     spec.columns = ReadColumns(map, item, false);
     if (spec.columns.empty()) spec.columns = {spec.signal};
-    constexpr SignalKind kKinds[] = {SignalKind::kPosition, SignalKind::kVelocity, SignalKind::kTorque};
-    spec.kind = kKinds[map.Choice("kind", {"position", "velocity", "torque"}, 0)];
+    std::vector<std::string> kinds;
+    for (const auto& row : AllSignalTraits()) kinds.emplace_back(row.name);
+    const SignalTraits& traits = AllSignalTraits()[map.Choice("kind", kinds, 0)];
+    spec.kind = traits.kind;
     const std::string joint = map.Text("joint", ""), actuator = map.Text("actuator", "");
-    spec.on = spec.kind == SignalKind::kTorque ? actuator : joint;
+    spec.on = traits.of_actuator ? actuator : joint;
     if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
       map.Fail(item, {.what = "the signal '" + spec.signal +
                               "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
     }
     spec.unit = ReadScaling(map, item, &spec.factor, &spec.offset);
     // "1": the column is in SI already.
-    const std::array<const char*, 3> fits[] = {{"rad", "m", "1"}, {"rad/s", "m/s", "1"}, {"N m", "N", "1"}};
-    const auto& units = fits[static_cast<std::size_t>(spec.kind)];
-    if (std::find(units.begin(), units.end(), spec.unit) == units.end()) {
+    const auto& units = traits.units;
+    if (spec.unit != "1" && std::ranges::find(units, spec.unit) == std::end(units)) {
       map.Fail(item, {.what = "the unit of the signal '" + spec.signal + "' does not fit its kind",
                       .actual = "'" + map.Text("unit", "1") + "'",
                       .allowed = std::string("units of ") + units[0] + " or " + units[1]});
@@ -269,6 +270,42 @@ Status ReadReplay(const YAML::Node& node, const std::string& path, Experiment* e
 }
 
 }  // namespace
+
+std::span<const SignalTraits> AllSignalTraits() {
+  using enum SignalKind;
+  static constexpr SignalTraits kTraits[] = {{.kind = kPosition,
+                                              .name = "position",
+                                              .units = {"rad", "m"},
+                                              .of_actuator = false,
+                                              .has_zero = true,
+                                              .gives_angle = true,
+                                              .gives_speed = false,
+                                              .stage = SignalStage::kState},
+                                             {.kind = kVelocity,
+                                              .name = "velocity",
+                                              .units = {"rad/s", "m/s"},
+                                              .of_actuator = false,
+                                              .has_zero = false,
+                                              .gives_angle = false,
+                                              .gives_speed = true,
+                                              .stage = SignalStage::kState},
+                                             {.kind = kTorque,
+                                              .name = "torque",
+                                              .units = {"N m", "N"},
+                                              .of_actuator = true,
+                                              .has_zero = false,
+                                              .gives_angle = false,
+                                              .gives_speed = false,
+                                              .stage = SignalStage::kForces}};
+  return kTraits;
+}
+
+const SignalTraits& TraitsOf(SignalKind kind) {
+  for (const SignalTraits& traits : AllSignalTraits()) {
+    if (traits.kind == kind) return traits;
+  }
+  throw std::logic_error("a kind of signal without traits");
+}
 
 template <>
 std::span<const EnumName<ReplayMode>> EnumNames<ReplayMode>() {

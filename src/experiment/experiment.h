@@ -41,6 +41,22 @@ struct CommandSpec {
 
 enum class SignalKind { kPosition, kVelocity, kTorque };
 
+// From which a simulation reads a signal: the state alone, or forces, which follow the command at once.
+enum class SignalStage { kState, kForces };
+
+struct SignalTraits {
+  SignalKind kind;
+  const char* name;      // as the experiment file says it
+  const char* units[2];  // SI, of a hinge and of a slide
+  bool of_actuator;      // measured on an actuator, else on a joint
+  bool has_zero;         // its sensor has a zero of its own, which a log may be off by
+  bool gives_angle;      // it is the joint's coordinate
+  bool gives_speed;      // it is the joint's speed
+  SignalStage stage;
+};
+std::span<const SignalTraits> AllSignalTraits();
+const SignalTraits& TraitsOf(SignalKind kind);
+
 // Second-order low-pass that the rig applies to a signal before it is logged, w^2 / (s^2 + 2 z w s + w^2): names of
 // parameters; empty: none.
 struct SensorFilter {
@@ -52,7 +68,7 @@ struct MeasuredSpec {
   std::string signal;                // name in results: "arm_rad"
   std::vector<std::string> columns;  // the first one that the log has
   SignalKind kind = SignalKind::kPosition;
-  std::string on;                 // joint, or actuator for kTorque
+  std::string on;                 // joint or actuator: SignalTraits::of_actuator
   std::string unit;               // SI unit: "rad", "rad/s", "N m"
   double factor = 1, offset = 0;  // measured in SI = factor * column + offset
   double resolution = 0;          // size of one sensor count, SI; 0: unknown

@@ -88,7 +88,7 @@ void FitProblem::PlaceStart(Worker& worker, const FitWindow& window, const FitPo
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {
     const SignalLayout& signal = layout_.signals[window.log][s];
     const SignalSource& source = model_.source(recording.measured[s].index);
-    if (source.kind != SignalKind::kPosition) continue;
+    if (!TraitsOf(source.kind).gives_angle) continue;
     if (source.offset >= 0 && from_log && !late)
       start.qpos[source.qpos] += first[source.offset] - values[source.offset];
     if (from_log) start.qpos[source.qpos] -= layout_.Offset(point.y, window.log, s);

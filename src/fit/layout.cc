@@ -17,11 +17,12 @@ double Weight(const FitOptions& options, const Recording::Measured& measured, co
   return 1 / (options.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean));
 }
 
-// Torques jump to the next command as soon as commands come early.
-bool ScoresTorque(const std::vector<Recording>& recordings, const FitLayout& layout) {
+// Forces jump to the next command as soon as commands come early.
+bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& layout) {
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
-      if (recordings[l].measured[s].spec.kind == SignalKind::kTorque && layout.signals[l][s].weight > 0) return true;
+      const SignalTraits& traits = TraitsOf(recordings[l].measured[s].spec.kind);
+      if (traits.stage == SignalStage::kForces && layout.signals[l][s].weight > 0) return true;
     }
   }
   return false;
@@ -39,7 +40,7 @@ void AddLog(const Model& model, const Recording& recording, const FitOptions& op
     if (!(deviation > 0)) continue;
     signals[s].deviation = deviation;
     signals[s].weight = Weight(options, measured, moments, deviation);
-    if (measured.spec.kind != SignalKind::kPosition) continue;
+    if (!TraitsOf(measured.spec.kind).has_zero) continue;
     if (options.fit_offsets) {
       signals[s].offset = static_cast<int>(low->size());
       low->push_back(-kFitPolicy.offset_bound_rad / deviation);
@@ -76,7 +77,7 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
   if (options.fit_shift && model.command_delay() < 0) {
     // In samples. No descent gets past the jump of a torque at an early command: where one is scored commands are late
     // or on time.
-    low.push_back(ScoresTorque(recordings, layout) ? 0 : -1);
+    low.push_back(ScoresForces(recordings, layout) ? 0 : -1);
     high.push_back(1);
     layout.shift_scale_s = options.shift_range_s > 0 ? options.shift_range_s : step;
   }

@@ -110,7 +110,7 @@ Status Model::ResolveNames() {
   }
   for (const auto& measured : experiment().measured) {
     SignalSource source{.kind = measured.kind};
-    if (measured.kind == SignalKind::kTorque) {
+    if (TraitsOf(measured.kind).of_actuator) {
       source.actuator = mj_name2id(&m, mjOBJ_ACTUATOR, measured.on.c_str());
       if (source.actuator < 0)
         return NoSuch("a measured torque is of an actuator that the MJCF lacks", measured.on,

@@ -109,7 +109,7 @@ std::vector<std::string> Rig::Signals() const {
 
 std::string Rig::JointOfSignal(const std::string& signal) const {
   for (const auto& measured : experiment_.measured) {
-    if (measured.signal == signal) return measured.kind == SignalKind::kTorque ? JointOf(measured.on) : measured.on;
+    if (measured.signal == signal) return TraitsOf(measured.kind).of_actuator ? JointOf(measured.on) : measured.on;
   }
   return "";
 }

@@ -51,7 +51,7 @@ PageTraces TracesOf(const Recording& recording, const Experiment& experiment, co
     for (const bool position : {true, false}) {
       for (std::size_t s = 0; s < recording.measured.size(); ++s) {
         const MeasuredSpec& spec = recording.measured[s].spec;
-        if (spec.scored != scored || (spec.kind == SignalKind::kPosition) != position) continue;
+        if (spec.scored != scored || TraitsOf(spec.kind).gives_angle != position) continue;
         traces.signals.push_back({.name = spec.signal,
                                   .unit = spec.unit,
                                   .moves = position,
@@ -217,7 +217,7 @@ Status Validate(const Recording& recording, VideoOptions* options) {
                  .actual = "'" + extension + "'",
                  .allowed = ".mp4, .gif, .png"};
   if (std::none_of(recording.measured.begin(), recording.measured.end(),
-                   [](const auto& q) { return q.spec.kind == SignalKind::kPosition; })) {
+                   [](const auto& q) { return TraitsOf(q.spec.kind).gives_angle; })) {
     return Error{.what = "no position is measured: there is no real mechanism to draw", .where = recording.log_path};
   }
   const double end = recording.time_s.back();

@@ -28,8 +28,10 @@ std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, do
 Status ReadLogSection(const YAML::Node& node, const std::string& path, Experiment* experiment) {
   if (!node.IsDefined()) return Ok();
   YamlMap map(node, path, "'log'");
-  constexpr LogFormat kFormats[] = {LogFormat::kAuto, LogFormat::kCsv, LogFormat::kBamJson};
-  experiment->read.format = kFormats[map.Choice("format", {"auto", "csv", "bam_json"}, 0)];
+  std::vector<std::string> formats = {"auto"};
+  for (const LogReader& reader : LogReaders()) formats.emplace_back(reader.name);
+  if (const std::size_t chosen = map.Choice("format", formats, 0); chosen > 0)
+    experiment->read.format = &LogReaders()[chosen - 1];
   if (const YAML::Node time = map.Child("time"); time.IsDefined()) {
     YamlMap time_map(time, path, "'time'");
     experiment->timeline.time_column = time_map.Text("column", "");

@@ -339,12 +339,16 @@ class Handler : public nlohmann::json_sax<Json> {
 
 }  // namespace
 
+bool LooksLikeJson(const std::string& path, std::string_view bytes) {
+  const std::size_t first = bytes.find_first_not_of(" \t\r\n", BomSize(bytes));
+  return path.ends_with(".json") || (first != std::string_view::npos && (bytes[first] == '{' || bytes[first] == '['));
+}
+
 Result<Log> ReadBamJson(const std::string& path, std::string_view bytes) {
   GS_RETURN_IF_ERROR(CheckText(path, bytes));
   bytes.remove_prefix(BomSize(bytes));
   Log log;
   log.path = path;
-  log.format = "bam_json";
   std::string copy;
   std::vector<std::size_t> longer;
   std::size_t infinities = 0;

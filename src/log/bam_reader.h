@@ -13,6 +13,9 @@
 
 namespace gapscope {
 
+// Whether a file is one: by its extension, or by how it begins.
+bool LooksLikeJson(const std::string& path, std::string_view bytes);
+
 // Reads a log from the bytes of a file; `path` is for messages. The JSON is taken as a stream of events, so that memory
 // stays within a small multiple of the file whatever it says. Errors give path:line:column: not JSON, no "entries",
 // an entry that is not a flat object of numbers, a key twice, nesting deeper than 64, more than 1,000 columns.

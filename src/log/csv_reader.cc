@@ -367,7 +367,6 @@ Result<Log> ReadCsv(const std::string& path, std::string_view bytes) {
   GS_ASSIGN(const CsvDialect dialect, DetectCsvDialect(path, bytes));
   Log log;
   log.path = path;
-  log.format = "csv";
   log.header_line = dialect.header_line;
   log.findings = dialect.findings;
   GS_RETURN_IF_ERROR(BodyReader(path, bytes, dialect, &log).Read());

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <new>
 
@@ -15,43 +14,26 @@
 namespace gapscope {
 namespace {
 
-// One entry per format. A new format is a reader and a line here (and its name in LogFormat).
-struct FormatReader {
-  LogFormat format;
-  bool (*matches)(const std::string& path, std::string_view bytes);  // for kAuto; the first that matches reads
-  Result<Log> (*read)(const std::string& path, std::string_view bytes);
+// A new format is a reader and a row here, before the last.
+constexpr LogReader kReaders[] = {
+    {"bam_json", LooksLikeJson, ReadBamJson},
+    {"csv", [](const std::string&, std::string_view) { return true; }, ReadCsv},
 };
 
-bool LooksLikeJson(const std::string& path, std::string_view bytes) {
-  const std::size_t first = bytes.find_first_not_of(" \t\r\n", BomSize(bytes));
-  return path.ends_with(".json") || (first != std::string_view::npos && (bytes[first] == '{' || bytes[first] == '['));
-}
-bool Always(const std::string&, std::string_view) { return true; }
-
-constexpr std::array kReaders = {
-    FormatReader{LogFormat::kBamJson, LooksLikeJson, ReadBamJson},
-    FormatReader{LogFormat::kCsv, Always, ReadCsv},
-};
-
-Result<Log> ReadOne(const std::string& path, LogFormat format) {
+Result<Log> ReadOne(const std::string& path, const LogReader* format) {
   GS_ASSIGN(const std::string bytes, ReadFile(path));
-  for (const auto& reader : kReaders) {
-    if (format == LogFormat::kAuto ? !reader.matches(path, bytes) : reader.format != format) continue;
-    try {
-      return reader.read(path, bytes);
-    } catch (const std::bad_alloc&) {
-      return Error{.what = "not enough memory for this log",
-                   .where = At(path, 1),
-                   .actual = fmt::format("{} bytes", bytes.size()),
-                   .allowed = "",
-                   .cure = "split it, or leave out columns"};
-    }
+  if (!format) format = std::ranges::find_if(kReaders, [&](const auto& reader) { return reader.matches(path, bytes); });
+  try {
+    GS_ASSIGN(Log log, format->read(path, bytes));
+    log.format = format->name;
+    return log;
+  } catch (const std::bad_alloc&) {
+    return Error{.what = "not enough memory for this log",
+                 .where = At(path, 1),
+                 .actual = fmt::format("{} bytes", bytes.size()),
+                 .allowed = "",
+                 .cure = "split it, or leave out columns"};
   }
-  return Error{.what = "no reader for this format",
-               .where = At(path, 1),
-               .actual = "",
-               .allowed = "auto, csv, bam_json",
-               .cure = ""};
 }
 
 Result<std::string> CompanionPath(const std::string& path, const Companion& companion) {
@@ -113,6 +95,8 @@ bool EqualApartFromBlanks(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
+
+std::span<const LogReader> LogReaders() { return kReaders; }
 
 const Column* Log::Find(std::string_view name) const {
   for (const auto& column : columns) {

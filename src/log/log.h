@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,7 +38,7 @@ struct LineAnchor {
 
 struct Log {
   std::string path;
-  std::string format;  // "csv" or "bam_json"
+  std::string format;  // LogReader::name
   std::vector<Column> columns;
   std::map<std::string, double> header;            // numbers of the header, by name
   std::map<std::string, std::string> header_text;  // texts of the header, by name
@@ -55,7 +56,14 @@ struct Log {
   std::string WhereHeader() const;
 };
 
-enum class LogFormat { kAuto, kCsv, kBamJson };
+// A format: its name in Log::format and in experiment files, and its reader.
+struct LogReader {
+  const char* name;
+  bool (*matches)(const std::string& path, std::string_view bytes);  // by its content or extension
+  Result<Log> (*read)(const std::string& path, std::string_view bytes);
+};
+// All formats, in the order in which a file of none in particular is offered to them; the last takes every one.
+std::span<const LogReader> LogReaders();
 
 // A second file that belongs to the log and is paired with it row by row: its path is the log's path with the last
 // `find` in its file name replaced by `replace`; its columns are named `prefix` + name.
@@ -64,7 +72,7 @@ struct Companion {
 };
 
 struct ReadOptions {
-  LogFormat format = LogFormat::kAuto;
+  const LogReader* format = nullptr;  // of LogReaders(); null: the first that matches
   std::vector<Companion> companions = {};
 };
 

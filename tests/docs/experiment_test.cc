@@ -60,6 +60,11 @@ TEST(ExperimentDocTest, NamesEveryKey) {
   for (const auto& [what, yaml] : maps) ExpectDocumented(AllowedKeys(yaml), what);
 }
 
+TEST(ExperimentDocTest, NamesEveryLogFormatAndKindOfSignal) {
+  for (const LogReader& reader : LogReaders()) ExpectDocumented(reader.name, "log format");
+  for (const SignalTraits& traits : AllSignalTraits()) ExpectDocumented(traits.name, "kind of signal");
+}
+
 TEST(ExperimentDocTest, NamesEveryField) {
   char error[500] = "";
   SpecPtr spec(

@@ -21,7 +21,6 @@ TEST(BamReaderTest, ReadsHeaderAndEntries) {
   const Log log = Read(R"({"mass": 0.49, "kp": 100, "motor": "xl330", "spare": true, "entries": [
     {"timestamp": 0.0035, "position": -0.5, "load": 65527, "torque_enable": true},
     {"timestamp": 0.0087, "position": 1e-3, "load": 0, "torque_enable": false}]})");
-  EXPECT_EQ(log.format, "bam_json");
   EXPECT_EQ(log.header, (std::map<std::string, double>{{"kp", 100}, {"mass", 0.49}, {"spare", 1}}));
   EXPECT_EQ(log.header_text, (std::map<std::string, std::string>{{"motor", "xl330"}}));
   EXPECT_EQ(log.ColumnNames(), (std::vector<std::string>{"timestamp", "position", "load", "torque_enable"}));

@@ -13,8 +13,10 @@ TEST(LogTest, FormatIsFoundByContentAndName) {
   const auto json = ReadLog(folder.Write("b.log", "\n {\"entries\": [{\"t\": 0}]}"), {});
   ASSERT_TRUE(json.ok());
   EXPECT_EQ(json.value().format, "bam_json");
-  EXPECT_FALSE(ReadLog(folder.Path("b.log"), {.format = LogFormat::kCsv, .companions = {}}).ok());
-  EXPECT_FALSE(ReadLog(folder.Path("a.csv"), {.format = LogFormat::kBamJson, .companions = {}}).ok());
+  for (const LogReader& reader : LogReaders()) {
+    const std::string other = std::string(reader.name) == "csv" ? "b.log" : "a.csv";
+    EXPECT_FALSE(ReadLog(folder.Path(other), {.format = &reader, .companions = {}}).ok()) << reader.name;
+  }
 }
 
 class CompanionTest : public testing::Test {

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
-"""Makes demo/qube.csv: a rotary pendulum whose arm has what models/qube lacks, a cable that pulls to a rest angle and dry friction.
+"""Makes demo/qube.csv: a rotary pendulum whose arm has what models/qube lacks, a cable that pulls to a rest angle and
+dry friction.
 
-The equations are those of models/qube/README.md, integrated here in steps of 20 us with no simulator, so that the demo does not compare the program
-with itself. Encoders have 2048 counts per revolution. Usage: demo/make_log.py > demo/qube.csv
+The equations are those of models/qube/README.md, integrated here in steps of 20 us with no simulator, so that the demo
+does not compare the program with itself. Encoders have 2048 counts per revolution. Usage: demo/make_log.py >
+demo/qube.csv
 """
 import math
 

@@ -26,19 +26,24 @@ def main(signal, out, *traces):
     low, high = min(values), max(values)
     x = lambda t: LEFT + (WIDTH - LEFT - 10) * t / time[-1]
     y = lambda v: TOP + (HEIGHT - TOP - BOTTOM) * (high - v) / (high - low)
-    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="12">',
+    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" '
+           f'font-size="12">',
            f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>']
     for tick in range(0, int(time[-1]) + 1, 2):
-        svg.append(f'<text x="{x(tick):.0f}" y="{HEIGHT - 10}" text-anchor="{"end" if tick == int(time[-1]) else "middle"}">{tick} s</text>')
+        svg.append(f'<text x="{x(tick):.0f}" y="{HEIGHT - 10}" '
+                   f'text-anchor="{"end" if tick == int(time[-1]) else "middle"}">{tick} s</text>')
     step = 0.5 if high - low > 1 else 0.1
     for k in range(math.ceil(low / step), math.floor(high / step) + 1):
-        svg.append(f'<path d="M{LEFT} {y(k * step):.1f}H{WIDTH - 10}" stroke="#ddd"/><text x="{LEFT - 6}" y="{y(k * step) + 4:.1f}" text-anchor="end">{k * step:.1f}</text>')
-    svg.append(f'<text x="12" y="{HEIGHT / 2:.0f}" transform="rotate(-90 12 {HEIGHT / 2:.0f})" text-anchor="middle">{signal}</text>')
+        svg.append(f'<path d="M{LEFT} {y(k * step):.1f}H{WIDTH - 10}" stroke="#ddd"/><text x="{LEFT - 6}" '
+                   f'y="{y(k * step) + 4:.1f}" text-anchor="end">{k * step:.1f}</text>')
+    svg.append(f'<text x="12" y="{HEIGHT / 2:.0f}" transform="rotate(-90 12 {HEIGHT / 2:.0f})" '
+               f'text-anchor="middle">{signal}</text>')
     for place, (label, colour, data) in enumerate(lines):
         points = " ".join(f"{x(t):.1f},{y(v):.1f}" for t, v in list(zip(time, data))[::6] if v == v)
         style = ' stroke-width="3.4" stroke-opacity="0.45"' if label == "measured" else ' stroke-width="1.3"'
         svg.append(f'<polyline points="{points}" fill="none" stroke="{colour}"{style}/>')
-        svg.append(f'<path d="M{LEFT + 10 + 215 * place} 17h18" stroke="{colour}" stroke-width="3"/><text x="{LEFT + 34 + 215 * place}" y="21">{label}</text>')
+        svg.append(f'<path d="M{LEFT + 10 + 215 * place} 17h18" stroke="{colour}" stroke-width="3"/><text '
+                   f'x="{LEFT + 34 + 215 * place}" y="21">{label}</text>')
     with open(out, "w") as file:
         file.write("\n".join(svg) + "\n</svg>\n")
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""What a verdict's probability should be, from banks of twin cases: logistic fits of "right" on the verdict's evidence, one for each kind of verdict.
+"""What a verdict's probability should be, from banks of twin cases: logistic fits of "right" on the verdict's evidence,
+one for each kind of verdict.
 
     scripts/blind/calibrate.py out/blind/902 [out/blind/...]
 
-Prints the constants of `Confidence` in src/diagnose/verdict.cc. Judge them on banks of other seeds. Plain Newton steps with a Gaussian prior of
-deviation 2 on each weight: banks are small."""
+Prints the constants of `Confidence` in src/diagnose/verdict.cc. Judge them on banks of other seeds. Plain Newton steps
+with a Gaussian prior of deviation 2 on each weight: banks are small."""
 import json, math, sys
 from pathlib import Path
 
@@ -18,7 +19,8 @@ def features(verdict):
     e = verdict["evidence"]
     left = math.log(max(e["floors_left"] or 1.0, 1.0))
     lead = min(max(e["rival_lead"] or 0.0, 0.0), 0.5)
-    return {"none": [left], "effects": [left, lead, float(len(verdict["effects"]) > 1)], "ambiguous": [left], "unknown": [left, max(e["removed"] or 0.0, 0.0)]}[kind(verdict)]
+    return {"none": [left], "effects": [left, lead, float(len(verdict["effects"]) > 1)], "ambiguous": [left],
+            "unknown": [left, max(e["removed"] or 0.0, 0.0)]}[kind(verdict)]
 
 
 def kind(verdict):
@@ -49,7 +51,8 @@ def logistic(x, y):
     for _ in range(50):
         p = [1 / (1 + math.exp(-sum(a * b for a, b in zip(w, row)))) for row in x]
         gradient = [sum((p[i] - y[i]) * x[i][j] for i in range(len(x))) + w[j] / PRIOR**2 for j in range(n)]
-        hessian = [[sum(p[i] * (1 - p[i]) * x[i][j] * x[i][k] for i in range(len(x))) + (j == k) / PRIOR**2 for k in range(n)] for j in range(n)]
+        hessian = [[sum(p[i] * (1 - p[i]) * x[i][j] * x[i][k] for i in range(len(x))) + (j == k) / PRIOR**2
+                    for k in range(n)] for j in range(n)]
         w = [a - b for a, b in zip(w, solve(hessian, gradient))]
     return w
 
@@ -62,7 +65,8 @@ def main():
         part = [c for c in cases if kind(c.verdict) == name]
         if part:
             weights = logistic([features(c.verdict) for c in part], [float(c.right()) for c in part])
-            print(f"{name:10s} {len(part):4d} cases, {sum(c.right() for c in part)} right; weights " + ", ".join(f"{w:.2f}" for w in weights))
+            print(f"{name:10s} {len(part):4d} cases, {sum(c.right() for c in part)} right; weights "
+                  + ", ".join(f"{w:.2f}" for w in weights))
 
 
 if __name__ == "__main__":

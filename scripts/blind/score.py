@@ -1,4 +1,5 @@
-"""Scores verdicts of `gapscope diagnose` against sealed labels: the table of targets of docs/diagnosis.md, baselines, confusions."""
+"""Scores verdicts of `gapscope diagnose` against sealed labels: the table of targets of docs/diagnosis.md, baselines,
+confusions."""
 import json, math, random
 from collections import Counter
 
@@ -26,10 +27,13 @@ class Case:
         self.truth = [(e["name"], e["on"]) for e in label["effects"]]
         # What only the log that is kept from the program shows, nobody can find.
         logs = len(given(label["logs"]))
-        seen = [min(e["effect_to_floor_refit"], max(e.get("effect_to_floor_logs", [math.inf])[:logs])) for e in label["effects"]]
+        seen = [min(e["effect_to_floor_refit"], max(e.get("effect_to_floor_logs", [math.inf])[:logs]))
+                for e in label["effects"]]
         self.strength = min(seen, default=label["effect_to_floor_refit"])
         # A delay below one sample is a nuisance of every model, by the contract: no severity makes it a finding.
-        below_a_sample = any(e["name"] == "command_delay" and e["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"]) for e in label["effects"])
+        below_a_sample = any(e["name"] == "command_delay"
+                             and e["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"])
+                             for e in label["effects"])
         self.strong = self.kind in ("none", "ambiguous") or (self.strength >= STRONG and not below_a_sample)
         self.named = [(e["name"], e["on"]) for e in verdict["effects"]]
         self.answer, self.probability = verdict["verdict"], verdict["probability"]
@@ -84,7 +88,8 @@ def median_interval(values):
 
 
 def parameter_errors(case):
-    """Relative errors of the found effect's parameters; angles of rest, whose zero a sensor's offset moves, and counts of periods are left out."""
+    """Relative errors of the found effect's parameters; angles of rest, whose zero a sensor's offset moves, and counts
+    of periods are left out."""
     truth, found = case.label["effects"][0]["parameters"], case.verdict["effects"][0]["parameters"]
     for name, value in truth.items():
         if name in found and "rest" not in name and "periods" not in name and value:
@@ -116,11 +121,13 @@ def figures(cases, seed):
 
     def share(name, target, better, hits, n):
         low, high = wilson(hits, n)
-        rows.append({"name": name, "target": target, "better": better, "value": hits / n if n else math.nan, "low": low, "high": high, "hits": hits, "cases": n})
+        rows.append({"name": name, "target": target, "better": better, "value": hits / n if n else math.nan, "low": low,
+                     "high": high, "hits": hits, "cases": n})
 
     def number(name, target, better, values):
         low, high = median_interval(values)
-        rows.append({"name": name, "target": target, "better": better, "value": median(values), "low": low, "high": high, "cases": len(values)})
+        rows.append({"name": name, "target": target, "better": better, "value": median(values), "low": low,
+                     "high": high, "cases": len(values)})
 
     share("effect named where there is none", 0.02, "lower", sum(bool(c.named) for c in none), len(none))
     gaps = single + pair
@@ -128,23 +135,30 @@ def figures(cases, seed):
     share("right effect first, single", 0.90, "higher", len(found), len(single))
     share("right effect within group or first two", 0.97, "higher", sum(c.near() for c in single), len(single))
     share("two effects: exact set", 0.65, "higher", sum(set(c.named) == set(c.truth) for c in pair), len(pair))
-    share("wrong with probability >= 0.9", 0.02, "lower", sum(c.probability >= 0.9 and not c.right() for c in judged), len(judged))
+    share("wrong with probability >= 0.9", 0.02, "lower", sum(c.probability >= 0.9 and not c.right() for c in judged),
+          len(judged))
     share("`unknown` recalled", 0.75, "higher", sum(c.answer == "unknown" for c in outside), len(outside))
     share("built ambiguity named", None, "higher", sum(c.right() for c in ambiguous), len(ambiguous))
-    share("ambiguity where none was built", 0.10, "lower", sum(c.answer == "ambiguous" for c in none + gaps), len(none + gaps))
+    share("ambiguity where none was built", 0.10, "lower", sum(c.answer == "ambiguous" for c in none + gaps),
+          len(none + gaps))
     error, bins = calibration(judged)
-    rows.append({"name": "calibration error", "target": 0.05, "better": "lower", "value": error, "low": math.nan, "high": math.nan, "cases": len(judged)})
+    rows.append({"name": "calibration error", "target": 0.05, "better": "lower", "value": error, "low": math.nan,
+                 "high": math.nan, "cases": len(judged)})
     number("effect parameter, median error", 0.10, "lower", [e for c in found for e in parameter_errors(c)])
     number("held-out gap to floor closed, median", 0.80, "higher", [c.verdict["gap"]["closed"] for c in found])
-    number("predicted against realised shrinkage, median difference", 0.10, "lower", [shrinkage_difference(c) for c in found if shrinkage_difference(c) is not None])
+    number("predicted against realised shrinkage, median difference", 0.10, "lower",
+           [shrinkage_difference(c) for c in found if shrinkage_difference(c) is not None])
     number("wall time of a case, s", None, "lower", [c.verdict.get("check", {}).get("wall_s") for c in cases])
     share("verdict right as a whole", None, "higher", sum(c.right() for c in judged), len(judged))
     # Baselines on the single cases: what they would put first.
     draw = random.Random(seed)
-    for name, pick in (("largest error drop", lambda c: min(tried(c), key=lambda e: e["held_out_error"], default=None)), ("raw BIC", lambda c: min(tried(c), key=lambda e: e.get("bic", math.inf), default=None)),
+    for name, pick in (("largest error drop", lambda c: min(tried(c), key=lambda e: e["held_out_error"], default=None)),
+                       ("raw BIC", lambda c: min(tried(c), key=lambda e: e.get("bic", math.inf), default=None)),
                        ("random", lambda c: draw.choice([e for e in c.verdict["candidates"] if e["name"] != "none"]))):
-        share(f"baseline {name}: right effect first, single", None, "higher", sum(is_truth(pick(c), c) for c in single), len(single))
-        share(f"baseline {name}: effect named where there is none", None, "lower", sum(names_one(pick, name, c) for c in none), len(none))
+        share(f"baseline {name}: right effect first, single", None, "higher", sum(is_truth(pick(c), c) for c in single),
+              len(single))
+        share(f"baseline {name}: effect named where there is none", None, "lower",
+              sum(names_one(pick, name, c) for c in none), len(none))
     return {"seed": seed, "cases": len(cases), "rows": rows, "calibration": bins}
 
 
@@ -176,15 +190,21 @@ def shrinkage_difference(case):
 
 
 def table(figures):
-    lines = [f"{figures['cases']} cases of seed {figures['seed']}; targets hold for severities of {STRONG:g} floors and more", "",
+    lines = [f"{figures['cases']} cases of seed {figures['seed']}; targets hold for severities of "
+             f"{STRONG:g} floors and more", "",
              "| metric | value | 95 % interval | cases | target | reached |", "|---|---|---|---|---|---|"]
     for row in figures["rows"]:
         percent = row.get("hits") is not None
-        text = (lambda v: "-" if v is None or math.isnan(v) else f"{100 * v:.1f} %") if percent else (lambda v: "-" if v is None or math.isnan(v) else f"{v:.3g}")
-        reached = "" if row["target"] is None or math.isnan(row["value"]) else "yes" if (row["value"] <= row["target"]) == (row["better"] == "lower") or row["value"] == row["target"] else "no"
+        number = (lambda v: f"{100 * v:.1f} %") if percent else (lambda v: f"{v:.3g}")
+        text = lambda v: "-" if v is None or math.isnan(v) else number(v)
+        reached = ""
+        if row["target"] is not None and not math.isnan(row["value"]):
+            better = (row["value"] <= row["target"]) == (row["better"] == "lower")
+            reached = "yes" if better or row["value"] == row["target"] else "no"
         sign = "" if row["target"] is None else "<= " if row["better"] == "lower" else ">= "
         count = f"{row['hits']} of {row['cases']}" if percent else str(row["cases"])
-        lines.append(f"| {row['name']} | {text(row['value'])} | {text(row['low'])} .. {text(row['high'])} | {count} | {sign}{text(row['target']) if row['target'] is not None else ''} | {reached} |")
+        lines.append(f"| {row['name']} | {text(row['value'])} | {text(row['low'])} .. {text(row['high'])} | {count} | "
+                     f"{sign}{text(row['target']) if row['target'] is not None else ''} | {reached} |")
     lines += ["", "| stated probability | right | cases |", "|---|---|---|"]
     lines += [f"| {b['stated']:.2f} | {b['right']:.2f} | {b['cases']} |" for b in figures["calibration"]]
     return "\n".join(lines) + "\n"
@@ -200,15 +220,18 @@ def said(case):
 def was(case):
     if case.kind == "ambiguous":
         return "ambiguous: " + " | ".join(", ".join(sorted(g)) for g in case.built)
-    return {"none": "none", "unknown": "outside: " + case.label.get("outside", {}).get("name", "")}.get(case.kind) or " + ".join(f"{n}@{o}" for n, o in case.truth)
+    outside = "outside: " + case.label.get("outside", {}).get("name", "")
+    return {"none": "none", "unknown": outside}.get(case.kind) or " + ".join(f"{n}@{o}" for n, o in case.truth)
 
 
 def confusions(cases):
     wrong = [c for c in cases if not c.right()]
-    lines = [f"What was confused with what ({len(wrong)} of {len(cases)}, weak cases included):", "", "| case | rig | over floor | was | said | probability |", "|---|---|---|---|---|---|"]
+    lines = [f"What was confused with what ({len(wrong)} of {len(cases)}, weak cases included):", "",
+             "| case | rig | over floor | was | said | probability |", "|---|---|---|---|---|---|"]
     for c in sorted(wrong, key=lambda c: (c.kind, c.rig, c.index)):
         lines.append(f"| {c.index} | {c.rig} | {c.strength:.1f} | {was(c)} | {said(c)} | {c.probability:.2f} |")
     counts = Counter((c.kind, c.right()) for c in cases)
     lines.append("")
-    lines += [f"{kind}: {counts[kind, True]} right, {counts[kind, False]} wrong" for kind in sorted({k for k, _ in counts})]
+    lines += [f"{kind}: {counts[kind, True]} right, {counts[kind, False]} wrong"
+              for kind in sorted({k for k, _ in counts})]
     return "\n".join(lines) + "\n"

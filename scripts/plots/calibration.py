@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Draws stated probability against share of verdicts that were right, from `scripts/blind_check --json FILE`.
 
-    python3 -m venv V && V/bin/pip install matplotlib && V/bin/python scripts/plots/calibration.py FIGURES.json docs/calibration.png
+    python3 -m venv V && V/bin/pip install matplotlib && V/bin/python scripts/plots/calibration.py FIGURES.json
+        docs/calibration.png
 """
 import json
 import math
@@ -22,7 +23,8 @@ def main():
     figure, axes = plt.subplots(figsize=(4.6, 4.2), layout="constrained")
     axes.plot([0, 1], [0, 1], color="0.7", linewidth=1)
     axes.errorbar(stated, right, yerr=spread, fmt="o", color="tab:blue", capsize=3)
-    axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel="stated probability of the verdict", ylabel="share right", title=f"{figures['cases']} cases of seed {figures['seed']}, five equal bins")
+    axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel="stated probability of the verdict", ylabel="share right",
+             title=f"{figures['cases']} cases of seed {figures['seed']}, five equal bins")
     figure.savefig(sys.argv[2], dpi=130)
 
 

@@ -26,9 +26,12 @@ def model(plugin, config, step_s=0.001):
 <mujoco>
   <compiler angle="radian"/>
   <option timestep="{step_s}" integrator="implicitfast"><flag contact="disable" gravity="disable"/></option>
-  <extension><plugin plugin="{plugin}"><instance name="p"><config key="joint" value="j"/>{settings}</instance></plugin></extension>
+  <extension><plugin plugin="{plugin}">
+    <instance name="p"><config key="joint" value="j"/>{settings}</instance>
+  </plugin></extension>
   <worldbody><body>
-    <joint name="j" axis="0 0 1" frictionloss="1e-9" solimpfriction=".9999 .9999 .001 .5 2" solreffriction="-1 {-0.9999 / step_s}"/>
+    <joint name="j" axis="0 0 1" frictionloss="1e-9" solimpfriction=".9999 .9999 .001 .5 2"
+           solreffriction="-1 {-0.9999 / step_s}"/>
     <inertial pos="0 0 0" mass="1" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>
     <plugin plugin="{plugin}" instance="p"/>
   </body></worldbody>
@@ -58,10 +61,12 @@ def friction_figure():
       ("Coulomb", coulomb, 0),
       ("+ Stribeck", stribeck, 0),
       ("+ viscous, drag", stribeck | {"viscous_n_m_s_per_rad": 0.005, "quadratic_n_m_s2_per_rad2": 0.001}, 0),
-      ("Coulomb, load 0.2 x 0.4 N m,\nhalf of it back-driven", coulomb | {"load_coefficient": 0.2, "backdrive_factor": 0.5}, 0.4),
+      ("Coulomb, load 0.2 x 0.4 N m,\nhalf of it back-driven",
+       coulomb | {"load_coefficient": 0.2, "backdrive_factor": 0.5}, 0.4),
       ("by direction: +0.06, +0.02", coulomb | {"friction_positive_n_m": 0.06, "friction_negative_n_m": 0.02}, 0)]:
     values = friction_at_speeds(config, speeds, torque)
-    values[np.searchsorted(speeds, 0) - 1] = np.nan  # no line through standstill, where any torque up to the level holds
+    # No line through standstill, where any torque up to the level holds.
+    values[np.searchsorted(speeds, 0) - 1] = np.nan
     left.plot(speeds, values, label=name, lw=1.4)
   left.set(xlabel="speed, rad/s", ylabel="friction torque, N m", title="sliding")
   left.legend(fontsize=7)
@@ -86,10 +91,12 @@ def friction_figure():
 
 def spring_figure():
   figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), constrained_layout=True)
-  sweep = np.concatenate([np.linspace(a, b, 120) for a, b in [(0, 1), (1, -1), (-1, 1), (1, 0.2), (0.2, 0.7), (0.7, 0.2)]])
+  sweep = np.concatenate([np.linspace(a, b, 120)
+                          for a, b in [(0, 1), (1, -1), (-1, 1), (1, 0.2), (0.2, 0.7), (0.7, 0.2)]])
   for name, config in [("stiffness 0.3, rest 0.2", {"stiffness_n_m_per_rad": 0.3, "rest_rad": 0.2}),
                        ("+ hysteresis 0.06 over 0.08 rad",
-                        {"stiffness_n_m_per_rad": 0.3, "rest_rad": 0.2, "hysteresis_n_m": 0.06, "hysteresis_rad": 0.08}),
+                        {"stiffness_n_m_per_rad": 0.3, "rest_rad": 0.2, "hysteresis_n_m": 0.06,
+                         "hysteresis_rad": 0.08}),
                        ("+ cubic 0.25", {"stiffness_n_m_per_rad": 0.3, "rest_rad": 0.2, "cubic_n_m_per_rad3": 0.25})]:
     m = model("gapscope.spring", config)
     m.dof_armature[0] = 1e9  # carried along at the speed it is given
@@ -106,7 +113,8 @@ def spring_figure():
 
   angles = np.linspace(-np.pi, np.pi, 400)
   for name, config in [("gravity 0.2, rest 0.5", {"gravity_n_m": 0.2, "gravity_rest_rad": 0.5}),
-                       ("cogging 0.05, 7 per rev, second 0.02", {"cogging_n_m": 0.05, "cogging_periods_per_rev": 7, "cogging_second_n_m": 0.02}),
+                       ("cogging 0.05, 7 per rev, second 0.02",
+                        {"cogging_n_m": 0.05, "cogging_periods_per_rev": 7, "cogging_second_n_m": 0.02}),
                        ("bias 0.1", {"bias_n_m": 0.1})]:
     m = model("gapscope.spring", config)
     d = mujoco.MjData(m)

@@ -70,8 +70,8 @@ def plot_motor():
     curves = {
         "rated / peak / no-load": {"peak_torque_n_m": 3, "rated_speed_rad_per_s": 4, "no_load_speed_rad_per_s": 10},
         "torque limit and power": {"torque_limit_n_m": 2.5, "power_w": 8, "generating_power_w": 14},
-        "table, cubic": {"speed_table": "0 2 5 9 12", "torque_table": "2 1.95 1.6 0.6 0", "table_interpolation": "cubic",
-                         "generating_torque_table": "2 2 1.8 1.5 1.2"},
+        "table, cubic": {"speed_table": "0 2 5 9 12", "torque_table": "2 1.95 1.6 0.6 0",
+                         "table_interpolation": "cubic", "generating_torque_table": "2 2 1.8 1.5 1.2"},
     }
     speeds = np.linspace(-13, 13, 521)
     for color, (name, attributes) in enumerate(curves.items()):

@@ -1,8 +1,9 @@
 """Replays a log with the stock `mujoco` package: PLUGIN_LIBRARY MODEL LOG MAX_STEP_S OUT.
 
-LOG is a CSV file: time_s, then one column per actuator, named after it. OUT receives qpos and qvel at every stamp, as raw doubles. Written from the
-description of the replay (docs/architecture.md, mujoco.h), not from its code: a command is held from its stamp to the next, and every
-interval is cut in the fewest equal steps that are at most MAX_STEP_S long.
+LOG is a CSV file: time_s, then one column per actuator, named after it. OUT receives qpos and qvel at every stamp, as
+raw doubles. Written from the description of the replay (docs/architecture.md, mujoco.h), not from its code: a command
+is held from its stamp to the next, and every interval is cut in the fewest equal steps that are at most MAX_STEP_S
+long.
 """
 
 import csv
@@ -17,7 +18,8 @@ def main() -> None:
     library, model_path, log_path, max_step_s, out_path = sys.argv[1:]
     mujoco.mj_loadPluginLibrary(library)
     model = mujoco.MjModel.from_xml_path(model_path)
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_SENSOR | mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    bit = mujoco.mjtDisableBit
+    model.opt.disableflags |= int(bit.mjDSBL_AUTORESET | bit.mjDSBL_SENSOR | bit.mjDSBL_ISLAND)
     # Dry friction written "as stiff as the step allows" (solreffriction="-1 ...") follows the step that is used.
     stiff = model.dof_solref[:, 0] == -1
     model.dof_solref[stiff, 1] = -0.9999 / float(max_step_s)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""report.html in headless Chromium, from disk, with the network off. usage: browser_test.py PROGRAM (gapscope_report_pages)
+"""report.html in headless Chromium, from disk, with the network off. usage: browser_test.py PROGRAM
+(gapscope_report_pages)
 
 Exit status 77: no browser here (scripts/setup --tests installs it).
 """
@@ -36,21 +37,31 @@ def check(good, what):
 def browser(profile):
     options = Options()
     options.binary_location = shutil.which("chromium")
-    for flag in ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    for flag in ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+                 "--disable-background-networking", "--disable-component-update", "--disable-sync",
                  "--disable-dev-shm-usage", "--force-prefers-reduced-motion", f"--user-data-dir={profile}"]:
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
     driver.execute_cdp_cmd("Network.enable", {})
-    driver.execute_cdp_cmd("Network.emulateNetworkConditions", {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0})
+    driver.execute_cdp_cmd("Network.emulateNetworkConditions",
+                           {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0})
     return driver
 
 
 # Contrast of text with what is behind it, by WCAG 2's formula; elements with less than 4.5 (3 for large text).
 CONTRAST = """
 const parse = (c) => c.match(/[\\d.]+/g).map(Number);
-const luminance = ([r, g, b]) => [r, g, b].map((v) => v / 255).map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-const behind = (e) => { for (; e; e = e.parentElement) { const c = parse(getComputedStyle(e).backgroundColor); if (c.length < 4 || c[3] > 0) return c; } return [255, 255, 255]; };
+const linear = (v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+const luminance = ([r, g, b]) => [r, g, b].map((v) => linear(v / 255))
+  .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+const behind = (e) => {
+  for (; e; e = e.parentElement) {
+    const c = parse(getComputedStyle(e).backgroundColor);
+    if (c.length < 4 || c[3] > 0) return c;
+  }
+  return [255, 255, 255];
+};
 const poor = [];
 for (const e of document.querySelectorAll("body *")) {
   const text = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
@@ -68,9 +79,12 @@ const bad = [];
 if (!document.documentElement.lang) bad.push("no language");
 if (!document.title) bad.push("no title");
 if (document.querySelectorAll("h1").length !== 1) bad.push("not one h1");
-for (const e of document.querySelectorAll("button, select, [role=img], [role=group], [role=region], nav, video, table")) {
+const named = "button, select, [role=img], [role=group], [role=region], nav, video, table";
+for (const e of document.querySelectorAll(named)) {
   if (e.closest("[hidden]")) continue;
-  const label = e.getAttribute("aria-label") || (e.id && document.querySelector(`label[for="${e.id}"]`)?.textContent) || (e.tagName === "BUTTON" && e.textContent);
+  const label = e.getAttribute("aria-label")
+    || (e.id && document.querySelector(`label[for="${e.id}"]`)?.textContent)
+    || (e.tagName === "BUTTON" && e.textContent);
   if (!label || !label.trim()) bad.push("no name: " + e.outerHTML.slice(0, 80));
 }
 let before = 1;
@@ -99,7 +113,8 @@ RANGES = "return timeCharts.map((c) => c.xAxisRange());"
 
 
 def open_page(driver, path, width, height):
-    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                           {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
     driver.get(path.as_uri())
 
 
@@ -107,10 +122,13 @@ def look(driver, path, width, verdict):
     name = f"{path.name} at {width} px"
     driver.get_log("browser"), driver.get_log("performance")
     open_page(driver, path, width, 900)
-    check(verdict in driver.find_element(By.TAG_NAME, "h1").text, f"{name}: verdict, got '{driver.find_element(By.TAG_NAME, 'h1').text}'")
+    check(verdict in driver.find_element(By.TAG_NAME, "h1").text,
+          f"{name}: verdict, got '{driver.find_element(By.TAG_NAME, 'h1').text}'")
     messages = driver.get_log("browser")
     check(not messages, f"{name}: console says {messages}")
-    asked = [e["params"]["request"]["url"] for e in (json.loads(r["message"])["message"] for r in driver.get_log("performance")) if e["method"] == "Network.requestWillBeSent"]
+    asked = [e["params"]["request"]["url"]
+             for e in (json.loads(r["message"])["message"] for r in driver.get_log("performance"))
+             if e["method"] == "Network.requestWillBeSent"]
     check(all(url == path.as_uri() or url.startswith("data:") for url in asked), f"{name}: asked for {asked}")
     overflow = driver.execute_script("return document.documentElement.scrollWidth - window.innerWidth;")
     check(overflow <= 0, f"{name}: wider than the window by {overflow} px")
@@ -133,10 +151,12 @@ def linked_zoom(driver, path):
     ranges = driver.execute_script(RANGES)
     check(same(ranges) and narrower(ranges, all_of_it), f"button: {ranges}")
     driver.find_element(By.CSS_SELECTOR, "[data-zoom=all]").click()
-    check(same(driver.execute_script(RANGES)) and not narrower(driver.execute_script(RANGES), all_of_it), "button 'All'")
+    check(same(driver.execute_script(RANGES)) and not narrower(driver.execute_script(RANGES), all_of_it),
+          "button 'All'")
     plot = driver.find_elements(By.CSS_SELECTOR, "#charts .plot")[1]
     driver.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'});", plot)
-    ActionChains(driver).move_to_element_with_offset(plot, -100, 0).click_and_hold().move_by_offset(200, 0).release().perform()
+    drag = ActionChains(driver).move_to_element_with_offset(plot, -100, 0).click_and_hold()
+    drag.move_by_offset(200, 0).release().perform()
     ranges = driver.execute_script(RANGES)
     check(same(ranges) and narrower(ranges, all_of_it), f"drag: {ranges}")
     charts = driver.find_element(By.ID, "charts")
@@ -151,7 +171,8 @@ def linked_zoom(driver, path):
     reached = set()
     for _ in range(60):
         ActionChains(driver).send_keys(Keys.TAB).perform()
-        reached.add(driver.execute_script("const e = document.activeElement; return e.id || e.dataset?.zoom || e.textContent.trim();"))
+        reached.add(driver.execute_script("const e = document.activeElement; "
+                                          "return e.id || e.dataset?.zoom || e.textContent.trim();"))
     missing = {"theme", "log", "in", "out", "left", "right", "all", "charts"} - reached
     check(not missing, f"the keyboard does not reach {missing}")
 
@@ -161,22 +182,30 @@ def main():
         subprocess.run([sys.argv[1], folder], check=True)
         driver = browser(str(Path(folder) / "profile"))
         try:
-            verdicts = {"replay": "hardly follows", "long": "hardly follows", "none": "Nothing is missing", "parameters": "other parameter values close the gap",
-                        "effects": "The model lacks cable spring on arm and Coulomb friction on arm.", "ambiguous": "lacks cable spring or gravity offset: these logs cannot tell which",
+            verdicts = {"replay": "hardly follows", "long": "hardly follows", "none": "Nothing is missing",
+                        "parameters": "other parameter values close the gap",
+                        "effects": "The model lacks cable spring on arm and Coulomb friction on arm.",
+                        "ambiguous": "lacks cable spring or gravity offset: these logs cannot tell which",
                         "unknown": "and something that no known effect explains"}
             for name, verdict in verdicts.items():
                 for width in (390, 1440):
                     look(driver, Path(folder) / f"{name}.html", width, verdict)
-            check("Of what cable spring on arm and Coulomb friction on arm leave" in driver.find_element(By.ID, "where").text, "unknown: what the effects leave")
+            where = driver.find_element(By.ID, "where").text
+            check("Of what cable spring on arm and Coulomb friction on arm leave" in where,
+                  "unknown: what the effects leave")
             linked_zoom(driver, Path(folder) / "effects.html")
             text = driver.find_element(By.ID, "main").text
-            for part in ["91 %", "does not bend with the angle", "</script><b>held out</b>", "gapscope design triangle --seconds 20", "cable_spring@arm.stiffness_n_m_per_rad", "sha256"]:
+            for part in ["91 %", "does not bend with the angle", "</script><b>held out</b>",
+                         "gapscope design triangle --seconds 20", "cable_spring@arm.stiffness_n_m_per_rad", "sha256"]:
                 check(part in text, f"the diagnosis does not say '{part}'")
-            check(driver.execute_script("return document.querySelectorAll('.map canvas').length") == 2, "two maps of the missing torque")
+            check(driver.execute_script("return document.querySelectorAll('.map canvas').length") == 2,
+                  "two maps of the missing torque")
             open_page(driver, Path(folder) / "long.html", 1440, 900)
-            opened = driver.execute_script("const t = performance.getEntriesByType('navigation')[0]; return t.loadEventEnd;")
+            opened = driver.execute_script("const t = performance.getEntriesByType('navigation')[0]; "
+                                           "return t.loadEventEnd;")
             print(f"a log of 1,000,000 rows is open after {opened:.0f} ms")
-            check(driver.execute_script("return Math.max(...data.logs[0].traces.signals[0].measured)") == 9.75, "the spike of the long log")
+            check(driver.execute_script("return Math.max(...data.logs[0].traces.signals[0].measured)") == 9.75,
+                  "the spike of the long log")
         finally:
             driver.quit()
     print("failed" if failures else "passed")

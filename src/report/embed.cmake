@@ -1,4 +1,5 @@
-# cmake -DOUTPUT=FILE.cc "-DASSETS=NAME=FILE[+FILE]|NAME=FILE..." -P embed.cmake: files as C++ strings. Bytes are taken as they are.
+# cmake -DOUTPUT=FILE.cc "-DASSETS=NAME=FILE[+FILE]|NAME=FILE..." -P embed.cmake: files as C++ strings. Bytes are taken
+# as they are.
 string(REPLACE "|" ";" assets "${ASSETS}")
 set(code "#include \"src/report/html_assets.h\"\n\nnamespace gapscope::assets {\n")
 foreach(asset ${assets})

@@ -7,27 +7,58 @@ let timeCharts = [];
 
 function chartBox(parent, title, unit, keys, height) {
   const value = element("div", {class: "value", "aria-live": "off"});
-  const plot = element("div", {class: "plot", style: {height: `${height}px`}, role: "img", "aria-label": `${title}${unit ? `, ${unit}` : ""}: ${keys.map((k) => k.label).join(", ")}`});
-  const head = element("div", {class: "chart-title"}, element("h3", {}, title), unit ? element("span", {class: "note"}, unit) : null,
-    ...keys.map((k) => element("span", {class: "key", style: {"--key": k.color}}, k.label)));
+  const plot = element("div", {
+    class: "plot",
+    style: {height: `${height}px`},
+    role: "img",
+    "aria-label": `${title}${unit ? `, ${unit}` : ""}: ${keys.map((k) => k.label).join(", ")}`,
+  });
+  const head = element(
+    "div",
+    {class: "chart-title"},
+    element("h3", {}, title),
+    unit ? element("span", {class: "note"}, unit) : null,
+    ...keys.map((k) => element("span", {class: "key", style: {"--key": k.color}}, k.label)),
+  );
   parent.append(element("div", {class: "chart"}, head, plot, value));
   return {plot, value};
 }
 
 function drawChart(box, rows, keys, options) {
-  return new Dygraph(box.plot, rows, Object.assign({
-    labels: ["x", ...keys.map((k) => k.label)],
-    colors: keys.map((k) => k.color),
-    series: Object.fromEntries(keys.map((k) => [k.label, {strokeWidth: k.width ?? 1.4}])),
-    legend: "never",
-    gridLineColor: color("--line"), axisLineColor: color("--line"),
-    axisLabelFontSize: 12, highlightCircleSize: 3, rightGap: 8, connectSeparatedPoints: false,
-    axes: {y: {axisLabelWidth: 58, axisLabelFormatter: (y) => number(y, 3)}, x: {axisLabelFormatter: (x) => number(x, 5)}},
-    highlightCallback: (event, x, points) => {
-      box.value.textContent = `${options.xName ?? "time"} ${number(x, 6)}${options.xUnit ?? " s"}   ` + points.filter((p) => known(p.yval)).map((p) => `${p.name} ${number(p.yval, 4)}`).join("   ");
-    },
-    unhighlightCallback: () => { box.value.textContent = ""; },
-  }, options.dygraph ?? {}));
+  return new Dygraph(
+    box.plot,
+    rows,
+    Object.assign(
+      {
+        labels: ["x", ...keys.map((k) => k.label)],
+        colors: keys.map((k) => k.color),
+        series: Object.fromEntries(keys.map((k) => [k.label, {strokeWidth: k.width ?? 1.4}])),
+        legend: "never",
+        gridLineColor: color("--line"),
+        axisLineColor: color("--line"),
+        axisLabelFontSize: 12,
+        highlightCircleSize: 3,
+        rightGap: 8,
+        connectSeparatedPoints: false,
+        axes: {
+          y: {axisLabelWidth: 58, axisLabelFormatter: (y) => number(y, 3)},
+          x: {axisLabelFormatter: (x) => number(x, 5)},
+        },
+        highlightCallback: (event, x, points) => {
+          box.value.textContent =
+            `${options.xName ?? "time"} ${number(x, 6)}${options.xUnit ?? " s"}   ` +
+            points
+              .filter((p) => known(p.yval))
+              .map((p) => `${p.name} ${number(p.yval, 4)}`)
+              .join("   ");
+        },
+        unhighlightCallback: () => {
+          box.value.textContent = "";
+        },
+      },
+      options.dygraph ?? {},
+    ),
+  );
 }
 
 function drawTraces(log) {
@@ -42,25 +73,61 @@ function drawTraces(log) {
     timeCharts.push(drawChart(box, time.map((t, r) => [t, ...columns.map((c) => c[r])]), keys, {dygraph: extra}));
   };
   for (const signal of traces.signals) {
-    const predicted = signal.predicted.map((p, i) => ({label: p.label, color: seriesColor(p.label, i), values: p.values}));
-    add(signal.name + (signal.scored ? "" : " (not scored)"), signal.unit, [{label: "measured", color: color("--measured"), width: 2.6}, ...predicted], [signal.measured, ...predicted.map((p) => p.values)], 190);
+    const predicted = signal.predicted.map((p, i) => ({
+      label: p.label,
+      color: seriesColor(p.label, i),
+      values: p.values,
+    }));
+    add(
+      signal.name + (signal.scored ? "" : " (not scored)"),
+      signal.unit,
+      [{label: "measured", color: color("--measured"), width: 2.6}, ...predicted],
+      [signal.measured, ...predicted.map((p) => p.values)],
+      190,
+    );
     if (predicted.length) {
-      const residuals = predicted.map((p) => p.values.map((v, r) => (known(v) && known(signal.measured[r]) ? signal.measured[r] - v : null)));
-      add("measured less predicted", signal.unit, predicted.map(({label, color: c}) => ({label, color: c})), residuals, 90);
+      const residuals = predicted.map((p) =>
+        p.values.map((v, r) => (known(v) && known(signal.measured[r]) ? signal.measured[r] - v : null)),
+      );
+      add(
+        "measured less predicted",
+        signal.unit,
+        predicted.map(({label, color: c}) => ({label, color: c})),
+        residuals,
+        90,
+      );
     }
   }
   for (const command of traces.commands) {
-    add(`command ${command.name}`, command.unit, [{label: command.name, color: color("--command")}], [command.values], 90, {stepPlot: true});
+    add(
+      `command ${command.name}`,
+      command.unit,
+      [{label: command.name, color: color("--command")}],
+      [command.values],
+      90,
+      {stepPlot: true},
+    );
   }
   if (timeCharts.length > 1) linked = Dygraph.synchronize(timeCharts, {zoom: true, selection: true, range: false});
   const rows = log.quality.rows;
-  document.getElementById("thinned").textContent = time.length < rows ? `${time.length} of ${rows} rows are drawn: of every stretch the extremes of each trace.` : "";
+  document.getElementById("thinned").textContent =
+    time.length < rows ? `${time.length} of ${rows} rows are drawn: of every stretch the extremes of each trace.` : "";
 }
 
 function zoom(how) {
   if (!timeCharts.length) return;
-  const chart = timeCharts[0], [first, last] = chart.xAxisExtremes(), [a, b] = chart.xAxisRange(), middle = (a + b) / 2, half = (b - a) / 2;
-  const ranges = {in: [middle - half / 2, middle + half / 2], out: [middle - 2 * half, middle + 2 * half], left: [a - half, b - half], right: [a + half, b + half], all: [first, last]};
+  const chart = timeCharts[0],
+    [first, last] = chart.xAxisExtremes(),
+    [a, b] = chart.xAxisRange(),
+    middle = (a + b) / 2,
+    half = (b - a) / 2;
+  const ranges = {
+    in: [middle - half / 2, middle + half / 2],
+    out: [middle - 2 * half, middle + 2 * half],
+    left: [a - half, b - half],
+    right: [a + half, b + half],
+    all: [first, last],
+  };
   let [from, to] = ranges[how];
   const width = Math.min(to - from, last - first);
   from = Math.min(Math.max(from, first), last - width);
@@ -70,20 +137,46 @@ function zoom(how) {
 function drawResponses(log) {
   const parent = document.getElementById("responses");
   parent.replaceChildren();
-  document.getElementById("response").hidden = log.responses.length === 0;  // first: a chart takes its width from the page
+  // First: a chart takes its width from the page.
+  document.getElementById("response").hidden = log.responses.length === 0;
   for (const response of log.responses) {
     const figure = element("div", {});
     parent.append(element("h3", {}, `${response.signal} over command ${response.command}`), figure);
-    const keys = [{label: "measured", color: color("--measured"), width: 2.6}, {label: log.response_of, color: color("--model-0")}];
+    const keys = [
+      {label: "measured", color: color("--measured"), width: 2.6},
+      {label: log.response_of, color: color("--model-0")},
+    ];
     const db = (x) => (x > 0 ? 20 * Math.log10(x) : null);
-    const x = {axes: {y: {axisLabelWidth: 58, axisLabelFormatter: (y) => number(y, 3)}, x: {logscale: true, axisLabelFormatter: (f) => number(f, 2)}}};
+    const x = {
+      axes: {
+        y: {axisLabelWidth: 58, axisLabelFormatter: (y) => number(y, 3)},
+        x: {logscale: true, axisLabelFormatter: (f) => number(f, 2)},
+      },
+    };
     const gain = chartBox(figure, "gain", "dB", keys, 180);
-    const a = drawChart(gain, response.points.map((p) => [p[0], db(p[1]), db(p[2])]), keys, {xName: "frequency", xUnit: " Hz", dygraph: x});
+    const a = drawChart(
+      gain,
+      response.points.map((p) => [p[0], db(p[1]), db(p[2])]),
+      keys,
+      {xName: "frequency", xUnit: " Hz", dygraph: x},
+    );
     const phase = chartBox(figure, "phase", "degrees; below: frequency, Hz", keys, 150);
-    const b = drawChart(phase, response.points.map((p) => [p[0], p[3], p[4]]), keys, {xName: "frequency", xUnit: " Hz", dygraph: x});
+    const b = drawChart(
+      phase,
+      response.points.map((p) => [p[0], p[3], p[4]]),
+      keys,
+      {xName: "frequency", xUnit: " Hz", dygraph: x},
+    );
     Dygraph.synchronize([a, b], {zoom: true, selection: true, range: false});
   }
-  if (log.responses.length) parent.append(element("p", {class: "note"}, "Where the command has power and the measured signal follows it (square coherence at least 0.5). Under feedback both curves are biased alike."));
+  if (log.responses.length) parent.append(
+    element(
+      "p",
+      {class: "note"},
+      "Where the command has power and the measured signal follows it (square coherence at least 0.5). "
+        + "Under feedback both curves are biased alike.",
+    ),
+  );
 }
 
 // Blue: the real mechanism is held back against positive motion; orange: it is driven.
@@ -93,7 +186,12 @@ function mapColor(share) {
 }
 
 function drawMap(map) {
-  const columns = map.angle.length - 1, rows = map.speed.length - 1, sorted = map.torque.filter(known).map(Math.abs).sort((a, b) => a - b);
+  const columns = map.angle.length - 1,
+    rows = map.speed.length - 1,
+    sorted = map.torque
+      .filter(known)
+      .map(Math.abs)
+      .sort((a, b) => a - b);
   if (!sorted.length) return null;
   const most = sorted[Math.floor(0.97 * (sorted.length - 1))] || 1e-12;
   const canvas = element("canvas", {width: columns * 20, height: rows * 20, role: "img",
@@ -106,10 +204,39 @@ function drawMap(map) {
   });
   const value = element("p", {class: "value"});
   canvas.addEventListener("pointermove", (event) => {
-    const box = canvas.getBoundingClientRect(), x = Math.floor(((event.clientX - box.left) / box.width) * columns), y = rows - 1 - Math.floor(((event.clientY - box.top) / box.height) * rows), i = y * columns + x;
-    value.textContent = known(map.torque[i]) ? `angle ${number(map.angle[x], 3)} rad, speed ${number(map.speed[y], 3)} rad/s: ${number(map.torque[i], 3)} N m (${map.rows[i]} rows)` : "no data";
+    const box = canvas.getBoundingClientRect(),
+      x = Math.floor(((event.clientX - box.left) / box.width) * columns),
+      y = rows - 1 - Math.floor(((event.clientY - box.top) / box.height) * rows),
+      i = y * columns + x;
+    value.textContent = known(map.torque[i])
+      ? `angle ${number(map.angle[x], 3)} rad, speed ${number(map.speed[y], 3)} rad/s: `
+        + `${number(map.torque[i], 3)} N m (${map.rows[i]} rows)`
+      : "no data";
   });
-  return element("figure", {class: "map"}, element("figcaption", {}, element("b", {}, map.joint), `: torque that the ${data.map_of} lacks, over angle (across) and speed (up, ${number(map.speed[0], 3)} to ${number(map.speed[rows], 3)} rad/s)`),
-    canvas, element("div", {class: "axis"}, element("span", {}, `${number(map.angle[0], 3)} rad`), element("span", {}, `${number(map.angle[columns], 3)} rad`)),
-    element("div", {class: "scale"}, element("span", {}, `${number(-most, 2)} N m`), element("i", {}), element("span", {}, `${number(most, 2)} N m`)), value);
+  return element(
+    "figure",
+    {class: "map"},
+    element(
+      "figcaption",
+      {},
+      element("b", {}, map.joint),
+      `: torque that the ${data.map_of} lacks, over angle (across) and speed `
+        + `(up, ${number(map.speed[0], 3)} to ${number(map.speed[rows], 3)} rad/s)`,
+    ),
+    canvas,
+    element(
+      "div",
+      {class: "axis"},
+      element("span", {}, `${number(map.angle[0], 3)} rad`),
+      element("span", {}, `${number(map.angle[columns], 3)} rad`),
+    ),
+    element(
+      "div",
+      {class: "scale"},
+      element("span", {}, `${number(-most, 2)} N m`),
+      element("i", {}),
+      element("span", {}, `${number(most, 2)} N m`),
+    ),
+    value,
+  );
 }

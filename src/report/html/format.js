@@ -22,9 +22,16 @@ function element(tag, attributes = {}, ...children) {
 // rows: lists of cells, a cell being text, an element, or {number} for text set to the right.
 function table(caption, heads, rows) {
   const cell = (tag, content) =>
-    content && typeof content === "object" && "number" in content ? element(tag, {class: "number"}, content.number) : element(tag, {}, content ?? "");
+    content && typeof content === "object" && "number" in content
+      ? element(tag, {class: "number"}, content.number)
+      : element(tag, {}, content ?? "");
   const head = element("tr", {}, ...heads.map((h) => { const th = cell("th", h); th.scope = "col"; return th; }));
-  const made = element("table", {"aria-label": caption}, element("thead", {}, head), element("tbody", {}, ...rows.map((r) => element("tr", {}, ...r.map((c) => cell("td", c))))));
+  const made = element(
+    "table",
+    {"aria-label": caption},
+    element("thead", {}, head),
+    element("tbody", {}, ...rows.map((r) => element("tr", {}, ...r.map((c) => cell("td", c))))),
+  );
   return element("div", {class: "scroll", tabindex: "0", role: "region", "aria-label": caption}, made);
 }
 

@@ -7,7 +7,9 @@ let current = 0;
 function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
   document.getElementById("theme").textContent = theme === "dark" ? "Light" : "Dark";
-  document.getElementById("theme").setAttribute("aria-label", theme === "dark" ? "Switch to light colours" : "Switch to dark colours");
+  document
+    .getElementById("theme")
+    .setAttribute("aria-label", theme === "dark" ? "Switch to light colours" : "Switch to dark colours");
 }
 
 function drawLog() {
@@ -20,29 +22,56 @@ function drawLog() {
   const figures = (log.maps ?? []).map(drawMap).filter(Boolean);
   if (figures.length) {
     show("where");
-    maps.append(element("div", {class: "maps"}, ...figures), element("p", {class: "note"},
-      "A jump where the speed changes sign is dry friction, a slope across the angle a spring, a slope across the speed damping. Speed and acceleration come from the log by local fits over 20 ms to each side."));
+    maps.append(
+      element("div", {class: "maps"}, ...figures),
+      element(
+        "p",
+        {class: "note"},
+        "A jump where the speed changes sign is dry friction, a slope across the angle a spring, a slope "
+          + "across the speed damping. Speed and acceleration come from the log by local fits over 20 ms to each side.",
+      ),
+    );
   }
 }
 
 function choosers() {
   const select = document.getElementById("log");
-  data.logs.forEach((log, i) => { if (log.traces) select.append(element("option", {value: i}, fileName(log.path) + (log.held_out ? " (held out)" : ""))); });
+  data.logs.forEach((log, i) => {
+    const name = fileName(log.path) + (log.held_out ? " (held out)" : "");
+    if (log.traces) select.append(element("option", {value: i}, name));
+  });
   select.addEventListener("change", () => { current = Number(select.value); drawLog(); });
-  document.querySelectorAll("[data-zoom]").forEach((button) => button.addEventListener("click", () => zoom(button.dataset.zoom)));
+  document
+    .querySelectorAll("[data-zoom]")
+    .forEach((button) => button.addEventListener("click", () => zoom(button.dataset.zoom)));
   const keys = {"+": "in", "=": "in", "-": "out", ArrowLeft: "left", ArrowRight: "right", 0: "all"};
   document.getElementById("charts").addEventListener("keydown", (event) => {
     if (!(event.key in keys) || event.ctrlKey || event.metaKey || event.altKey) return;
     zoom(keys[event.key]);
     event.preventDefault();
   });
-  document.getElementById("theme").addEventListener("click", () => { setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"); drawLog(); });
+  document.getElementById("theme").addEventListener("click", () => {
+    setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+    drawLog();
+  });
 }
 
 function contents() {
-  const titles = {verdict: "Result", video: "Video", traces: "Traces", where: "Where", candidates: "Explanations", parameters: "Parameters", response: "Frequency", next: "Next", data: "Data", reproduce: "Reproduce"};
+  const titles = {
+    verdict: "Result",
+    video: "Video",
+    traces: "Traces",
+    where: "Where",
+    candidates: "Explanations",
+    parameters: "Parameters",
+    response: "Frequency",
+    next: "Next",
+    data: "Data",
+    reproduce: "Reproduce",
+  };
   for (const [id, title] of Object.entries(titles)) {
-    if (!document.getElementById(id).hidden) document.getElementById("contents").append(element("li", {}, element("a", {href: `#${id}`}, title)));
+    if (document.getElementById(id).hidden) continue;
+    document.getElementById("contents").append(element("li", {}, element("a", {href: `#${id}`}, title)));
   }
 }
 

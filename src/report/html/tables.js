@@ -1,13 +1,34 @@
 "use strict";
 // Conditions, candidates, parameters, data quality, provenance.
 
-const shareBar = (share, mark, kind = "") => element("div", {class: "bar", "aria-hidden": "true"}, element("span", {class: kind, style: {width: `${Math.min(100, 100 * share)}%`}}),
-  known(mark) ? element("i", {style: {left: `${Math.min(99, 100 * mark)}%`}}) : null);
+const shareBar = (share, mark, kind = "") =>
+  element(
+    "div",
+    {class: "bar", "aria-hidden": "true"},
+    element("span", {class: kind, style: {width: `${Math.min(100, 100 * share)}%`}}),
+    known(mark) ? element("i", {style: {left: `${Math.min(99, 100 * mark)}%`}}) : null,
+  );
 
 function conditionTable(shares) {
-  return table("Shares of the error by condition", ["signal", "condition", {number: "of the error"}, "bar: of the error; mark: of the time", {number: "of the time"}, "90 % interval"],
-    shares.map((w) => [w.signal, w.condition, {number: percent(w.share_of_error)}, shareBar(w.share_of_error, w.share_of_time, "share"), {number: percent(w.share_of_time)},
-      known(w.low) && known(w.high) ? `${percent(w.low)} to ${percent(w.high)}` : "–"]));
+  return table(
+    "Shares of the error by condition",
+    [
+      "signal",
+      "condition",
+      {number: "of the error"},
+      "bar: of the error; mark: of the time",
+      {number: "of the time"},
+      "90 % interval",
+    ],
+    shares.map((w) => [
+      w.signal,
+      w.condition,
+      {number: percent(w.share_of_error)},
+      shareBar(w.share_of_error, w.share_of_time, "share"),
+      {number: percent(w.share_of_time)},
+      known(w.low) && known(w.high) ? `${percent(w.low)} to ${percent(w.high)}` : "–",
+    ]),
+  );
 }
 
 function writeConditions(where) {
@@ -18,9 +39,25 @@ function writeConditions(where) {
 
 function writeCandidates(candidates, more) {
   if (!candidates.length) return;
-  const cells = candidates.map((c) => [c.title, {number: percent(c.probability)}, shareBar(c.probability ?? 0), {number: number(c.held_out_error, 3)}, c.reason]);
-  document.getElementById("candidate-table").append(table("Candidates", ["explanation", {number: "probability"}, "", {number: "held-out error"}, "why, or why not"], cells));
-  if (more) document.getElementById("candidate-table").append(element("p", {class: "note"}, `${more} more, less likely ones are in result.json.`));
+  const cells = candidates.map((c) => [
+    c.title,
+    {number: percent(c.probability)},
+    shareBar(c.probability ?? 0),
+    {number: number(c.held_out_error, 3)},
+    c.reason,
+  ]);
+  document
+    .getElementById("candidate-table")
+    .append(
+      table(
+        "Candidates",
+        ["explanation", {number: "probability"}, "", {number: "held-out error"}, "why, or why not"],
+        cells,
+      ),
+    );
+  if (more) document
+    .getElementById("candidate-table")
+    .append(element("p", {class: "note"}, `${more} more, less likely ones are in result.json.`));
   show("candidates");
 }
 
@@ -28,16 +65,41 @@ function writeCandidates(candidates, more) {
 function rangePicture(p) {
   if (!known(p.low) || !known(p.high) || !(p.high > p.low)) return "";
   const log = p.low > 0 && p.high / p.low > 20, scale = (x) => (log ? Math.log(x) : x);
-  const x = (v) => Math.min(198, Math.max(2, 4 + (192 * (scale(Math.max(v, log ? p.low : -Infinity)) - scale(p.low))) / (scale(p.high) - scale(p.low))));
+  const x = (v) =>
+    Math.min(
+      198,
+      Math.max(
+        2,
+        4 + (192 * (scale(Math.max(v, log ? p.low : -Infinity)) - scale(p.low))) / (scale(p.high) - scale(p.low)),
+      ),
+    );
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("viewBox", "0 0 200 24");
   svg.setAttribute("class", "range");
   svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", `bounds ${number(p.low, 3)} to ${number(p.high, 3)}${log ? ", logarithmic" : ""}; nominal ${number(p.nominal, 3)}; value ${number(p.value, 3)}`);
-  const part = (tag, attributes) => { const made = document.createElementNS("http://www.w3.org/2000/svg", tag); Object.entries(attributes).forEach(([k, v]) => made.setAttribute(k, v)); svg.append(made); };
+  svg.setAttribute(
+    "aria-label",
+    `bounds ${number(p.low, 3)} to ${number(p.high, 3)}${log ? ", logarithmic" : ""}; `
+      + `nominal ${number(p.nominal, 3)}; value ${number(p.value, 3)}`,
+  );
+  const part = (tag, attributes) => {
+    const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    Object.entries(attributes).forEach(([k, v]) => made.setAttribute(k, v));
+    svg.append(made);
+  };
   part("line", {x1: 4, x2: 196, y1: 12, y2: 12, stroke: "var(--line)", "stroke-width": 4, "stroke-linecap": "round"});
-  if (known(p.from) && known(p.to)) part("line", {x1: x(p.from), x2: x(p.to), y1: 12, y2: 12, stroke: "var(--accent)", "stroke-width": 6, "stroke-opacity": .55});
-  if (known(p.nominal)) part("line", {x1: x(p.nominal), x2: x(p.nominal), y1: 3, y2: 21, stroke: "var(--faint)", "stroke-width": 2});
+  if (known(p.from) && known(p.to)) part("line", {
+    x1: x(p.from),
+    x2: x(p.to),
+    y1: 12,
+    y2: 12,
+    stroke: "var(--accent)",
+    "stroke-width": 6,
+    "stroke-opacity": 0.55,
+  });
+  if (known(p.nominal)) {
+    part("line", {x1: x(p.nominal), x2: x(p.nominal), y1: 3, y2: 21, stroke: "var(--faint)", "stroke-width": 2});
+  }
   if (known(p.value)) part("circle", {cx: x(p.value), cy: 12, r: 5, fill: "var(--accent)"});
   return svg;
 }
@@ -46,11 +108,38 @@ function writeParameters(parameters, notes) {
   if (!parameters.length) return;
   const rows = parameters.map((p) => {
     const open = p.identifiable === false;
-    const tags = [open ? element("span", {class: "tag warn"}, "not known alone") : null, p.at_bound ? element("span", {class: "tag warn"}, "at its bound") : null];
+    const tags = [
+      open ? element("span", {class: "tag warn"}, "not known alone") : null,
+      p.at_bound ? element("span", {class: "tag warn"}, "at its bound") : null,
+    ];
     const interval = known(p.from) ? `${number(p.from)} to ${number(p.to)}` : "–";
-    return [element("code", {title: p.doc ?? ""}, p.name), {number: number(p.nominal)}, {number: number(p.value)}, interval, p.unit, rangePicture(p), element("span", {}, ...tags)];
+    return [
+      element("code", {title: p.doc ?? ""}, p.name),
+      {number: number(p.nominal)},
+      {number: number(p.value)},
+      interval,
+      p.unit,
+      rangePicture(p),
+      element("span", {}, ...tags),
+    ];
   });
-  document.getElementById("parameter-table").append(table("Parameters", ["parameter", {number: "nominal"}, {number: "value"}, "95 % interval", "unit", "dot: value; mark: nominal; line: bounds", ""], rows));
+  document
+    .getElementById("parameter-table")
+    .append(
+      table(
+        "Parameters",
+        [
+          "parameter",
+          {number: "nominal"},
+          {number: "value"},
+          "95 % interval",
+          "unit",
+          "dot: value; mark: nominal; line: bounds",
+          "",
+        ],
+        rows,
+      ),
+    );
   document.getElementById("parameter-notes").append(...notes.map((note) => element("li", {}, note)));
   show("parameters");
 }
@@ -64,11 +153,28 @@ function writeNext(next) {
 function writeQuality(logs) {
   const rows = logs.map((log) => {
     const q = log.quality, rate = q.step_s > 0 ? 1 / q.step_s : null;
-    const findings = q.findings.length ? element("ul", {}, ...q.findings.map((f) => element("li", {}, f))) : element("span", {class: "tag good"}, "nothing to report");
-    return [element("code", {}, fileName(log.path)), log.held_out ? element("span", {class: "tag"}, "held out") : "", {number: String(q.rows)}, {number: `${number(q.duration_s)} s`}, {number: `${number(rate)} Hz`},
-      {number: `${number(1e3 * q.jitter_s, 3)} ms`}, findings];
+    const findings = q.findings.length
+      ? element("ul", {}, ...q.findings.map((f) => element("li", {}, f)))
+      : element("span", {class: "tag good"}, "nothing to report");
+    return [
+      element("code", {}, fileName(log.path)),
+      log.held_out ? element("span", {class: "tag"}, "held out") : "",
+      {number: String(q.rows)},
+      {number: `${number(q.duration_s)} s`},
+      {number: `${number(rate)} Hz`},
+      {number: `${number(1e3 * q.jitter_s, 3)} ms`},
+      findings,
+    ];
   });
-  document.getElementById("quality").append(table("Data quality", ["log", "", {number: "rows"}, {number: "length"}, {number: "rate"}, {number: "jitter"}, "findings and repairs"], rows));
+  document
+    .getElementById("quality")
+    .append(
+      table(
+        "Data quality",
+        ["log", "", {number: "rows"}, {number: "length"}, {number: "rate"}, {number: "jitter"}, "findings and repairs"],
+        rows,
+      ),
+    );
   show("data");
 }
 

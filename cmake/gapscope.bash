@@ -3,7 +3,9 @@ _gapscope() {
   local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]} program=${COMP_WORDS[0]} help
   if ((COMP_CWORD == 1)); then
     help=$("$program" --help 2>/dev/null)
-    mapfile -t COMPREPLY < <(compgen -W "$(sed -n '/^Subcommands:/,/^$/s/^  \([a-z]*\).*/\1/p' <<<"$help") --help --version" -- "$current")
+    local commands
+    commands=$(sed -n '/^Subcommands:/,/^$/s/^  \([a-z]*\).*/\1/p' <<<"$help")
+    mapfile -t COMPREPLY < <(compgen -W "$commands --help --version" -- "$current")
     return
   fi
   help=$("$program" "${COMP_WORDS[1]}" --help 2>/dev/null) || return
@@ -13,7 +15,9 @@ _gapscope() {
   if [ -n "$choices" ]; then
     mapfile -t COMPREPLY < <(compgen -W "${choices//,/ }" -- "$current")
   elif [[ $current == -* ]]; then
-    mapfile -t COMPREPLY < <(compgen -W "$(grep -oE '^  (-h,)?--[a-z-]+' <<<"$help" | grep -oE -- '--[a-z-]+')" -- "$current")
+    local options
+    options=$(grep -oE '^  (-h,)?--[a-z-]+' <<<"$help" | grep -oE -- '--[a-z-]+')
+    mapfile -t COMPREPLY < <(compgen -W "$options" -- "$current")
   else
     compopt -o default  # files
   fi

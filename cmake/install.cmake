@@ -1,8 +1,10 @@
 # cmake --install build [--prefix DIR]:
 #   bin/gapscope                         finds its libraries by $ORIGIN
-#   lib/gapscope/libgapscope_plugins.so  for any MuJoCo host of the same version; without RUNPATH (see src/plugins/CMakeLists.txt)
+#   lib/gapscope/libgapscope_plugins.so  for any MuJoCo host of the same version; without RUNPATH
+#                                        (see src/plugins/CMakeLists.txt)
 #   lib/gapscope/libmujoco.so.*          where MuJoCo came with the build
-#   lib/gapscope/*.a, include/gapscope   the stages as libraries; find_package(gapscope) gives gapscope::replay, gapscope::plugins ...
+#   lib/gapscope/*.a, include/gapscope   the stages as libraries; find_package(gapscope) gives
+#                                        gapscope::replay, gapscope::plugins ...
 #   share/gapscope/models                rigs and experiment files
 #   share/man/man1/gapscope.1            made from the program's own --help
 #   share/bash-completion/completions/gapscope
@@ -19,10 +21,12 @@ install(TARGETS gapscope RUNTIME)
 foreach(name core log experiment model replay compare fit tune identify design diagnose video report plugins warnings)
   if(TARGET gapscope_${name})
     set_target_properties(gapscope_${name} PROPERTIES EXPORT_NAME ${name})
-    install(TARGETS gapscope_${name} EXPORT gapscope LIBRARY DESTINATION ${_libraries} ARCHIVE DESTINATION ${_libraries})
+    install(TARGETS gapscope_${name} EXPORT gapscope LIBRARY DESTINATION ${_libraries}
+            ARCHIVE DESTINATION ${_libraries})
   endif()
 endforeach()
-foreach(folder src/core src/log src/experiment src/model src/compare src/fit src/tune src/identify src/design src/diagnose src/video src/report replay)
+foreach(folder src/core src/log src/experiment src/model src/compare src/fit src/tune src/identify
+        src/design src/diagnose src/video src/report replay)
   if(EXISTS ${CMAKE_SOURCE_DIR}/${folder})
     get_filename_component(_parent ${folder} DIRECTORY)
     install(DIRECTORY ${folder} DESTINATION ${_headers}/${_parent} FILES_MATCHING PATTERN "*.h" PATTERN effects EXCLUDE)
@@ -39,17 +43,20 @@ if(GAPSCOPE_MUJOCO_LIBRARY)
   file(GLOB_RECURSE _licenses ${_sdk}/../*LICENSE*)
   install(FILES ${_licenses} DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope/mujoco)
 endif()
-configure_package_config_file(cmake/gapscope-config.cmake.in ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake INSTALL_DESTINATION ${_package}
-                              PATH_VARS _libraries _headers)
+configure_package_config_file(cmake/gapscope-config.cmake.in ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake
+                              INSTALL_DESTINATION ${_package} PATH_VARS _libraries _headers)
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/gapscope-config-version.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake ${CMAKE_BINARY_DIR}/cmake/gapscope-config-version.cmake DESTINATION ${_package})
+install(FILES ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake ${CMAKE_BINARY_DIR}/cmake/gapscope-config-version.cmake
+        DESTINATION ${_package})
 
 install(DIRECTORY models DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope)
 install(FILES cmake/gapscope.bash RENAME gapscope DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 
 # The manual page says what the program says.
 set(_man ${CMAKE_BINARY_DIR}/share/man/man1/gapscope.1)
-add_custom_command(OUTPUT ${_man} COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:gapscope> -DOUTPUT=${_man} -DVERSION=${PROJECT_VERSION} -P
-                   ${CMAKE_SOURCE_DIR}/cmake/man_page.cmake DEPENDS gapscope cmake/man_page.cmake VERBATIM)
+add_custom_command(OUTPUT ${_man}
+                   COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:gapscope> -DOUTPUT=${_man}
+                           -DVERSION=${PROJECT_VERSION} -P ${CMAKE_SOURCE_DIR}/cmake/man_page.cmake
+                   DEPENDS gapscope cmake/man_page.cmake VERBATIM)
 add_custom_target(gapscope_man ALL DEPENDS ${_man})
 install(FILES ${_man} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)

@@ -1,4 +1,5 @@
-# cmake -DPROGRAM=... -DOUTPUT=... -DVERSION=... -P man_page.cmake: a manual page from the program's --help and that of each subcommand.
+# cmake -DPROGRAM=... -DOUTPUT=... -DVERSION=... -P man_page.cmake: a manual page from the program's --help
+# and that of each subcommand.
 function(help out)
   execute_process(COMMAND ${PROGRAM} ${ARGN} --help OUTPUT_VARIABLE text RESULT_VARIABLE status)
   if(NOT status EQUAL 0)

@@ -25,9 +25,11 @@ elseif(GAPSCOPE_MUJOCO STREQUAL "wheel")
   if(NOT EXISTS ${_sdk}/mujoco/include/mujoco/mujoco.h)
     file(SHA256 ${_wheel} _hash)
     if(NOT _hash STREQUAL GAPSCOPE_MUJOCO_SHA256)
-      message(FATAL_ERROR "${_wheel} has sha256 ${_hash}, expected ${GAPSCOPE_MUJOCO_SHA256}. Delete it and run scripts/setup.")
+      message(FATAL_ERROR "${_wheel} has sha256 ${_hash}, expected ${GAPSCOPE_MUJOCO_SHA256}. "
+                          "Delete it and run scripts/setup.")
     endif()
-    file(ARCHIVE_EXTRACT INPUT ${_wheel} DESTINATION ${_sdk} PATTERNS "mujoco/include/*" "mujoco/libmujoco.so.*" "*LICENSE*")
+    file(ARCHIVE_EXTRACT INPUT ${_wheel} DESTINATION ${_sdk}
+         PATTERNS "mujoco/include/*" "mujoco/libmujoco.so.*" "*LICENSE*")
   endif()
   file(GLOB _lib ${_sdk}/mujoco/libmujoco.so.*)
   get_filename_component(_soname ${_lib} NAME)

@@ -44,27 +44,6 @@ double Mean(std::span<const double> values) {
   return sum / static_cast<double>(values.size());
 }
 
-// Standard deviation of the finite rows; exactly zero when they are all the same, NaN when there are none.
-double StandardDeviation(std::span<const double> values) {
-  double sum = 0, low = kNaN, high = kNaN;
-  std::size_t count = 0;
-  for (const double value : values) {
-    if (!std::isfinite(value)) continue;
-    low = std::fmin(low, value);
-    high = std::fmax(high, value);
-    sum += value;
-    ++count;
-  }
-  if (count == 0) return kNaN;
-  if (low == high) return 0;
-  const double mean = sum / static_cast<double>(count);
-  double squares = 0;
-  for (const double value : values) {
-    if (std::isfinite(value)) squares += (value - mean) * (value - mean);
-  }
-  return std::sqrt(squares / static_cast<double>(count));
-}
-
 bool Constant(std::span<const double> values) {
   return std::all_of(values.begin(), values.end(), [&](double value) { return value == values.front(); });
 }
@@ -237,7 +216,7 @@ SignalScore ScoreSignal(std::string signal, std::span<const double> time_s, std:
   score.rmse = std::sqrt(squares / count);
   score.mae = magnitudes / count;
   score.max = greatest;
-  const double scale = std::max(StandardDeviation(measured), resolution);
+  const double scale = std::max(MomentsOf(measured).deviation, resolution);
   score.nrmse = scale > 0 ? score.rmse / scale : kNaN;
   if (std::isfinite(squares)) {
     score.correlation = Pearson(rows.measured, rows.predicted);

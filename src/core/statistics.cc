@@ -15,6 +15,23 @@ double OfRank(std::vector<double>* values, std::size_t rank) {
 
 }  // namespace
 
+Moments MomentsOf(std::span<const double> values) {
+  double sum = 0, low = kNaN, high = kNaN, count = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    low = std::fmin(low, value);
+    high = std::fmax(high, value);
+    sum += value, count += 1;
+  }
+  const double mean = sum / count;
+  if (low == high) return {mean, 0};
+  double squares = 0;
+  for (const double value : values) {
+    if (std::isfinite(value)) squares += (value - mean) * (value - mean);
+  }
+  return {mean, std::sqrt(squares / count)};
+}
+
 double Quantile(std::vector<double> values, double share) {
   if (values.empty()) return kNaN;
   return OfRank(&values, static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1))));

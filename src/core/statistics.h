@@ -1,8 +1,9 @@
-// Small statistics that several folders need: no value, medians and quantiles, Student's t.
+// Small statistics that several folders need: no value, mean and deviation, medians and quantiles, Student's t.
 #ifndef GAPSCOPE_CORE_STATISTICS_H_
 #define GAPSCOPE_CORE_STATISTICS_H_
 
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace gapscope {
@@ -10,6 +11,13 @@ namespace gapscope {
 // No value: what was not measured, or cannot be said.
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Mean and standard deviation (over n, not n - 1) of the values that are finite; NaN when none is. Of values that are
+// all the same the deviation is exactly zero.
+struct Moments {
+  double mean = 0, deviation = 0;
+};
+Moments MomentsOf(std::span<const double> values);
 
 // The value of nearest rank `share` (0 the least, 1 the greatest) of finite values; NaN of none. O(n), on a copy.
 double Quantile(std::vector<double> values, double share);

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
+
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kRoughJacobians = 2, kJacobians = 8;  // of an imitation: each is a replay per parameter
 
 // Library inputs made as large as all models' limits allow. An entry without a value keeps no limit at any amplitude.

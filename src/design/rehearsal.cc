@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "src/core/names.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kPrefix = "limit ";
 
 MeasuredSpec LimitSignal(const std::string& name, SignalKind kind, const std::string& on) {
@@ -31,7 +30,7 @@ bool IsLimitSignal(const MeasuredSpec& spec) { return spec.signal.starts_with(kP
 double LargestMagnitude(const std::vector<double>& values) {
   double largest = 0;
   for (const double value : values) {
-    if (!std::isfinite(value)) return std::numeric_limits<double>::infinity();
+    if (!std::isfinite(value)) return kInfinity;
     largest = std::max(largest, std::abs(value));
   }
   return largest;
@@ -122,7 +121,7 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
     input.measured.push_back({.spec = experiment.measured[i],
                               .index = i,
                               .column = experiment.measured[i].columns.front(),
-                              .values = std::vector<double>(values.size(), kNan)});
+                              .values = std::vector<double>(values.size(), kNaN)});
   }
   return input;
 }
@@ -131,7 +130,7 @@ Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, co
   Rehearsal rehearsal{.recording = std::move(input)};
   Recording& recording = rehearsal.recording;
   const std::size_t signals = recording.measured.size();
-  std::vector<double> predicted(recording.rows() * signals, kNan);
+  std::vector<double> predicted(recording.rows() * signals, kNaN);
   const bool simulated =
       simulator.SetParameters(values, recording) &&
       simulator.Run(recording, {0, recording.rows()}, AtRest(model), predicted).outcome == Outcome::kCompleted;
@@ -147,7 +146,7 @@ Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, co
     for (const auto& measured : recording.measured) {
       if (measured.spec.signal == kPrefix + name) return LargestMagnitude(measured.values);
     }
-    return kNan;
+    return kNaN;
   };
   for (const auto& limit : experiment.limits) {
     if (limit.command > 0) {
@@ -161,7 +160,7 @@ Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, co
     if (limit.position > 0) add(limit.joint + " angle", "rad", reached(limit.joint + " angle"), limit.position);
     if (limit.speed > 0) add(limit.joint + " speed", "rad/s", reached(limit.joint + " speed"), limit.speed);
   }
-  if (!simulated) rehearsal.worst = std::numeric_limits<double>::infinity();
+  if (!simulated) rehearsal.worst = kInfinity;
   return rehearsal;
 }
 

@@ -179,18 +179,6 @@ bool StartsAtRest(const Recording& recording, const Recording::Measured& measure
 
 }  // namespace
 
-Moments MomentsOf(const std::vector<double>& values) {
-  double mean = 0, square = 0, count = 0;
-  for (const double value : values) {
-    if (std::isfinite(value)) mean += value, count += 1;
-  }
-  mean /= count;
-  for (const double value : values) {
-    if (std::isfinite(value)) square += (value - mean) * (value - mean);
-  }
-  return {mean, std::sqrt(square / count)};
-}
-
 LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
                     double half_width_s) {
   if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured))

@@ -41,12 +41,6 @@ struct Recording {
 // name); no scored signal at all; fewer than two rows.
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path);
 
-// Mean and standard deviation (over n, not n - 1) of the values that are finite; NaN when none is.
-struct Moments {
-  double mean = 0, deviation = 0;
-};
-Moments MomentsOf(const std::vector<double>& values);
-
 // The value and slope of a measured signal at `row`, from a local quadratic least-squares fit over +-`half_width_s`
 // (one-sided at the ends): the initial state of a replay. Slope in SI per second; a slope within two standard errors of
 // zero is zero, and the value then the sample itself; so is that of a first row that is followed by 10 ms within one

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 #include "src/identify/slides.h"
@@ -37,13 +38,6 @@ Estimate RestOf(const Regression& f) {
   return {.name = "rest", .unit = "rad", .value = rest, .low = rest - error, .high = rest + error};
 }
 
-double StandardDeviation(const std::vector<double>& v) {
-  double mean = 0, square = 0;
-  for (const double x : v) mean += x / static_cast<double>(v.size());
-  for (const double x : v) square += (x - mean) * (x - mean);
-  return std::sqrt(square / static_cast<double>(v.size() - 1));
-}
-
 // Repeats: logs, or quarters of the only one; the spread of the values over them.
 void AddRepeats(const CableColumns& columns, const std::vector<Recording>& recordings, Identification* result) {
   PointTable repeats{
@@ -67,7 +61,8 @@ void AddRepeats(const CableColumns& columns, const std::vector<Recording>& recor
   }
   if (stiffnesses.size() > 1) {
     const auto add = [&](const char* name, const char* unit, const std::vector<double>& v) {
-      result->values.push_back({.name = name, .unit = unit, .value = StandardDeviation(v), .low = NAN, .high = NAN});
+      const double n = static_cast<double>(v.size()), spread = MomentsOf(v).deviation * std::sqrt(n / (n - 1));
+      result->values.push_back({.name = name, .unit = unit, .value = spread, .low = kNaN, .high = kNaN});
     };
     add("stiffness_spread", "N m/rad", stiffnesses);
     add("rest_spread", "rad", rests);

@@ -153,7 +153,7 @@ Result<Identification> IdentifyCurrentOffset(const IdentifyInput& input, const I
   Identification result{.method = "current-offset",
                         .relation = "current = offset at zero command and rest",
                         .values = {ToEstimate(fit.value(), 0, "current_offset", "A")},
-                        .r2 = NAN,
+                        .r2 = kNaN,
                         .rmse = fit.value().rmse,
                         .unit = "A",
                         .rows = rows.size()};
@@ -210,10 +210,10 @@ Result<Identification> IdentifyTorqueConstant(const IdentifyInput& input, const 
       curve.quantile * std::sqrt(std::max(0.0, gradient.dot(curve.covariance.topLeftCorner(2, 2) * gradient)));
   result.values.push_back(
       {.name = "loss_at_peak", .unit = "1", .value = loss, .low = loss - error, .high = loss + error});
-  result.values.push_back({.name = "peak_current", .unit = "A", .value = peak, .low = NAN, .high = NAN});
+  result.values.push_back({.name = "peak_current", .unit = "A", .value = peak, .low = kNaN, .high = kNaN});
   result.values.push_back(ToEstimate(curve, 2, "offset", "N m"));
   result.values.push_back(ToEstimate(line, 0, "kt_straight", "N m/A"));
-  result.values.push_back({.name = "r2_straight", .unit = "1", .value = line.r2, .low = NAN, .high = NAN});
+  result.values.push_back({.name = "r2_straight", .unit = "1", .value = line.r2, .low = kNaN, .high = kNaN});
   if (loss - error <= 0) result.remarks.push_back("no bend is seen up to the peak current of this log");
   PointTable table{.name = "points", .columns = {"current_a", "torque_n_m"}, .rows = {}};
   for (std::size_t k = 0; k < samples.size(); k += std::max<std::size_t>(1, samples.size() / 500))

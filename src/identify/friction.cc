@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 #include "src/identify/slides.h"
@@ -96,7 +97,7 @@ void AddHump(const FrictionColumns& columns, const Regression& fit, Identificati
         hump.value[at] - 2 * (hump.value[at] - hump.low[at]) > 0))
     return;
   result->values.push_back(ToEstimate(hump, at, "stribeck_rise", "N m"));
-  result->values.push_back({.name = "stribeck_speed", .unit = "rad/s", .value = width, .low = NAN, .high = NAN});
+  result->values.push_back({.name = "stribeck_speed", .unit = "rad/s", .value = width, .low = kNaN, .high = kNaN});
   result->r2 = hump.r2, result->rmse = hump.rmse;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 #include "src/identify/slides.h"
@@ -84,8 +85,8 @@ Result<Identification> IdentifyInertia(const IdentifyInput& input, const Identif
   result.values.push_back({.name = "inertia_nominal",
                            .unit = "kg m2",
                            .value = DrivenInertia(input.model.compiled(), joint),
-                           .low = NAN,
-                           .high = NAN});
+                           .low = kNaN,
+                           .high = kNaN});
   result.remarks.push_back("low pass at " + std::to_string(chosen.options.cutoff_hz).substr(0, 4) + " Hz; noise is " +
                            std::to_string(100 * share).substr(0, 4) +
                            " % of the acceleration that the other columns leave: the interval holds it");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 
@@ -347,7 +348,7 @@ Result<Identification> IdentifyPd(const IdentifyInput& input, const IdentifyOpti
   WidenBelowOneRow(direct, dt, &result);
   result.values.push_back(ToEstimate(direct, 0, "kp_without_delay", gain));
   result.values.push_back(ToEstimate(direct, 1, "kd_without_delay", damping));
-  result.values.push_back({.name = "r2_without_delay", .unit = "1", .value = direct.r2, .low = NAN, .high = NAN});
+  result.values.push_back({.name = "r2_without_delay", .unit = "1", .value = direct.r2, .low = kNaN, .high = kNaN});
   if (!corrected.trusted)
     result.remarks.push_back(
         "noise of the angle moves the values by more than can be corrected: a larger motion, or a lower --cutoff");

@@ -117,13 +117,10 @@ constexpr double kTwoPi = 2 * std::numbers::pi;
 
 // Returns the mean of the logs' peaks.
 double AddPeakValues(const Oscillation& seen, double inertia, Identification* result) {
-  double mean = 0, square = 0;
+  const auto [mean, deviation] = MomentsOf(seen.peaks_hz);
   const double n = static_cast<double>(seen.peaks_hz.size());
-  for (const double hz : seen.peaks_hz) mean += hz / n;
-  for (const double hz : seen.peaks_hz) square += (hz - mean) * (hz - mean);
   // One log: a quarter of the spectrum's own resolution. Several: their scatter as well.
-  const double half =
-      std::max(n > 1 ? StudentQuantile(n - 1) * std::sqrt(square / (n - 1) / n) : 0, 0.25 * seen.width_hz);
+  const double half = std::max(n > 1 ? StudentQuantile(n - 1) * deviation / std::sqrt(n - 1) : 0, 0.25 * seen.width_hz);
   result->values.push_back(
       {.name = "peak_frequency", .unit = "Hz", .value = mean, .low = mean - half, .high = mean + half});
   const auto stiffness = [&](double hz) { return inertia * kTwoPi * kTwoPi * hz * hz; };
@@ -186,7 +183,7 @@ Result<Identification> IdentifyResonance(const IdentifyInput& input, const Ident
   const double inertia = DrivenInertia(input.model.compiled(), joint);
   const double peak_hz = AddPeakValues(seen, inertia, &result);
   AddClampedValues(fit, inertia, peak_hz, &result);
-  result.values.push_back({.name = "inertia_nominal", .unit = "kg m2", .value = inertia, .low = NAN, .high = NAN});
+  result.values.push_back({.name = "inertia_nominal", .unit = "kg m2", .value = inertia, .low = kNaN, .high = kNaN});
   if (fit.r2 < 0.8)
     result.remarks.push_back(
         "the spring's equation explains less than 80 % of the acceleration: noise of the second derivative (lower "

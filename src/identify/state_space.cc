@@ -16,6 +16,7 @@
 #include <nlopt.hpp>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
 #include "src/model/parameter_writer.h"
@@ -128,7 +129,7 @@ double Score(const System& system, const IdentifyInput& input,
     sum += 0.5 * (eq / vq + ea / va);
     ++count;
   }
-  return count > 0 ? std::sqrt(sum / count) : NAN;
+  return count > 0 ? std::sqrt(sum / count) : kNaN;
 }
 
 struct FlexibleJoint {
@@ -402,7 +403,7 @@ Result<Identification> IdentifyStateSpace(const IdentifyInput& input, const Iden
   AddCoefficients(rows, units, solution, samples.dt_s, &result);
   result.rmse /= w1;  // of the base's acceleration: the rows are in units of its noise
   const auto add = [&](const char* name, double value) {
-    result.values.push_back({.name = name, .unit = "1", .value = value, .low = NAN, .high = NAN});
+    result.values.push_back({.name = name, .unit = "1", .value = value, .low = kNaN, .high = kNaN});
   };
   const auto error = [&](const System& system) { return Score(system, input, split.held_out, joint.base, joint.link); };
   const System constrained = FromCoefficients(solution);

@@ -89,7 +89,7 @@ void AddFriction(const std::vector<Plateau>& plateaus, const std::vector<double>
   if (!fixed) {
     estimate(1, "coulomb", "N m");
   } else {
-    result->values.push_back({.name = "coulomb", .unit = "N m", .value = coulomb_n_m, .low = NAN, .high = NAN});
+    result->values.push_back({.name = "coulomb", .unit = "N m", .value = coulomb_n_m, .low = kNaN, .high = kNaN});
   }
   const double spread = (y.array() - y.mean()).square().sum();
   result->r2 = spread > 0 ? 1 - residual.squaredNorm() / spread : 0;

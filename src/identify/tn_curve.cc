@@ -19,7 +19,7 @@ struct Sample {
 using Envelope = std::vector<std::pair<double, double>>;  // speed, torque
 
 struct Curve {
-  double peak, power, no_load = NAN;
+  double peak, power, no_load = kNaN;
 };
 constexpr int kGrid = 60, kDraws = 200;
 constexpr double kGridStep = 0.6 / kGrid;
@@ -161,7 +161,7 @@ using Interval = std::pair<double, double>;  // NaN: none known
 
 struct CurveFit {
   Curve curve;
-  Interval peak{NAN, NAN}, power{NAN, NAN}, no_load{NAN, NAN};  // 95 %
+  Interval peak{kNaN, kNaN}, power{kNaN, kNaN}, no_load{kNaN, kNaN};  // 95 %
 };
 
 // Intervals: the same fit over bins drawn again (bootstrap percentiles; Efron and Tibshirani, "An Introduction to the
@@ -206,11 +206,11 @@ Result<Identification> IdentifyTnCurve(const IdentifyInput& input, const Identif
   Identification result{
       .method = "tn-curve",
       .relation = "|torque| <= min(peak, power / speed), envelope of the rows in which the drive pushes",
-      .r2 = NAN,
-      .rmse = NAN,
+      .r2 = kNaN,
+      .rmse = kNaN,
       .unit = "N m",
       .rows = rows.samples.size()};
-  const auto add = [&](const char* name, const char* unit, double value, Interval bounds = {NAN, NAN}) {
+  const auto add = [&](const char* name, const char* unit, double value, Interval bounds = {kNaN, kNaN}) {
     result.values.push_back({.name = name, .unit = unit, .value = value, .low = bounds.first, .high = bounds.second});
   };
   const Curve& curve = fit.curve;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/core/statistics.h"
 #include "src/log/signal_checks.h"
 #include "src/log/timeline.h"
 
@@ -50,7 +51,7 @@ Result<std::vector<double>> ExtractColumn(const Log& log, const Timeline& timeli
     const double value = options.factor * raw + options.offset;
     if (!std::isfinite(raw)) {
       if (missing++ == 0) first_missing = row;
-      values.push_back(NAN);
+      values.push_back(kNaN);
       continue;
     }
     if (!std::isfinite(value)) {

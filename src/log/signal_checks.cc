@@ -68,7 +68,7 @@ Wraps FindWraps(const std::vector<double>& values, double period) {
 }
 
 void Unwrap(double period, std::vector<double>* values) {
-  double turns = 0, previous = NAN;
+  double turns = 0, previous = kNaN;
   for (double& x : *values) {
     if (!std::isfinite(x)) continue;
     if (std::isfinite(previous)) turns -= std::round((x - previous) / period);

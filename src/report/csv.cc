@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <set>
 
+#include "src/core/statistics.h"
+
 namespace gapscope {
 
 std::string CsvText(const std::vector<CsvColumn>& columns, int digits) {
@@ -15,7 +17,7 @@ std::string CsvText(const std::vector<CsvColumn>& columns, int digits) {
   for (std::size_t row = 0; !columns.empty() && row < columns.front().values.size(); ++row) {
     for (std::size_t c = 0; c < columns.size(); ++c) {
       if (c > 0) text += ',';
-      const double value = row < columns[c].values.size() ? columns[c].values[row] : NAN;
+      const double value = row < columns[c].values.size() ? columns[c].values[row] : kNaN;
       if (!std::isfinite(value)) continue;
       char* const end = buffer + sizeof buffer;
       text.append(buffer, digits > 0 ? std::to_chars(buffer, end, value, std::chars_format::general, digits).ptr

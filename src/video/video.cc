@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "src/compare/score.h"
+#include "src/core/statistics.h"
 #include "src/video/encoder.h"
 
 namespace gapscope {

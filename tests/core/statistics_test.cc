@@ -1,4 +1,4 @@
-// Medians and quantiles against values counted by hand, Student's t against printed tables.
+// Moments, medians and quantiles against values counted by hand, Student's t against printed tables.
 #include "src/core/statistics.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +7,15 @@
 
 namespace gapscope {
 namespace {
+
+TEST(StatisticsTest, MomentsAreOfTheFiniteValues) {
+  const Moments four = MomentsOf(std::vector{1.0, kNaN, 3.0, 5.0, kInfinity, 7.0});
+  EXPECT_EQ(four.mean, 4);
+  EXPECT_DOUBLE_EQ(four.deviation, std::sqrt(5)) << "(9 + 1 + 1 + 9) / 4";
+  EXPECT_EQ(MomentsOf(std::vector(3, 0.1)).deviation, 0) << "though 0.1 + 0.1 + 0.1 is not 0.3";
+  EXPECT_TRUE(std::isnan(MomentsOf(std::vector{kNaN}).mean));
+  EXPECT_TRUE(std::isnan(MomentsOf(std::vector{kNaN}).deviation));
+}
 
 TEST(StatisticsTest, QuantilesAreOfTheNearestRank) {
   EXPECT_EQ(Median({3, 1, 2}), 2);

@@ -86,8 +86,8 @@ class FitProblem {
   // Predictions on all rows of the problem's windows, offsets added: one entry per recording.
   std::vector<LogReplay> Predict(const FitPoint& point);
 
-  // Between two solves, by the residuals where the first ended: weighs the states by the sensors' noise
-  // (StatePriorsByNoise), and sets Huber's threshold where the options ask for one.
+  // By the residuals of a point whose states are solved: weighs the states by the sensors' noise (StatePriorsByNoise),
+  // and sets Huber's threshold where the options ask for one.
   void WeighStates(const Residuals& residuals);
   void SetHuberThreshold(const Residuals& residuals);
 

@@ -106,11 +106,23 @@ struct Found {
   Work work;
 };
 
-// The states' priors and the robust threshold by the residuals at a point.
-void Reweigh(const TuneOptions& options, const FitPoint& point, FitProblem* problem) {
-  const Residuals residuals = problem->Evaluate(point, Keep::kResiduals).residuals;
-  if (options.fit_states) problem->WeighStates(residuals);
-  problem->SetHuberThreshold(residuals);
+// A point whose windows' states are solved, and what is left there.
+struct Solved {
+  FitPoint point;
+  Evaluation left;
+};
+
+// Weighs the states' priors by what is left: the model's misfit, once the states are solved. Before, it is mostly the
+// starts', which a prior of that size would hold where they are.
+Solved Weigh(FitProblem& problem, const FitPoint& solved) {
+  Solved result{.point = solved, .left = problem.Evaluate(solved, Keep::kResiduals)};
+  if (std::isfinite(result.left.cost)) problem.WeighStates(result.left.residuals);
+  return result;
+}
+
+// The only way to weigh a point that no solve has ended at.
+Solved SolveStatesAndWeigh(FitProblem& problem, Objective& objective, const FitPoint& point, Work* work) {
+  return Weigh(problem, SolveStates(problem, objective, point, 3, work));
 }
 
 // The free runs beside the windows, from where the windows ended; nothing where they cannot be simulated there.
@@ -123,12 +135,10 @@ std::optional<Found> FitBoth(const Fit& fit, const Eigen::VectorXd& y) {
   both.work += first.work;
   both.result.cost = kInfinity;
   if (!std::isfinite(first.cost)) return both;
-  // Windows come log by log, each log's free run last: their states are found again from the log. What is left once
-  // they are found is the model's; before, it is mostly a free run's start, which a prior of that size would hold where
-  // it is.
-  joint = SolveStates(problem, both.stage->objective(), joint, 3, &both.work);
-  Reweigh(fit.options, joint, &problem);
-  both.result = both.stage->SolveFrom(joint, fit.options.solve);
+  // Windows come log by log, each log's free run last: their states are found again from the log.
+  const Solved found = SolveStatesAndWeigh(problem, both.stage->objective(), joint, &both.work);
+  problem.SetHuberThreshold(found.left.residuals);
+  both.result = both.stage->SolveFrom(found.point, fit.options.solve);
   both.work += both.result.work;
   return both;
 }
@@ -147,7 +157,8 @@ Found FitFrom(const Fit& fit, const std::optional<std::vector<double>>& random) 
   if (found.result.termination == Termination::kNotSimulated) return found;
   if (asked != ObjectiveKind::kBoth) {
     if (fit.options.huber > 0 || fit.options.fit_states) {
-      Reweigh(fit.options, found.result.point, &found.stage->problem);
+      FitProblem& problem = found.stage->problem;
+      problem.SetHuberThreshold(Weigh(problem, found.result.point).left.residuals);
       found.result = found.stage->SolveFrom(found.result.point, fit.options.solve);
       found.work += found.result.work;
     }
@@ -206,16 +217,12 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   fit.fit_shift = !shift_s;
   fit.shift_s = shift_s.value_or(0);
   FitProblem problem(model, recordings, fit, values, pool);
-  FitPoint point = problem.Start();
   ProblemObjective objective(problem);
   Work work;
-  point = SolveStates(problem, objective, point, 3, &work);
-  const Evaluation start = problem.Evaluate(point, Keep::kResiduals);
-  if (std::isfinite(start.cost)) {
-    problem.WeighStates(start.residuals);
-    point = Solve(problem, point, {.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01}).point;
-  }
-  return problem.Predict(point);
+  Solved found = SolveStatesAndWeigh(problem, objective, problem.Start(), &work);
+  if (std::isfinite(found.left.cost))
+    found.point = Solve(problem, found.point, {.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01}).point;
+  return problem.Predict(found.point);
 }
 
 Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::vector<double>& start,

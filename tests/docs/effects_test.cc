@@ -4,10 +4,9 @@
 
 #include <cctype>
 #include <cstdio>
-#include <cstdlib>
 
-#include "src/core/file.h"
 #include "src/model/effect.h"
+#include "tests/docs/made_part.h"
 
 namespace gapscope {
 namespace {
@@ -65,7 +64,8 @@ std::string EffectsText() {
   for (const Effect& effect : Catalogue()) {
     std::string meaning = effect.meaning;
     meaning[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(meaning[0])));
-    text += "## " + effect.name + "\n\n" + meaning + ". On " + PlaceText(effect.place) + ".\n\n";
+    text += (text.empty() ? "## " : "\n## ") + effect.name + "\n\n";
+    text += Wrapped(meaning + ". On " + PlaceText(effect.place) + ".") + "\n";
     text += "| parameter | unit | base | bounds |\n|---|---|---|---|\n";
     for (const EffectParameter& p : effect.parameters) {
       const std::string key = p.scale == ScaleKind::kCommand
@@ -75,28 +75,15 @@ std::string EffectsText() {
       text += "| " + key + " | " + unit + " | " + Number(p.neutral, p.scale) + " | " + Number(p.low, p.scale) + " .. " +
               Number(p.high, p.scale) + " |\n";
     }
-    text += "\nShows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
-    for (std::size_t i = 0; i < effect.partners.size(); ++i) text += (i ? ", " : "") + ("`" + effect.partners[i] + "`");
-    text += ".\n\n";
+    std::string told = "Shows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
+    for (std::size_t i = 0; i < effect.partners.size(); ++i) told += (i ? ", " : "") + ("`" + effect.partners[i] + "`");
+    text += "\n" + Wrapped(told + ".");
   }
   return text;
 }
 
 TEST(EffectsDocTest, IsWhatTheCatalogueSays) {
-  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/effects.md",
-                    begin = "<!-- made from src/model/effects -->\n\n", end = "<!-- end -->";
-  const auto file = ReadFile(path);
-  ASSERT_TRUE(file.ok()) << file.error().Text();
-  const std::string& text = file.value();
-  const std::size_t from = text.find(begin), to = text.find(end);
-  ASSERT_NE(from, std::string::npos);
-  ASSERT_NE(to, std::string::npos);
-  const std::string made = text.substr(0, from + begin.size()) + EffectsText() + text.substr(to);
-  if (std::getenv("GAPSCOPE_WRITE_DOCS")) {
-    ASSERT_TRUE(WriteFile(path, made).ok());
-    return;
-  }
-  EXPECT_EQ(text, made) << "run GAPSCOPE_WRITE_DOCS=1 build/tests/docs_effects_test";
+  ExpectMadePart("effects", "src/model/effects", EffectsText(), "docs_effects_test");
 }
 
 TEST(EffectsDocTest, PartnersAreEffects) {

@@ -2,12 +2,10 @@
 // GAPSCOPE_WRITE_DOCS=1 build/tests/docs_options_test rewrites it, without that the test compares.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <map>
 
 #include "src/cli/commands.h"
-#include "src/core/file.h"
-#include "tests/docs/wrap.h"
+#include "tests/docs/made_part.h"
 
 namespace gapscope {
 namespace {
@@ -96,20 +94,7 @@ std::string OptionsText() {
 }
 
 TEST(OptionsDocTest, IsWhatTheCommandsTake) {
-  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/options.md",
-                    begin = "<!-- made from src/cli -->\n\n", end = "\n<!-- end -->";
-  const auto file = ReadFile(path);
-  ASSERT_TRUE(file.ok()) << file.error().Text();
-  const std::string& text = file.value();
-  const std::size_t from = text.find(begin), to = text.find(end);
-  ASSERT_NE(from, std::string::npos);
-  ASSERT_NE(to, std::string::npos);
-  const std::string made = text.substr(0, from + begin.size()) + OptionsText() + text.substr(to);
-  if (std::getenv("GAPSCOPE_WRITE_DOCS")) {
-    ASSERT_TRUE(WriteFile(path, made).ok());
-    return;
-  }
-  EXPECT_EQ(text, made) << "run GAPSCOPE_WRITE_DOCS=1 build/tests/docs_options_test";
+  ExpectMadePart("options", "src/cli", OptionsText(), "docs_options_test");
 }
 
 // What a command starts from is a value that it would accept.

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "tests/model/synthetic.h"
+#include "tests/models/rig_facts.h"
 
 namespace gapscope::testing {
 namespace {
@@ -23,7 +24,7 @@ struct Rig {
           if (actuator == "motor.enable") return 1.0;
           return c == 0 ? Exciting(t, amplitude.at(name)) : 0.0;
         },
-        ShippedLogValues(name));
+        FactsOfRig(name).log_values);
     base = Predict(*model, recording);
     // The rig's own size from its own motion.
     for (std::size_t s = 0; s < base.size(); ++s) recording.measured[s].values = base[s];

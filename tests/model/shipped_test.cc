@@ -7,6 +7,7 @@
 #include "src/model/fields.h"
 #include "src/model/parameter_writer.h"
 #include "tests/model/synthetic.h"
+#include "tests/models/rig_facts.h"
 
 namespace gapscope::testing {
 namespace {
@@ -16,7 +17,7 @@ double At(const mjModel& m, const FieldSlot& slot) {
   return *reinterpret_cast<const mjtNum*>(base + slot.offset);
 }
 
-class ShippedTest : public ::testing::TestWithParam<const char*> {};
+class ShippedTest : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedTest, BuildsAndReproducesItsMjcf) {
   const std::string rig = GetParam();
@@ -27,20 +28,17 @@ TEST_P(ShippedTest, BuildsAndReproducesItsMjcf) {
   const ModelPtr written(mj_copyModel(nullptr, &model->compiled()));
   const DataPtr data(mj_makeData(written.get()));
   ParameterWriter writer(*model, written.get(), data.get());
-  ASSERT_TRUE(writer.Write(model->Nominal(), ShippedLogValues(rig)));
-  // Deliberate: this rig gives another one's MJCF its own numbers; the servos' gravity is tilted by the published
-  // offset.
-  if (rig == "qube_simurlacra") return;
-  // The MJCFs hold nine digits of what expressions compute; the servos' hold four.
-  const double relative = rig == "xl330" || rig == "sts3032" ? 1e-4 : 1e-9;
+  ASSERT_TRUE(writer.Write(model->Nominal(), FactsOfRig(rig).log_values));
+  const RigFacts& facts = FactsOfRig(rig);
+  if (facts.own_values) return;
   for (const auto& setting : experiment.settings) {
-    if (setting.field == "option/gravity") continue;
+    if (setting.field == "option/gravity") continue;  // deliberate: tilted by the published offset
     const auto field = ResolveField(model->compiled(), setting.field, setting.where);
     ASSERT_TRUE(field.ok()) << field.error().Text();
     for (std::size_t i = 0; i < field.value().components.size(); ++i) {
       for (const FieldSlot& slot : field.value().components[i]) {
         const double mjcf = At(model->compiled(), slot), now = At(*written, slot);
-        EXPECT_NEAR(now, mjcf, relative * std::abs(mjcf))
+        EXPECT_NEAR(now, mjcf, facts.rounded * std::abs(mjcf))
             << rig << ": " << setting.where << " " << setting.field << "[" << i << "]";
       }
     }
@@ -52,8 +50,7 @@ TEST_P(ShippedTest, BuildsAndReproducesItsMjcf) {
 
 TEST_P(ShippedTest, MovesAsItsMjcfWhenDrivenByMuJoCoAlone) {
   const std::string rig = GetParam();
-  if (rig == "qube_simurlacra" || rig == "xl330" || rig == "sts3032" || rig == "ak80")
-    return;  // see above; and gains that logs bring
+  if (FactsOfRig(rig).own_values || !FactsOfRig(rig).log_values.empty()) return;
   const Experiment experiment = ShippedExperiment(rig);
   const auto model = MakeModel(experiment);
   const mjModel& m = model->compiled();
@@ -89,10 +86,8 @@ TEST_P(ShippedTest, EveryPossibleEffectCanBeAdded) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Rigs, ShippedTest,
-                         ::testing::Values("joint", "qube", "flexjoint", "flexlink", "xl330", "sts3032", "ak80",
-                                           "qube_simurlacra", "qube_koopman", "flexlink_2dsfl"),
-                         [](const auto& test) { return std::string(test.param); });
+INSTANTIATE_TEST_SUITE_P(Rigs, ShippedTest, ::testing::ValuesIn(RigNames()),
+                         [](const auto& test) { return test.param; });
 
 }  // namespace
 }  // namespace gapscope::testing

@@ -21,13 +21,6 @@ Experiment ShippedExperiment(const std::string& rig) {
   return loaded.ok() ? loaded.value() : Experiment{};
 }
 
-std::map<std::string, double> ShippedLogValues(const std::string& rig) {
-  if (rig == "xl330") return {{"log.kp", 400}, {"log.mass", 0.49}, {"log.length", 0.1}, {"log.supply_v", 7.4}};
-  if (rig == "sts3032") return {{"log.kp", 16}, {"log.mass", 0.457}, {"log.length", 0.1}, {"log.supply_v", 6.0}};
-  if (rig == "ak80") return {{"log.desired_position", 0}};
-  return {};
-}
-
 Recording MakeRecording(const Experiment& experiment, int rows, double step_s,
                         const std::function<double(int, double)>& command,
                         const std::map<std::string, double>& values) {

@@ -20,8 +20,6 @@ Experiment MakeExperiment(const Scratch& scratch, const std::string& mjcf, const
 
 // models/RIG/experiment.yaml.
 Experiment ShippedExperiment(const std::string& rig);
-// What a log's header would hold for a shipped rig, equal to what its MJCF holds.
-std::map<std::string, double> ShippedLogValues(const std::string& rig);
 
 // Rows every `step_s`; command c of the experiment is command(c, t); every measured signal is there and zero.
 Recording MakeRecording(const Experiment& experiment, int rows, double step_s,

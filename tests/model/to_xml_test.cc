@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/model/synthetic.h"
+#include "tests/models/rig_facts.h"
 
 namespace gapscope::testing {
 namespace {
@@ -56,7 +57,7 @@ TEST_P(ToXmlTest, ReplaysLikeTheModelItWasMadeFrom) {
                : c == 0                     ? Exciting(t, 0.5) - Exciting(0, 0.5)
                                             : 0.0;
       },
-      ShippedLogValues(rig));
+      FactsOfRig(rig).log_values);
   const ScaleTable scales = EstimateScales(*base, {recording});
   const auto model = MakeModel(experiment, uses.value(), scales);
   ASSERT_NE(model, nullptr);

@@ -2,39 +2,16 @@
 // rendered.
 #include <gtest/gtest.h>
 
-#include <map>
-
 #include "tests/models/rig.h"
 
 namespace gapscope::testing {
 namespace {
 
-bool IsServo(const std::string& rig) { return rig == "xl330" || rig == "sts3032"; }
-
-// The rig as shipped, or, without the motor plugin, with a native actuator in its place.
-ModelPtr LoadAny(const std::string& rig) {
-  return LoadRig(rig, IsServo(rig) && !HasMotorPlugin() ? "<motor name=\"motor\" joint=\"joint\"/>" : "");
-}
-
-const std::map<std::string, std::vector<std::string>>& JointNames() {
-  static const std::map<std::string, std::vector<std::string>> names = {{"joint", {"joint"}},
-                                                                        {"qube", {"arm", "pendulum"}},
-                                                                        {"flexjoint", {"base", "link"}},
-                                                                        {"flexlink", {"hub", "deflection"}},
-                                                                        {"xl330", {"joint"}},
-                                                                        {"sts3032", {"joint"}},
-                                                                        {"ak80", {"joint"}},
-                                                                        {"qube_simurlacra", {"arm", "pendulum"}},
-                                                                        {"qube_koopman", {"arm", "pendulum"}},
-                                                                        {"flexlink_2dsfl", {"hub", "deflection"}}};
-  return names;
-}
-
 TEST(RigContractTest, JointsAndMotorHaveTheContractsNames) {
   for (const auto& rig : RigNames()) {
-    const ModelPtr m = LoadAny(rig);
+    const ModelPtr m = LoadRig(rig);
     ASSERT_NE(m, nullptr);
-    const auto& joints = JointNames().at(rig);
+    const auto& joints = FactsOfRig(rig).joints;
     ASSERT_EQ(m->njnt, static_cast<int>(joints.size())) << rig;
     for (int j = 0; j < m->njnt; ++j) EXPECT_EQ(mj_id2name(m.get(), mjOBJ_JOINT, j), joints[j]) << rig;
     const int motor = mj_name2id(m.get(), mjOBJ_ACTUATOR, "motor");
@@ -46,19 +23,14 @@ TEST(RigContractTest, JointsAndMotorHaveTheContractsNames) {
 
 TEST(RigContractTest, BaseModelsHoldNoEffects) {
   for (const auto& rig : RigNames()) {
-    const ModelPtr m = LoadAny(rig);
+    const ModelPtr m = LoadRig(rig);
     ASSERT_NE(m, nullptr);
     for (int i = 0; i < m->nv; ++i) {
-      if (IsServo(rig)) {
-        EXPECT_GT(m->dof_frictionloss[i], 0) << rig;
-      } else {
-        EXPECT_EQ(m->dof_frictionloss[i], 0) << rig;
-      }
+      EXPECT_EQ(m->dof_frictionloss[i] > 0, FactsOfRig(rig).dry_friction) << rig;
     }
     for (int j = 0; j < m->njnt; ++j) {
       EXPECT_FALSE(m->jnt_limited[j]) << rig;
-      // Only the flexible rigs' second joint has a spring.
-      EXPECT_EQ(m->jnt_stiffness[j] > 0, rig.starts_with("flex") && j == 1) << rig;
+      EXPECT_EQ(m->jnt_stiffness[j] > 0, mj_id2name(m.get(), mjOBJ_JOINT, j) == FactsOfRig(rig).spring) << rig;
     }
     for (int a = 0; a < m->nu; ++a) {
       EXPECT_FALSE(m->actuator_forcelimited[a]) << rig;
@@ -73,12 +45,11 @@ TEST(RigContractTest, BaseModelsHoldNoEffects) {
 
 TEST(RigContractTest, ThreeCamerasAndGeometryThatWeighsNothing) {
   for (const auto& rig : RigNames()) {
-    const ModelPtr m = LoadAny(rig);
+    const ModelPtr m = LoadRig(rig);
     ASSERT_NE(m, nullptr);
     for (const char* camera : {"fixed", "track", "top"})
       EXPECT_GE(mj_name2id(m.get(), mjOBJ_CAMERA, camera), 0) << rig << " " << camera;
     EXPECT_GE(m->ngeom, 10) << rig;
-    if (IsServo(rig) && !HasMotorPlugin()) continue;  // loaded without the scene and its classes
     for (int g = 0; g < m->ngeom; ++g)
       EXPECT_EQ(m->geom_contype[g] | m->geom_conaffinity[g], 0) << rig << " geom " << g;
     EXPECT_EQ(m->nlight, 2) << rig;

@@ -27,13 +27,6 @@ void LoadPluginsOnce() {
 
 }  // namespace
 
-const std::vector<std::string>& RigNames() {
-  static const std::vector<std::string> names = {"joint",        "qube",          "flexjoint", "flexlink",
-                                                 "xl330",        "sts3032",       "ak80",      "qube_simurlacra",
-                                                 "qube_koopman", "flexlink_2dsfl"};
-  return names;
-}
-
 std::string RigPath(const std::string& rig) {
   return std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/" + rig + ".xml";
 }

@@ -10,11 +10,9 @@
 #include <vector>
 
 #include "src/core/mujoco_handles.h"
+#include "tests/models/rig_facts.h"
 
 namespace gapscope::testing {
-
-// All rigs under models/.
-const std::vector<std::string>& RigNames();
 
 // The path of models/RIG/RIG.xml.
 std::string RigPath(const std::string& rig);

@@ -5,6 +5,7 @@
 #include <new>
 
 #include "tests/model/synthetic.h"
+#include "tests/models/rig_facts.h"
 #include "tests/replay/count_new.h"
 
 namespace gapscope::testing {
@@ -21,7 +22,8 @@ TEST(AllocationTest, RunAllocatesNothing) {
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     const auto model = MakeModel(experiment, uses.value());
     const Recording recording = MakeRecording(
-        experiment, 200, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.3) : 1.0; }, ShippedLogValues(rig));
+        experiment, 200, 0.002, [](int c, double t) { return c == 0 ? Exciting(t, 0.3) : 1.0; },
+        FactsOfRig(rig).log_values);
     std::vector<double> values = model->Nominal();
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (model->parameters()[i].name.find("delay_s") != std::string::npos) values[i] = 0.0031;

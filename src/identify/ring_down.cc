@@ -17,6 +17,7 @@
 #include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
+#include "src/model/drive_facts.h"
 #include "src/model/parameter_writer.h"
 
 namespace gapscope {
@@ -146,12 +147,13 @@ SwingFit Fit(const Swing& swing, Parameters start, std::vector<int> free) {
 }
 
 // The longest stretch in which nothing drives: a drive that is switched off, or a command of zero.
-Result<std::pair<double, double>> FreeStretch(const Recording& recording, const IdentifyOptions& options) {
+Result<std::pair<double, double>> FreeStretch(const Model& model, const Recording& recording,
+                                              const IdentifyOptions& options) {
   if (options.from_s > 0 || options.to_s > 0)
     return std::pair{options.from_s, options.to_s > 0 ? options.to_s : recording.time_s.back()};
   const Recording::Command* gate = &recording.commands.front();
-  for (const auto& command : recording.commands) {
-    if (command.actuator.ends_with(".enable")) gate = &command;
+  for (std::size_t c = 0; c < recording.commands.size(); ++c) {
+    if (FactsOf(model.compiled(), model.command_actuators()[c]).enables) gate = &recording.commands[c];
   }
   double best_from = 0, best_to = 0;
   std::size_t begin = 0;
@@ -319,7 +321,7 @@ Status AddLog(const IdentifyInput& input, std::size_t log, int joint, const Iden
   if (!angle)
     return Error{.what = "the log has no angle of '" + JointName(input.model, joint) + "'",
                  .where = recording.log_path};
-  GS_ASSIGN(const Stretch stretch, FreeStretch(recording, options));
+  GS_ASSIGN(const Stretch stretch, FreeStretch(input.model, recording, options));
   GS_ASSIGN(Swing swing, ReadSwing(recording, *angle, stretch));
   swing.spring = all->spring;
   AddCarrier(input.model, recording, joint, stretch, options, &swing);
@@ -399,7 +401,7 @@ void AddValues(const RingDown& all, double inertia, Identification* result) {
     return Combine(all.logs, index, [](double x) { return x; }, [](double) { return 1.0; });
   };
   const auto known = [](double value) {
-    return Estimate{.name = "", .unit = "", .value = value, .low = NAN, .high = NAN};
+    return Estimate{.name = "", .unit = "", .value = value, .low = kNaN, .high = kNaN};
   };
   const auto scaled = [&](Estimate e) {
     return Estimate{
@@ -441,7 +443,7 @@ Result<Identification> IdentifyRingDown(const IdentifyInput& input, const Identi
           all.spring
               ? "acceleration = -(2 pi frequency)^2 (angle - rest) - damping_rate speed - dry_rate sign(speed)"
               : "acceleration = -(2 pi frequency)^2 sin(angle - rest) - damping_rate speed - dry_rate sign(speed)",
-      .r2 = all.variance > 0 ? 1 - all.square / all.variance : NAN,
+      .r2 = all.variance > 0 ? 1 - all.square / all.variance : kNaN,
       .rmse = std::sqrt(all.square / all.rows),
       .unit = "rad",
       .rows = static_cast<std::size_t>(all.rows)};

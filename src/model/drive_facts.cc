@@ -1,5 +1,8 @@
 #include "src/model/drive_facts.h"
 
+#include <algorithm>
+#include <sstream>
+#include <string>
 #include <string_view>
 
 #include "src/plugins/motor/law.h"
@@ -14,6 +17,15 @@ double ParameterOf(const mjModel& m, int instance, const char* key) {
   if (numeric >= 0) return m.numeric_data[m.numeric_adr[numeric]];
   double value = 0;
   return plugins::ParseNumber(plugins::ConfigText(&m, instance, key), &value) ? value : 0;
+}
+
+// Whether the actuator is the input `enable` of its instance: as `inputs` lists them, in the order of their ids.
+bool Enables(const mjModel& m, int instance, int actuator) {
+  const auto before = std::count(m.actuator_plugin, m.actuator_plugin + actuator, instance);
+  std::istringstream inputs{std::string(plugins::ConfigText(&m, instance, "inputs"))};
+  std::string role;
+  for (auto i = before; i >= 0; --i) inputs >> role;
+  return !inputs.fail() && role == plugins::kRoleNames[plugins::kEnable];
 }
 
 }  // namespace
@@ -33,7 +45,7 @@ DriveFacts FactsOf(const mjModel& m, int actuator) {
   const bool holds = *gain && ParameterOf(m, instance, gain) != 0;
   // The affine law stands in for a native actuator: without a gain it is no servo, and meant to be none.
   const bool servo = *gain && (holds || law->law != plugins::MotorLaw::kAffine);
-  return {.feeds_back_position = servo, .holds_position = holds};
+  return {.feeds_back_position = servo, .holds_position = holds, .enables = Enables(m, instance, actuator)};
 }
 
 }  // namespace gapscope

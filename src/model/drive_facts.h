@@ -1,4 +1,4 @@
-// What kind of drive an actuator is: the one answer to "is this a servo".
+// What kind of drive an actuator is: the one answer to "is this a servo", and to "does this switch a drive off".
 #ifndef GAPSCOPE_MODEL_DRIVE_FACTS_H_
 #define GAPSCOPE_MODEL_DRIVE_FACTS_H_
 
@@ -9,6 +9,7 @@ namespace gapscope {
 struct DriveFacts {
   bool feeds_back_position = false;  // its law does: a servo, whatever its gains
   bool holds_position = false;       // and its gain is not zero in this model, so that it holds its joint
+  bool enables = false;              // it is a drive's input `enable`: while it is zero the drive gives no torque
 };
 
 // Of a native actuator by its bias, of a gapscope.motor by its law (src/plugins/motor/README.md), of another plugin

@@ -20,7 +20,7 @@ constexpr const char* kMjcf = R"(<mujoco>
         <config key="kt" value="1"/>
         <config key="ke" value="1"/><config key="resistance" value="1"/><config key="supply_v" value="5"/></instance>
       <instance name="slack"><config key="kp" value="0"/></instance>
-      <instance name="torque"><config key="law" value="torque"/></instance>
+      <instance name="torque"><config key="law" value="torque"/><config key="inputs" value="torque enable"/></instance>
     </plugin>
   </extension>
   <worldbody>
@@ -40,6 +40,7 @@ constexpr const char* kMjcf = R"(<mujoco>
     <plugin name="duty" joint="rough" plugin="gapscope.motor" instance="duty"/>
     <plugin name="slack" joint="slide" plugin="gapscope.motor" instance="slack"/>
     <plugin name="torque" joint="free_one" plugin="gapscope.motor" instance="torque"/>
+    <plugin name="switch" joint="free_one" plugin="gapscope.motor" instance="torque"/>
   </actuator>
 </mujoco>)";
 constexpr const char* kYaml = R"(commands:
@@ -90,13 +91,15 @@ TEST_F(RigTest, KnowsSpringsFrictionDrivesAndCommands) {
   EXPECT_FALSE(rig_->HasFriction("sprung"));
   struct Case {
     const char* actuator;
-    bool feeds_back, holds;
+    bool feeds_back, holds, enables;
   };
-  for (const auto& [actuator, feeds_back, holds] :
-       {Case{"servo", true, true}, Case{"duty", true, true}, Case{"slack", true, false}, Case{"torque", false, false},
-        Case{"servo.feedforward", false, false}, Case{"none", false, false}}) {
+  for (const auto& [actuator, feeds_back, holds, enables] :
+       {Case{"servo", true, true, false}, Case{"duty", true, true, false}, Case{"slack", true, false, false},
+        Case{"torque", false, false, false}, Case{"switch", false, false, true},
+        Case{"servo.feedforward", false, false, false}, Case{"none", false, false, false}}) {
     EXPECT_EQ(rig_->FactsOf(actuator).feeds_back_position, feeds_back) << actuator;
     EXPECT_EQ(rig_->FactsOf(actuator).holds_position, holds) << actuator;
+    EXPECT_EQ(rig_->FactsOf(actuator).enables, enables) << actuator;
   }
   EXPECT_EQ(rig_->KindOfCommand("servo"), CommandKind::kAngle);
   EXPECT_EQ(rig_->KindOfCommand("servo.feedforward"), CommandKind::kTorque);

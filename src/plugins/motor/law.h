@@ -14,6 +14,8 @@ enum class MotorLaw { kPosition, kTorque, kCurrent, kVoltage, kDuty, kAffine };
 
 // What an actuator of the instance carries.
 enum MotorRole { kTarget, kVelocity, kTorque, kCurrent, kVoltage, kFeedforward, kSupply, kEnable, kRoles };
+inline constexpr const char* kRoleNames[kRoles] = {"target",  "velocity",    "torque", "current",
+                                                   "voltage", "feedforward", "supply", "enable"};
 
 struct LawTraits {
   const char* name;  // as the attribute `law` spells it

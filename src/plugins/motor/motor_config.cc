@@ -10,9 +10,6 @@
 namespace gapscope::plugins {
 namespace {
 
-constexpr const char* kRoleNames[kRoles] = {"target",  "velocity",    "torque", "current",
-                                            "voltage", "feedforward", "supply", "enable"};
-
 // The default of `max_delay_s`, and how much finer than the model's own a time step may be by default.
 constexpr double kDefaultMaxDelay_s = 0.05;
 constexpr double kStepRefinement = 2;

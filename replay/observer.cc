@@ -1,13 +1,14 @@
 #include "replay/observer.h"
 
 #include <cmath>
-#include <unsupported/Eigen/MatrixFunctions>
+
+#include "src/core/dense.h"
 
 namespace gapscope {
 
 Observer::Observer(ObserverSpec spec)
     : spec_(std::move(spec)),
-      left_inverse_(spec_.c.completeOrthogonalDecomposition().pseudoInverse()),
+      left_inverse_(PseudoInverse(spec_.c)),
       state_(Eigen::VectorXd::Zero(spec_.a.rows())),
       next_(state_),
       wanted_(state_),
@@ -21,7 +22,7 @@ void Observer::Discretise(double period_s) {
   augmented.topLeftCorner(n, n) = spec_.a - spec_.gain * spec_.c;
   augmented.block(0, n, n, 1) = spec_.b;
   augmented.topRightCorner(n, m) = spec_.gain;
-  const Eigen::MatrixXd exponential = (augmented * period_s).exp();
+  const Eigen::MatrixXd exponential = MatrixExponential(augmented * period_s);
   step_ = exponential.topLeftCorner(n, n);
   push_ = exponential.block(0, n, n, 1);
   read_ = exponential.topRightCorner(n, m);

@@ -2,7 +2,7 @@
 #ifndef GAPSCOPE_REPLAY_OBSERVER_H_
 #define GAPSCOPE_REPLAY_OBSERVER_H_
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <span>
 
 namespace gapscope {

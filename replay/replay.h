@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "replay/scales.h"
 #include "replay/simulator.h"
 #include "src/core/thread_pool.h"
 
@@ -68,10 +69,6 @@ TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& record
 // Root mean square over scored signals of (RMSE / standard deviation of the measured signal), then over logs; NaN rows
 // are left out, a log that diverged gives infinity.
 double ReplayError(const std::vector<LogReplay>& logs);
-
-// Largest torque, angle, speed and command on each joint and actuator over the recordings, from a nominal free run: the
-// rig's own size.
-ScaleTable EstimateScales(const Model& model, const std::vector<Recording>& recordings);
 
 }  // namespace gapscope
 

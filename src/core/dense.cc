@@ -57,6 +57,10 @@ Eigen::MatrixXd Inverse(const Eigen::MatrixXd& square) {
   return square.inverse();
 }
 
+Eigen::MatrixXd PseudoInverse(const Eigen::MatrixXd& matrix) {
+  return matrix.completeOrthogonalDecomposition().pseudoInverse();
+}
+
 Eigen::MatrixXd MatrixExponential(const Eigen::MatrixXd& square) {
   GS_CHECK(square.rows() == square.cols());
   return square.exp();

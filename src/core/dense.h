@@ -60,6 +60,8 @@ struct GeneralEigen {
 [[nodiscard]] Eigen::MatrixXd SolveLu(const Eigen::MatrixXd& square, const Eigen::MatrixXd& right);
 
 [[nodiscard]] Eigen::MatrixXd Inverse(const Eigen::MatrixXd& square);
+// Moore and Penrose's, of any shape, by the complete orthogonal decomposition.
+[[nodiscard]] Eigen::MatrixXd PseudoInverse(const Eigen::MatrixXd& matrix);
 [[nodiscard]] Eigen::MatrixXd MatrixExponential(const Eigen::MatrixXd& square);
 
 }  // namespace gapscope

@@ -53,6 +53,11 @@ TEST(DenseTest, SingularValuesFall) {
   EXPECT_LT((SingularValues(matrix) - Eigen::Vector2d(5, 2)).norm(), kRounding);
 }
 
+TEST(DenseTest, PseudoInverseGivesTheLeastNorm) {
+  const Eigen::MatrixXd wide = Eigen::RowVector2d(3, 4);
+  EXPECT_LT((PseudoInverse(wide) - Eigen::Vector2d(0.12, 0.16)).norm(), kRounding);
+}
+
 TEST(DenseTest, LuAndInverseSolveAnUnsymmetricMatrix) {
   const Eigen::MatrixXd matrix = (Eigen::Matrix2d() << 0, 2, -5, 1).finished(), one = Eigen::MatrixXd::Identity(2, 2);
   EXPECT_LT((matrix * Inverse(matrix) - one).norm(), kRounding);

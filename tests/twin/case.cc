@@ -6,10 +6,9 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr std::pair<Kind, const char*> kKinds[] = {{Kind::kAuto, "auto"},       {Kind::kNone, "none"},
-                                                   {Kind::kSingle, "single"},   {Kind::kPair, "pair"},
-                                                   {Kind::kUnknown, "unknown"}, {Kind::kAmbiguous, "ambiguous"}};
-constexpr double kLowestRatio = 3, kHighestRatio = 100;
+constexpr std::pair<Kind, const char*> kKinds[] = {
+    {Kind::kAuto, "auto"},     {Kind::kNone, "none"},       {Kind::kSingle, "single"},       {Kind::kPair, "pair"},
+    {Kind::kTriple, "triple"}, {Kind::kUnknown, "unknown"}, {Kind::kAmbiguous, "ambiguous"}, {Kind::kRough, "rough"}};
 constexpr int kTries = 12;
 
 Kind DrawKind(Random* random) {
@@ -47,65 +46,14 @@ bool Drifts(const EffectChoice& c) {
          c.name == "gravity_offset";
 }
 
-Plant With(const Case& c, const std::vector<EffectChoice>& choices, const Motion& motion) {
-  Plant plant = c.base;
-  for (const EffectChoice& choice : choices) AddEffect(choice, motion, &plant, nullptr);
-  return plant;
-}
-
-// With only the position logged a late sensor equals a late command: such a case would be ambiguous.
-void RequireColumns(const std::vector<EffectChoice>& choices, std::vector<LogSpec>* logs) {
-  const bool needed = std::any_of(choices.begin(), choices.end(), [](const EffectChoice& c) {
-    return c.name == "sensor_delay" || c.name == "command_delay";
-  });
-  for (LogSpec& log : *logs) {
-    log.torque_column = log.torque_column || needed;
-    log.speed_column = log.speed_column || needed;
-  }
-}
-
-bool TameAll(const Plant& plant, std::vector<LogSpec>* logs, Random* random) {
-  return std::all_of(logs->begin(), logs->end(), [&](LogSpec& log) { return Tame(plant, &log, random); });
-}
-
-// Draws effects and their severities until all show. `count` 1 or 2.
+// Draws effects and their severities until all show.
 bool MakeListed(const CaseRequest& request, int count, Random* random, Case* c, std::string* problem) {
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    std::vector<EffectRange> ranges;
-    while (static_cast<int>(ranges.size()) < count) {
-      EffectRange range;
-      const std::string& wanted = ranges.empty() ? request.effect : std::string();
-      if (!FindEffect(c->rig, wanted, random, &range)) {
-        *problem = "effect '" + wanted + "' does not exist on rig " + RigName(c->rig);
-        return false;
-      }
-      if (!ranges.empty() && Clash(c->rig, ranges[0].choice, range.choice)) continue;
-      ranges.push_back(range);
-    }
-    const bool loop = std::any_of(ranges.begin(), ranges.end(), [](const EffectRange& r) { return Drifts(r.choice); });
-    c->logs = DrawCampaign(c->base, loop && c->rig != Rig::kJoint, random);
-    const Motion motion = MotionOf(c->base, c->logs);
-    std::vector<EffectChoice> choices;
-    bool visible = true;
-    for (EffectRange& range : ranges) {
-      EffectChoice choice = range.choice;
-      const auto plant_at = [&](double severity) {
-        choice.severity = severity;
-        return With(*c, {choice}, motion);
-      };
-      if (request.severity > 0) {
-        choice.severity = request.severity;
-      } else {
-        const double target = random->LogUniform(kLowestRatio, kHighestRatio);
-        const Search found = FindSeverity(plant_at, c->base, c->logs, c->sensors, target, range.lowest, range.highest);
-        choice.severity = found.severity;
-        visible = visible && found.severity > 0 && found.gap.refit >= kLowestRatio * 0.8;
-      }
-      choices.push_back(choice);
-    }
-    if (!visible && !(count == 1 && !request.effect.empty() && attempt + 1 == kTries)) continue;
-    RequireColumns(choices, &c->logs);
-    c->truth = With(*c, choices, motion);
+    Listed drawn;
+    if (!DrawListed(request, count, random, c, &drawn, problem)) return false;
+    if (!drawn.visible && !(count == 1 && !request.effect.empty() && attempt + 1 == kTries)) continue;
+    RequireColumns(drawn.choices, &c->logs);
+    c->truth = drawn.On(c->base);
     if (!TameAll(c->truth, &c->logs, random)) continue;
     const GapOptions options;
     const auto records = CoarseRecords(c->truth, c->logs, c->sensors, options);
@@ -113,13 +61,12 @@ bool MakeListed(const CaseRequest& request, int count, Random* random, Case* c, 
     c->gap = MeasureGap(records, c->base, c->Floor(), directions, true, options);
     c->effects.clear();
     bool shown = true;
-    for (std::size_t i = 0; i < choices.size(); ++i) {
-      EffectLabel label{choices[i], {}, {}, c->gap};
+    for (std::size_t i = 0; i < drawn.choices.size(); ++i) {
+      EffectLabel label{drawn.choices[i], {}, {}, c->gap};
       Plant scratch = c->base;
-      label.parameters = AddEffect(choices[i], motion, &scratch, &label.extra);
-      if (choices.size() > 1) {
-        const Plant without = With(*c, {choices[1 - i]}, motion);
-        label.gap = MeasureGap(records, without, c->Floor(), directions, true, options);
+      label.parameters = AddEffect(drawn.choices[i], drawn.motion, &scratch, &label.extra);
+      if (drawn.choices.size() > 1) {
+        label.gap = MeasureGap(records, drawn.On(c->base, i), c->Floor(), directions, true, options);
       }
       shown = shown && label.gap.Finite() && label.gap.refit >= 0.8 * kLowestRatio;
       c->effects.push_back(label);
@@ -131,31 +78,12 @@ bool MakeListed(const CaseRequest& request, int count, Random* random, Case* c, 
 }
 
 bool MakeUnknown(const CaseRequest& request, Random* random, Case* c, std::string* problem) {
-  const auto names = OutsideNames();
-  if (!request.effect.empty() && std::find(names.begin(), names.end(), request.effect) == names.end()) {
-    *problem = "no effect outside the list is called '" + request.effect + "'";
-    return false;
-  }
   for (int attempt = 0; attempt < kTries; ++attempt) {
-    c->outside = request.effect.empty()
-                     ? names[static_cast<std::size_t>(random->Integer(0, static_cast<int>(names.size()) - 1))]
-                     : request.effect;
-    const auto shape = static_cast<std::uint64_t>(random->Unit() * 0x1.0p53);
-    c->logs = DrawCampaign(c->base, c->outside == "external_torque" && c->rig != Rig::kJoint, random);
-    const Motion motion = MotionOf(c->base, c->logs);
-    const auto plant_at = [&](double severity) {
-      Plant plant = c->base;
-      c->outside_parameters = AddOutside(c->outside, severity, shape, motion, &plant);
-      return plant;
-    };
-    double severity = request.severity;
-    if (severity <= 0) {
-      const Search found = FindSeverity(plant_at, c->base, c->logs, c->sensors, random->LogUniform(6, 60), 0.02, 10);
-      severity = found.severity;
-      if ((severity <= 0 || found.gap.refit < 4) && attempt + 1 < kTries) continue;
+    c->truth = c->base;
+    if (!DrawOutside(request, random, c, problem)) {
+      if (!problem->empty()) return false;
+      if (attempt + 1 < kTries) continue;
     }
-    c->truth = plant_at(severity);
-    c->outside_severity = severity;
     if (!TameAll(c->truth, &c->logs, random)) continue;
     const GapOptions options;
     c->gap = MeasureGap(CoarseRecords(c->truth, c->logs, c->sensors, options), c->base, c->Floor(),
@@ -173,6 +101,65 @@ const char* KindName(Kind kind) {
     if (value == kind) return name;
   }
   return "";
+}
+
+void RequireColumns(const std::vector<EffectChoice>& choices, std::vector<LogSpec>* logs) {
+  const bool needed = std::any_of(choices.begin(), choices.end(), [](const EffectChoice& c) {
+    return c.name == "sensor_delay" || c.name == "command_delay";
+  });
+  for (LogSpec& log : *logs) {
+    log.torque_column = log.torque_column || needed;
+    log.speed_column = log.speed_column || needed;
+  }
+}
+
+bool TameAll(const Plant& plant, std::vector<LogSpec>* logs, Random* random) {
+  return std::all_of(logs->begin(), logs->end(), [&](LogSpec& log) { return Tame(plant, &log, random); });
+}
+
+Plant Listed::On(const Plant& base, std::size_t without) const {
+  Plant plant = base;
+  for (std::size_t i = 0; i < choices.size(); ++i) {
+    if (i != without) AddEffect(choices[i], motion, &plant, nullptr);
+  }
+  return plant;
+}
+
+bool DrawListed(const CaseRequest& request, int count, Random* random, Case* c, Listed* drawn, std::string* problem) {
+  std::vector<EffectRange> ranges;
+  while (static_cast<int>(ranges.size()) < count) {
+    EffectRange range;
+    const std::string& wanted = ranges.empty() ? request.effect : std::string();
+    if (!FindEffect(c->rig, wanted, random, &range)) {
+      *problem = "effect '" + wanted + "' does not exist on rig " + RigName(c->rig);
+      return false;
+    }
+    const auto clashes = [&](const EffectRange& r) { return Clash(c->rig, r.choice, range.choice); };
+    if (std::none_of(ranges.begin(), ranges.end(), clashes)) ranges.push_back(range);
+  }
+  const bool loop = std::any_of(ranges.begin(), ranges.end(), [](const EffectRange& r) { return Drifts(r.choice); });
+  c->logs = DrawCampaign(c->base, loop && c->rig != Rig::kJoint, random);
+  drawn->motion = MotionOf(c->base, c->logs);
+  drawn->visible = true;
+  for (EffectRange& range : ranges) {
+    EffectChoice choice = range.choice;
+    const auto plant_at = [&](double severity) {
+      choice.severity = severity;
+      Plant plant = c->base;
+      AddEffect(choice, drawn->motion, &plant, nullptr);
+      return plant;
+    };
+    if (request.severity > 0) {
+      choice.severity = request.severity;
+    } else {
+      const double target = random->LogUniform(kLowestRatio, kHighestRatio);
+      const Search found = FindSeverity(plant_at, c->base, c->logs, c->sensors, target, range.lowest, range.highest);
+      choice.severity = found.severity;
+      drawn->visible = drawn->visible && found.severity > 0 && found.gap.refit >= kLowestRatio * 0.8;
+    }
+    drawn->choices.push_back(choice);
+  }
+  return true;
 }
 
 bool ParseKind(std::string_view name, Kind* kind) {
@@ -281,6 +268,10 @@ bool MakeCase(const CaseRequest& request, Case* made, std::string* problem) {
       return MakeListed(request, 1, &random, made, problem);
     case Kind::kPair:
       return MakeListed(request, 2, &random, made, problem);
+    case Kind::kTriple:
+      return MakeListed(request, 3, &random, made, problem);
+    case Kind::kRough:
+      return MakeRough(request, &random, made, problem);
     case Kind::kUnknown:
       return MakeUnknown(request, &random, made, problem);
     case Kind::kAmbiguous:

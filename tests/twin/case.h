@@ -14,10 +14,11 @@
 #include "tests/twin/gap.h"
 #include "tests/twin/plant.h"
 #include "tests/twin/recorder.h"
+#include "tests/twin/rough.h"
 
 namespace gapscope::twin {
 
-enum class Kind { kAuto, kNone, kSingle, kPair, kUnknown, kAmbiguous };
+enum class Kind { kAuto, kNone, kSingle, kPair, kTriple, kUnknown, kAmbiguous, kRough };
 const char* KindName(Kind kind);
 bool ParseKind(std::string_view name, Kind* kind);
 
@@ -33,6 +34,17 @@ struct EffectLabel {
   EffectChoice choice;
   Values parameters, extra;
   Gap gap;  // what the logs change when this effect alone is taken away
+  // kRough: whether the effect stands clear of the roughness, and what random torques leave of gap.refit (JudgeClear).
+  bool clear = true;
+  double beside_torques = 0;
+};
+
+// kRough: what was put on one joint.
+struct RoughLabel {
+  Place place = Place::kFirst;
+  double alone = 0, refit = 0;  // floors after refit: on the base model alone, as searched; and in the given logs
+  double rms_n_m = 0;
+  Hold held;  // by the one other law that holds most of it
 };
 
 struct Case {
@@ -53,7 +65,9 @@ struct Case {
     double distance_to_floor = 0;
   };
   std::vector<Member> group;
-  Gap gap;  // all effects together
+  std::vector<RoughLabel> roughness;  // kRough
+  double rough_refit = 0;             // floors after refit, all of it, in the logs that a diagnosis is given
+  Gap gap;                            // all effects together, roughness too
   std::array<double, 2> Floor() const { return {sensors.angle[0].Floor(), sensors.angle[1].Floor()}; }
 };
 
@@ -77,11 +91,31 @@ Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& r
                     const std::vector<LogSpec>& logs, const Sensors& sensors, double target, double lowest,
                     double highest);
 
-// case_outside.cc and case_ambiguous.cc.
+bool TameAll(const Plant& plant, std::vector<LogSpec>* logs, Random* random);
+// With only the position logged a late sensor equals a late command: such a case would be ambiguous.
+void RequireColumns(const std::vector<EffectChoice>& choices, std::vector<LogSpec>* logs);
+
+// Effects drawn for a case's base, each with a severity at which it alone shows.
+struct Listed {
+  std::vector<EffectChoice> choices;
+  Motion motion;
+  bool visible = false;
+  // The case's base with these effects, the one numbered `without` left out.
+  Plant On(const Plant& base, std::size_t without = static_cast<std::size_t>(-1)) const;
+};
+// Draws `count` effects, logs for them and severities. False with a text in `problem` when there are none such.
+bool DrawListed(const CaseRequest& request, int count, Random* random, Case* c, Listed* drawn, std::string* problem);
+constexpr double kLowestRatio = 3, kHighestRatio = 100;  // floors after refit
+
+// case_outside.cc, case_ambiguous.cc, case_rough.cc.
 std::vector<std::string> OutsideNames();
 Values AddOutside(const std::string& name, double severity, std::uint64_t shape_seed, const Motion& motion,
                   Plant* plant);
+// Draws a cause outside the list, logs for it and a severity, and sets `truth`. False when it does not show, with a
+// text in `problem` when it never can.
+bool DrawOutside(const CaseRequest& request, Random* random, Case* c, std::string* problem);
 bool MakeAmbiguous(Random* random, Case* made, std::string* problem);
+bool MakeRough(const CaseRequest& request, Random* random, Case* c, std::string* problem);
 
 }  // namespace gapscope::twin
 

@@ -71,4 +71,33 @@ Values AddOutside(const std::string& name, double severity, std::uint64_t shape_
   return {{"holds_per_s", o.hold_per_s}, {"hold_time_s", o.hold_time_s}};
 }
 
+bool DrawOutside(const CaseRequest& request, Random* random, Case* c, std::string* problem) {
+  const auto names = OutsideNames();
+  if (!request.effect.empty() && std::find(names.begin(), names.end(), request.effect) == names.end()) {
+    *problem = "no effect outside the list is called '" + request.effect + "'";
+    return false;
+  }
+  c->outside = request.effect.empty()
+                   ? names[static_cast<std::size_t>(random->Integer(0, static_cast<int>(names.size()) - 1))]
+                   : request.effect;
+  const auto shape = static_cast<std::uint64_t>(random->Unit() * 0x1.0p53);
+  c->logs = DrawCampaign(c->base, c->outside == "external_torque" && c->rig != Rig::kJoint, random);
+  const Motion motion = MotionOf(c->base, c->logs);
+  const auto plant_at = [&](double severity) {
+    Plant plant = c->base;
+    c->outside_parameters = AddOutside(c->outside, severity, shape, motion, &plant);
+    return plant;
+  };
+  double severity = request.severity;
+  bool shows = true;
+  if (severity <= 0) {
+    const Search found = FindSeverity(plant_at, c->base, c->logs, c->sensors, random->LogUniform(6, 60), 0.02, 10);
+    severity = found.severity;
+    shows = severity > 0 && found.gap.refit >= 4;
+  }
+  c->truth = plant_at(severity);
+  c->outside_severity = severity;
+  return shows;
+}
+
 }  // namespace gapscope::twin

@@ -101,6 +101,70 @@ class Window {
   mutable std::vector<std::array<double, 2>> past_;
 };
 
+// What a retuning of `center` may change in a window: along the directions, by an offset of each signal and by a delay.
+class Retuning {
+ public:
+  Retuning(const Plant& center, const std::vector<Direction>& directions)
+      : center_(center), moved_(directions.size(), center) {
+    for (std::size_t j = 0; j < directions.size(); ++j) {
+      directions[j].move(&moved_[j], directions[j].step);
+      weight_.push_back((directions[j].step / directions[j].spread) * (directions[j].step / directions[j].spread));
+    }
+  }
+  Eigen::Index count() const { return static_cast<Eigen::Index>(moved_.size()) + SignalCount(center_.rig) + 1; }
+  const Commands& commands() const { return commands_; }
+  void Receive(const Record& record) {
+    commands_ = Received(record, center_);
+    moved_commands_.clear();
+    for (const Plant& plant : moved_) moved_commands_.push_back(Received(record, plant));
+  }
+
+  struct Changes {
+    Eigen::MatrixXd global, basis;  // what the window's own initial state explains is out of `global`, and is `basis`
+  };
+  Changes In(const Window& window, const Eigen::VectorXd& y, const Eigen::VectorXd& weight) const {
+    constexpr std::array<std::array<double, 4>, 4> kNudges = {
+        {{1e-3, 0, 0, 0}, {0, 1e-2, 0, 0}, {0, 0, 1e-3, 0}, {0, 0, 0, 1e-2}}};
+    const int signals = window.signals();
+    const auto moves = static_cast<Eigen::Index>(moved_.size());
+    Eigen::MatrixXd global(window.size(), count());
+    for (Eigen::Index j = 0; j < moves; ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      global.col(j) = (window.Predicted(moved_[i], moved_commands_[i], {}) - y).cwiseProduct(weight);
+    }
+    for (int s = 0; s < signals; ++s) global.col(moves + s) = window.Offset(s).cwiseProduct(weight) * kOffsetSpread_rad;
+    global.col(count() - 1) = window.Rate(y).cwiseProduct(weight) * kDelaySpread_s;
+    Eigen::MatrixXd local(window.size(), 2 * signals);
+    for (int k = 0; k < 2 * signals; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      local.col(k) = (window.Predicted(center_, commands_, kNudges[i]) - y).cwiseProduct(weight);
+    }
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(local);
+    Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(local.rows(), local.cols());
+    global -= basis * (basis.transpose() * global);
+    return {std::move(global), std::move(basis)};
+  }
+
+  // Priors: what a diagnosis allows itself too.
+  void AddPriors(Eigen::MatrixXd* normal) const {
+    const auto moves = static_cast<Eigen::Index>(moved_.size());
+    for (Eigen::Index j = 0; j < moves; ++j) (*normal)(j, j) += weight_[static_cast<std::size_t>(j)];
+    for (Eigen::Index j = moves; j < normal->cols(); ++j) (*normal)(j, j) += 1;
+  }
+
+ private:
+  Plant center_;
+  std::vector<Plant> moved_;
+  std::vector<double> weight_;
+  Commands commands_;
+  std::vector<Commands> moved_commands_;
+};
+
+double Root(double rest, double count) {
+  // Rounding may take it below zero; a diverged plant makes it NaN.
+  return std::sqrt((rest < 0 ? 0.0 : rest) / std::max(count, 1.0));
+}
+
 }  // namespace
 
 std::vector<Direction> BaseDirections(Rig rig) {
@@ -118,53 +182,26 @@ bool Gap::Finite() const { return std::isfinite(raw) && std::isfinite(refit); }
 
 Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std::array<double, 2>& floor_rad,
                const std::vector<Direction>& directions, bool refit, const GapOptions& options) {
-  const int signals = SignalCount(other.rig);
-  const auto moves = static_cast<Eigen::Index>(directions.size());
-  const Eigen::Index columns = refit ? moves + signals + 1 : 0;
-  std::vector<Plant> moved(directions.size(), other);
-  for (std::size_t j = 0; j < directions.size(); ++j) directions[j].move(&moved[j], directions[j].step);
-  const std::array<std::array<double, 4>, 4> nudges = {
-      {{1e-3, 0, 0, 0}, {0, 1e-2, 0, 0}, {0, 0, 1e-3, 0}, {0, 0, 0, 1e-2}}};
-
+  Retuning retuning(other, refit ? directions : std::vector<Direction>());
+  const Eigen::Index columns = retuning.count();
   double raw = 0, left = 0, count = 0;
   std::vector<double> logs;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
   for (const Record& record : records) {
     const double raw_before = raw, count_before = count;
-    const Commands commands = Received(record, other);
-    std::vector<Commands> moved_commands;
-    if (refit) {
-      for (const Plant& plant : moved) moved_commands.push_back(Received(record, plant));
-    }
+    retuning.Receive(record);
     for (std::size_t w = 0; w < record.snapshots.size(); ++w) {
       const Window window(record, w, other, options);
-      if (window.size() < 8 * signals) continue;
+      if (window.size() < 8 * window.signals()) continue;
       const Eigen::VectorXd weight = window.Weights(other, floor_rad);
-      const Eigen::VectorXd y = window.Predicted(other, commands, {});
+      const Eigen::VectorXd y = window.Predicted(other, retuning.commands(), {});
       Eigen::VectorXd change = (window.Logged() - y).cwiseProduct(weight);
       raw += change.squaredNorm();
       count += static_cast<double>((weight.array() > 0).count());
       if (!refit) continue;
-
-      Eigen::MatrixXd global(window.size(), columns);
-      for (Eigen::Index j = 0; j < moves; ++j) {
-        const auto i = static_cast<std::size_t>(j);
-        global.col(j) = (window.Predicted(moved[i], moved_commands[i], {}) - y).cwiseProduct(weight);
-      }
-      for (int s = 0; s < signals; ++s)
-        global.col(moves + s) = window.Offset(s).cwiseProduct(weight) * kOffsetSpread_rad;
-      global.col(columns - 1) = window.Rate(y).cwiseProduct(weight) * kDelaySpread_s;
-      // Take out what the window's own initial state explains.
-      Eigen::MatrixXd local(window.size(), 2 * signals);
-      for (int k = 0; k < 2 * signals; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        local.col(k) = (window.Predicted(other, commands, nudges[i]) - y).cwiseProduct(weight);
-      }
-      const Eigen::HouseholderQR<Eigen::MatrixXd> qr(local);
-      const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(local.rows(), local.cols());
+      const auto [global, basis] = retuning.In(window, y, weight);
       change -= basis * (basis.transpose() * change);
-      global -= basis * (basis.transpose() * global);
       left += change.squaredNorm();
       normal += global.transpose() * global;
       right += global.transpose() * change;
@@ -175,17 +212,56 @@ Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std
   gap.logs = std::move(logs);
   gap.raw = std::sqrt(raw / std::max(count, 1.0));
   if (!refit) return gap;
-  // Priors: what a diagnosis allows itself too.
-  for (Eigen::Index j = 0; j < moves; ++j) {
-    const Direction& d = directions[static_cast<std::size_t>(j)];
-    normal(j, j) += (d.step / d.spread) * (d.step / d.spread);
-  }
-  for (Eigen::Index j = moves; j < columns; ++j) normal(j, j) += 1;
+  retuning.AddPriors(&normal);
   const Eigen::VectorXd best = normal.ldlt().solve(right);
-  const double rest = left - right.dot(best);  // rounding may take it below zero; a diverged plant makes it NaN
-  gap.refit = std::sqrt((rest < 0 ? 0.0 : rest) / std::max(count, 1.0));
-  for (Eigen::Index j = 0; j < moves; ++j) gap.moves.push_back(best[j]);
+  gap.refit = Root(left - right.dot(best), count);
+  for (std::size_t j = 0; j < directions.size(); ++j) gap.moves.push_back(best[static_cast<Eigen::Index>(j)]);
   return gap;
+}
+
+std::vector<Trace> MeasureTraces(const std::vector<Record>& records, const Plant& plant,
+                                 const std::vector<Plant>& others, const std::array<double, 2>& floor_rad,
+                                 const std::vector<Direction>& directions, const std::vector<Direction>& beside,
+                                 const GapOptions& options) {
+  std::vector<Direction> all = beside;  // first, so that the rest can stand alone
+  all.insert(all.end(), directions.begin(), directions.end());
+  Retuning retuning(plant, all);
+  const Eigen::Index columns = retuning.count(), alone = columns - static_cast<Eigen::Index>(beside.size());
+  const auto traces = static_cast<Eigen::Index>(others.size()) + 1;
+  double count = 0;
+  Eigen::VectorXd left = Eigen::VectorXd::Zero(traces);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns), right = Eigen::MatrixXd::Zero(columns, traces);
+  for (const Record& record : records) {
+    retuning.Receive(record);
+    for (std::size_t w = 0; w < record.snapshots.size(); ++w) {
+      const Window window(record, w, plant, options);
+      if (window.size() < 8 * window.signals()) continue;
+      const Eigen::VectorXd weight = window.Weights(plant, floor_rad);
+      const Eigen::VectorXd y = window.Predicted(plant, retuning.commands(), {});
+      Eigen::MatrixXd change(window.size(), traces);
+      change.col(traces - 1) = (window.Logged() - y).cwiseProduct(weight);
+      for (Eigen::Index i = 0; i + 1 < traces; ++i) {
+        const Plant& other = others[static_cast<std::size_t>(i)];
+        change.col(i) = (y - window.Predicted(other, Received(record, other), {})).cwiseProduct(weight);
+      }
+      count += static_cast<double>((weight.array() > 0).count());
+      const auto [global, basis] = retuning.In(window, y, weight);
+      change -= basis * (basis.transpose() * change);
+      left += change.colwise().squaredNorm().transpose();
+      normal += global.transpose() * global;
+      right += global.transpose() * change;
+    }
+  }
+  retuning.AddPriors(&normal);
+  const Eigen::MatrixXd right_alone = right.bottomRows(alone);
+  const Eigen::MatrixXd best = normal.ldlt().solve(right);
+  const Eigen::MatrixXd best_alone = normal.bottomRightCorner(alone, alone).ldlt().solve(right_alone);
+  std::vector<Trace> list;
+  for (Eigen::Index i = 0; i < traces; ++i) {
+    list.push_back({Root(left[i] - right_alone.col(i).dot(best_alone.col(i)), count),
+                    Root(left[i] - right.col(i).dot(best.col(i)), count)});
+  }
+  return list;
 }
 
 Gap FitRival(const std::vector<Record>& records, const std::array<double, 2>& floor_rad,

@@ -40,6 +40,17 @@ struct Gap {
 Gap MeasureGap(const std::vector<Record>& records, const Plant& other, const std::array<double, 2>& floor_rad,
                const std::vector<Direction>& directions, bool refit, const GapOptions& options);
 
+// How far each of the others, and last the records themselves, are from `plant` in windows that start at the true
+// motion: less what a retuning along the directions takes up, and less what the directions `beside` take up too. Linear
+// about `plant`.
+struct Trace {
+  double refit = 0, beside = 0;
+};
+std::vector<Trace> MeasureTraces(const std::vector<Record>& records, const Plant& plant,
+                                 const std::vector<Plant>& others, const std::array<double, 2>& floor_rad,
+                                 const std::vector<Direction>& directions, const std::vector<Direction>& beside,
+                                 const GapOptions& options);
+
 // Moves `rival` along the directions until its gap is least (damped Gauss-Newton); returns that gap.
 Gap FitRival(const std::vector<Record>& records, const std::array<double, 2>& floor_rad,
              const std::vector<Direction>& directions, int iterations, const GapOptions& options, Plant* rival);

@@ -83,7 +83,7 @@ int Run(const Options& o) {
   std::string problem;
   CaseRequest request = o.request;
   if (!ParseKind(o.kind, &request.kind))
-    return Fail("--kind " + o.kind + ": none, single, pair, unknown, ambiguous or auto");
+    return Fail("--kind " + o.kind + ": none, single, pair, triple, unknown, ambiguous, rough or auto");
   const bool manual = o.nominal || !o.set.empty() || !o.shapes.empty();
   if (!(manual ? MakeManual(o, &c, &problem) : MakeCase(request, &c, &problem))) return Fail(problem);
   const std::vector<Record> records = MakeRecords(c, o.noise);
@@ -108,7 +108,8 @@ int main(int argc, char** argv) {
   app.add_option("--index", o.request.index, "Number of the case")->capture_default_str();
   app.add_option("--out", o.out, "Folder for log_N.csv")->required();
   app.add_option("--label", o.label, "File for the label (JSON); none without it");
-  app.add_option("--kind", o.kind, "none, single, pair, unknown, ambiguous, auto")->capture_default_str();
+  app.add_option("--kind", o.kind, "none, single, pair, triple, unknown, ambiguous, rough, auto")
+      ->capture_default_str();
   app.add_option("--rig", o.request.rig, "joint, qube, flexjoint, flexlink; drawn without it");
   app.add_option("--effect", o.request.effect, "NAME or NAME@ON");
   app.add_option("--severity", o.request.severity, "Instead of searching one by effect-to-floor ratio");

@@ -34,9 +34,51 @@ std::vector<std::string> ExpectedVerdicts(const Case& c) {
       return {"unknown"};
     case Kind::kAmbiguous:
       return {"ambiguous"};
+    case Kind::kRough:  // nothing to name: much is missing, or (where the roughness is weak) nothing is
+      if (!c.effects.empty()) return {"effects"};
+      if (!c.outside.empty()) return {"unknown"};
+      return {"unknown", "none", "parameters"};
     default:
       return {"effects"};
   }
+}
+
+Json RoughTermJson(const RoughTerm& t) {
+  Json json = {{"amplitude", t.amplitude}, {"angle", t.angle}, {"speed", t.speed}, {"phase_rad", t.phase_rad}};
+  if (t.drift_hz > 0) {
+    json.update({{"drift_hz", t.drift_hz},
+                 {"swing", t.swing},
+                 {"swing_phase_rad", t.swing_phase_rad},
+                 {"wander_rad", t.wander_rad},
+                 {"wander_phase_rad", t.wander_phase_rad}});
+  }
+  return json;
+}
+
+Json RoughJson(const Case& c) {
+  Json list = Json::array();
+  for (const RoughLabel& label : c.roughness) {
+    const Rough& rough = c.truth.rough[label.place == Place::kSecond ? 1 : 0];
+    Json terms = Json::array();
+    for (const RoughTerm& t : rough.terms) terms.push_back(RoughTermJson(t));
+    list.push_back({{"on", PlaceName(c.rig, label.place)},
+                    {"of", RoughKindName(KindOf(rough))},
+                    {"hysteretic", rough.memory_rad > 0},
+                    {"drifting", rough.terms.at(0).drift_hz > 0},
+                    {"rms_n_m", label.rms_n_m},
+                    {"alone_to_floor_refit", label.alone},
+                    {"to_floor_refit", label.refit},
+                    {"most_held", label.held.share},
+                    {"most_held_by", label.held.law},
+                    {"scale_n_m", rough.scale_n_m},
+                    {"middle_rad", rough.middle_rad},
+                    {"deviation_rad", rough.angle_rad},
+                    {"deviation_rad_per_s", rough.speed_rad_per_s},
+                    {"memory_rad", rough.memory_rad},
+                    {"terms", terms},
+                    {"laws_taken_out", rough.laws}});
+  }
+  return list;
 }
 
 }  // namespace
@@ -76,6 +118,15 @@ std::string LabelText(const Case& c, const std::vector<std::string>& files) {
                                {"effect_to_floor", e.gap.raw},
                                {"effect_to_floor_refit", e.gap.refit},
                                {"effect_to_floor_logs", e.gap.logs}});
+    if (c.kind == Kind::kRough) {
+      json["effects"].back().update({{"stands_clear", e.clear},
+
+                                     {"beside_torques_to_floor", e.beside_torques}});
+    }
+  }
+  if (c.kind == Kind::kRough) {
+    json["roughness"] = RoughJson(c);
+    json["roughness_to_floor_refit"] = c.rough_refit;
   }
   json["ambiguous"] = Json::array();
   if (!c.group.empty()) {

@@ -109,6 +109,24 @@ struct Outside {
   double hold_per_s = 0, hold_time_s = 0.05;     // the drive keeps an old command now and then
 };
 
+// One wave of a rough torque, x and v angle and speed over their deviations:
+// amplitude (1 + swing sin(W t + swing_phase)) sin(angle x + speed v + phase + wander sin(W t + wander_phase)).
+struct RoughTerm {
+  double amplitude = 0, angle = 0, speed = 0, phase_rad = 0;
+  double drift_hz = 0, swing = 0, swing_phase_rad = 0, wander_rad = 0, wander_phase_rad = 0;
+};
+
+// A smooth torque of one joint's angle and speed that no catalogue holds (rough.h): scale (waves - laws).
+struct Rough {
+  static constexpr int kLaws = 7;
+  double scale_n_m = 0;
+  double middle_rad = 0, angle_rad = 1, speed_rad_per_s = 1;  // mean and deviations of the joint's own motion
+  double memory_rad = 0;  // the waves see the angle through a play this wide: their value remembers the direction
+  std::vector<RoughTerm> terms;
+  std::array<double, kLaws> laws{};  // what the catalogue's laws hold of the waves, taken out of them
+  bool Any() const { return scale_n_m != 0; }
+};
+
 struct Plant {
   Rig rig = Rig::kJoint;
   Base base;
@@ -117,6 +135,7 @@ struct Plant {
   Load load;
   std::array<double, 2> sensor_delay_s = {0, 0};
   Outside outside;
+  std::array<Rough, 2> rough;  // first, second joint
 };
 
 inline Plant NominalPlant(Rig rig) {

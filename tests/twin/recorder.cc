@@ -138,6 +138,7 @@ Record MakeRecord(const Plant& plant, const LogSpec& log, const Sensors& sensors
   record.names = ColumnNames(plant.rig, log);
   Simulator simulator(plant, step);
   simulator.Place(log.start[0], log.start[1], log.start[2], log.start[3]);
+  simulator.SetSession(log.session_s);
   const bool late = plant.sensor_delay_s[0] > 0 || plant.sensor_delay_s[1] > 0;
   Past past(step, late);
   past.Push(simulator);
@@ -203,6 +204,7 @@ Record MakeRecord(const Plant& plant, const LogSpec& log, const Sensors& sensors
       record.jitter.push_back(jitter);
       record.angle_rad.push_back(shown);
       record.drive.push_back(drive);
+      record.motion.push_back({simulator.q1(), simulator.w1(), simulator.q2(), simulator.w2()});
       std::vector<double> row = {stamp, u, read[0]};
       if (signals > 1) row.push_back(read[1]);
       if (plant.rig == Rig::kJoint) {

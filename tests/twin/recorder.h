@@ -47,6 +47,7 @@ struct LogSpec {
   double rate_hz = 500;
   std::array<double, 4> start = {0, 0, 0, 0};  // q1, w1, q2, w2
   double dropped_share = 0;
+  double session_s = 0;    // when the log began: what drifts goes on from log to log
   std::uint64_t seed = 0;  // noise, jitter, dropped rows
   bool speed_column = false, torque_column = false, feedforward_column = false, current_column = false;
 };
@@ -60,6 +61,7 @@ struct Record {
   // The angles at each logged row, sensor effects included, noise and offset not.
   std::vector<std::array<double, 2>> angle_rad;
   std::vector<DriveOutput> drive;
+  std::vector<std::array<double, 4>> motion;  // q1, w1, q2, w2 of the plant itself
   // The plant at the beginning of every window, when asked for, its clock at the row's stamp.
   std::vector<Simulator> snapshots;
   std::vector<std::size_t> snapshot_rows;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "tests/twin/rough.h"
+
 namespace gapscope::twin {
 namespace {
 
@@ -69,6 +71,7 @@ void Simulator::Place(double q1_rad, double w1_rad_per_s, double q2_rad, double 
   x_[kW2] = w2_rad_per_s;
   x_[kQr] = q1_rad + (plant_.rig == Rig::kFlexJoint || plant_.rig == Rig::kFlexLink ? q2_rad : 0);
   start_ = x_;
+  rough_angle_ = {q1_rad, q2_rad};
 }
 
 void Simulator::Nudge(double q1_rad, double w1_rad_per_s, double q2_rad, double w2_rad_per_s) {
@@ -198,7 +201,16 @@ double Simulator::LoadTorque(const State& x, double time_s) const {
                                   load.cogging_second * std::sin(2 * phase + load.cogging_second_phase_rad));
   }
   if (o.torque_n_m != 0) torque += o.torque_n_m * std::sin(kTurn * o.torque_hz * time_s + o.torque_phase_rad);
+  if (plant_.rough[0].Any()) torque += RoughTorque(0, x, time_s);
   return torque;
+}
+
+double Simulator::RoughTorque(int joint, const State& x, double time_s) const {
+  const auto j = static_cast<std::size_t>(joint);
+  const Rough& rough = plant_.rough[j];
+  const double angle = x[joint == 0 ? kQ1 : kQ2], speed = x[joint == 0 ? kW1 : kW2];
+  const double seen = Remembered(rough, rough_angle_[j], angle);
+  return rough.scale_n_m * (Waves(rough, seen, speed, session_s_ + time_s) - Held(rough, angle, speed));
 }
 
 Simulator::State Simulator::Derivative(const State& x, const Inputs& in) const {
@@ -247,6 +259,7 @@ Simulator::State Simulator::Derivative(const State& x, const Inputs& in) const {
   const double inertia2 = plant_.rig == Rig::kQube ? Second(b) : b.link_inertia_kg_m2;
   double second = -b.second_damping_n_m_s_per_rad * x[kW2] - Drag(plant_.dry[1], x[kW2]) -
                   bristles_[1].Torque(plant_.dry[1], x[kQ2] - start_[kQ2], x[kW2], 0, inertia2);
+  if (plant_.rough[1].Any()) second += RoughTorque(1, x, in.time_s);
   double m11, m12;
   const double m22 = inertia2;
   if (plant_.rig == Rig::kQube) {
@@ -309,6 +322,10 @@ void Simulator::Step(const Commands& commands) {
   bristles_[0].Commit(plant_.dry[0], x_[q] - start_[q], x_[w], output_.torque_n_m);
   bristles_[1].Commit(plant_.dry[1], x_[kQ2] - start_[kQ2], x_[kW2], 0);
   if (plant_.load.cable_stiffness > 0) cable_.Commit(plant_.load, x_[kQ1] - start_[kQ1]);
+  for (std::size_t j = 0; j < 2; ++j) {
+    const double angle = x_[j == 0 ? kQ1 : kQ2];
+    rough_angle_[j] = Remembered(plant_.rough[j], rough_angle_[j], angle);
+  }
   start_ = x_;
   ++steps_;
   if (!split) {

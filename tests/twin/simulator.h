@@ -7,9 +7,10 @@
 //   qube      (I + m L^2 + J sin^2 q2) w1' + m L l cos q2 w2' + J sin 2q2 w1 w2 - m L l sin q2 w2^2 = T
 //             m L l cos q2 w1' + J w2' - J sin q2 cos q2 w1^2 + m g l sin q2 = S
 //   flexible  (I + I_L) w1' + I_L w2' = T,   I_L (w1' + w2') + K sinh(b q2) / b = S
-// T: drive torque, viscous and dry friction, drag, cable, gravity, bias, cogging; S: viscous and dry friction, drag.
-// Split (backlash, compliance): share s of I on the motor side with drive, viscous, dry friction and drag, the rest on
-// the load side with the others, and between them a spring and damper outside the gap (one-sided, never pulling).
+// T: drive torque, viscous and dry friction, drag, cable, gravity, bias, cogging, roughness; S: viscous and dry
+// friction, drag, roughness (rough.h; of both joints on the load side). Split (backlash, compliance): share s of I on
+// the motor side with drive, viscous, dry friction and drag, the rest on the load side with the others, and between
+// them a spring and damper outside the gap (one-sided, never pulling).
 #ifndef GAPSCOPE_TESTS_TWIN_SIMULATOR_H_
 #define GAPSCOPE_TESTS_TWIN_SIMULATOR_H_
 
@@ -60,6 +61,8 @@ class Simulator {
   double time_s() const { return clock_offset_s_ + static_cast<double>(steps_) * step_s_; }
   // From here on the clock shows another time (a log's stamps may be wrong).
   void SetTime(double time_s) { clock_offset_s_ = time_s - static_cast<double>(steps_) * step_s_; }
+  // Seconds from the session's begin to the log's: only what drifts from log to log sees them.
+  void SetSession(double begin_s) { session_s_ = begin_s; }
   double step_s() const { return step_s_; }
   double q1() const { return x_[kQ1]; }
   double w1() const { return x_[kW1]; }
@@ -79,16 +82,18 @@ class Simulator {
   double DelayedDemand(double at_s, double newest) const;
   double Transmission(const State& x) const;
   double LoadTorque(const State& x, double time_s) const;
+  double RoughTorque(int joint, const State& x, double time_s) const;
   Inputs At(const Commands& commands, double time_s, std::size_t* cursor) const;
 
   Plant plant_;
   double step_s_;
-  double clock_offset_s_ = 0;
+  double clock_offset_s_ = 0, session_s_ = 0;
   long steps_ = 0;
   State x_{};
   State start_{};  // at the beginning of the step: distances count from here
   std::array<Bristles, 2> bristles_;
   CableHysteresis cable_;
+  std::array<double, 2> rough_angle_{};  // what a rough torque with a memory sees
   DriveOutput output_;
   std::size_t cursor_ = 0;
   std::vector<double> demands_;  // joint: demand at the beginning of each past step, a ring

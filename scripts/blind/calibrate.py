@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
-"""What a verdict's probability should be, from banks of twin cases: logistic fits of "right" on the verdict's evidence,
-one for each kind of verdict.
+"""What a probability should be, from banks of twin cases: logistic fits of "right" on the evidence.
 
     scripts/blind/calibrate.py out/blind/902 [out/blind/...]
+    scripts/blind/calibrate.py --features lg,gp,p,smooth out/blind/rough_301 [...]
 
-Prints the constants of `Confidence` in src/diagnose/verdict.cc. Judge them on banks of other seeds. Plain Newton steps
-with a Gaussian prior of deviation 2 on each weight: banks are small."""
-import json, math, sys
+Without --features: of verdicts, one fit for each kind; prints the constants of `Confidence` in
+src/diagnose/verdict.cc. With: of statements, on the named members of each one's `numbers` (missing: 0; NAME:LOW:HIGH
+clips); prints weights, the AUC of every number alone, and the calibration error where each rig is judged by weights
+from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation 2 on each
+weight: banks are small."""
+import argparse, json, math, sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import score  # noqa: E402
+import statements  # noqa: E402
 
 PRIOR = 2.0
 
@@ -49,7 +53,7 @@ def logistic(x, y):
     y = [(t * (len(y) + 1) + 0.5) / (len(y) + 2) if len(y) else t for t in y]
     w = [0.0] * n
     for _ in range(50):
-        p = [1 / (1 + math.exp(-sum(a * b for a, b in zip(w, row)))) for row in x]
+        p = [probability(w, row[1:]) for row in x]
         gradient = [sum((p[i] - y[i]) * x[i][j] for i in range(len(x))) + w[j] / PRIOR**2 for j in range(n)]
         hessian = [[sum(p[i] * (1 - p[i]) * x[i][j] * x[i][k] for i in range(len(x))) + (j == k) / PRIOR**2
                     for k in range(n)] for j in range(n)]
@@ -57,10 +61,82 @@ def logistic(x, y):
     return w
 
 
+def probability(weights, row):
+    x = weights[0] + sum(w * v for w, v in zip(weights[1:], row))
+    return 1 / (1 + math.exp(-max(min(x, 500.0), -500.0)))
+
+
+def auc(values, truth):
+    """Probability that a true one's value is above a false one's; below 0.5 where less speaks for it."""
+    ranks, ordered = {}, sorted(values)
+    for i, v in enumerate(ordered):
+        ranks.setdefault(v, []).append(i + 1)
+    n = sum(truth)
+    if n in (0, len(truth)):
+        return math.nan
+    above = sum(sum(ranks[v]) / len(ranks[v]) for v, t in zip(values, truth) if t) - n * (n + 1) / 2
+    return above / (n * (len(truth) - n))
+
+
+def candidates(cases):
+    """(rig, numbers, truth) of all that is told present or absent; what is told together once."""
+    for case in cases:
+        for finding in statements.findings(case):
+            best = max(finding.statements, key=lambda s: s["probability"] or 0)
+            yield case.rig, best.get("numbers") or {}, float(finding.true)
+        for s in statements.told(case.verdict):
+            if s["answer"] == "absent":
+                yield case.rig, s.get("numbers") or {}, float((s["name"], s["on"]) in case.truth)
+
+
+def read(features, numbers):
+    row = []
+    for feature in features:
+        name, *limits = feature.split(":")
+        value = numbers.get(name)
+        value = 0.0 if value is None or not math.isfinite(value) else float(value)
+        row.append(min(max(value, float(limits[0])), float(limits[1])) if limits else value)
+    return row
+
+
+def of_statements(cases, features):
+    told = [(rig, numbers, truth) for rig, numbers, truth in candidates(cases) if numbers]
+    if not told:
+        sys.exit("calibrate.py: no statement with `numbers` in these banks")
+    rigs, truth = [rig for rig, _, _ in told], [t for _, _, t in told]
+    print(f"{len(told)} statements of {len(cases)} cases, {sum(truth):.0f} true")
+    for name in sorted({n for _, numbers, _ in told for n in numbers}):
+        print(f"  AUC {auc([read([name], numbers)[0] for _, numbers, _ in told], truth):.3f}  {name}")
+    rows = [read(features, numbers) for _, numbers, _ in told]
+    weights = logistic(rows, truth)
+    print(f"x = {weights[0]:.3f} " + " ".join(f"{w:+.3f} {n}" for w, n in zip(weights[1:], features)))
+    stated = [probability(weights, row) for row in rows]
+    apart = [0.0] * len(rows)
+    for rig in set(rigs):
+        others = [i for i, r in enumerate(rigs) if r != rig]
+        if others:
+            w = logistic([rows[i] for i in others], [truth[i] for i in others])
+            for i in (i for i, r in enumerate(rigs) if r == rig):
+                apart[i] = probability(w, rows[i])
+    for name, given in (("same statements", stated), ("each rig by the others", apart)):
+        error, bins = statements.calibration(list(zip(given, truth)))
+        sure = [t for p, t in zip(given, truth) if p >= statements.SURE]
+        print(f"{name}: AUC {auc(given, truth):.3f}, calibration error {error:.3f}, P >= 0.5 true "
+              f"{sum(sure):.0f}/{len(sure)}, found {sum(sure):.0f}/{sum(truth):.0f}; "
+              + ", ".join(f"{b['stated']:.2f}:{b['right']:.2f}" for b in bins))
+
+
 def main():
-    cases = [c for folder in sys.argv[1:] for c in score.load(Path(folder), range(10000)) if c.strong]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("banks", nargs="+", type=Path)
+    parser.add_argument("--features", help="comma-separated members of a statement's `numbers`")
+    options = parser.parse_args()
+    cases = [c for folder in options.banks for c in score.load(folder, range(10000))]
+    if options.features is not None:
+        return of_statements([c for c in cases if c.kind != "ambiguous"], options.features.split(","))
+    cases = [c for c in cases if c.strong]
     if not cases:
-        sys.exit(__doc__)
+        parser.error("no verdict of a strong case in these banks")
     for name in ("none", "effects", "ambiguous", "unknown"):
         part = [c for c in cases if kind(c.verdict) == name]
         if part:

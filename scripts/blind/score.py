@@ -20,6 +20,11 @@ def load(folder, indices):
     return cases
 
 
+def below_a_sample(label, effect):
+    return (effect["name"] == "command_delay"
+            and effect["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"]))
+
+
 class Case:
     def __init__(self, index, label, verdict):
         self.index, self.label, self.verdict = index, label, verdict
@@ -31,10 +36,8 @@ class Case:
                 for e in label["effects"]]
         self.strength = min(seen, default=label["effect_to_floor_refit"])
         # A delay below one sample is a nuisance of every model, by the contract: no severity makes it a finding.
-        below_a_sample = any(e["name"] == "command_delay"
-                             and e["parameters"]["delay_s"] < 1 / min(l["rate_hz"] for l in label["logs"])
-                             for e in label["effects"])
-        self.strong = self.kind in ("none", "ambiguous") or (self.strength >= STRONG and not below_a_sample)
+        below = any(below_a_sample(label, e) for e in label["effects"])
+        self.strong = self.kind in ("none", "ambiguous") or (self.strength >= STRONG and not below)
         self.named = [(e["name"], e["on"]) for e in verdict["effects"]]
         self.answer, self.probability = verdict["verdict"], verdict["probability"]
         self.groups = [set(g) for g in verdict["ambiguous"]]
@@ -87,6 +90,23 @@ def median_interval(values):
     return values[max(0, int(n / 2 - half))], values[min(n - 1, int(n / 2 + half))]
 
 
+class Board:
+    """Rows of a table: shares with Wilson intervals, medians with theirs."""
+
+    def __init__(self):
+        self.rows = []
+
+    def share(self, name, target, better, hits, n):
+        low, high = wilson(hits, n)
+        self.rows.append({"name": name, "target": target, "better": better, "value": hits / n if n else math.nan,
+                          "low": low, "high": high, "hits": hits, "cases": n})
+
+    def number(self, name, target, better, values):
+        low, high = median_interval(values)
+        self.rows.append({"name": name, "target": target, "better": better, "value": median(values), "low": low,
+                          "high": high, "cases": len(values)})
+
+
 def parameter_errors(case):
     """Relative errors of the found effect's parameters; angles of rest, whose zero a sensor's offset moves, and counts
     of periods are left out."""
@@ -117,18 +137,8 @@ def figures(cases, seed):
     ambiguous = [c for c in cases if c.kind == "ambiguous"]
     judged = none + single + pair + outside + ambiguous
     found = [c for c in single if c.first_right()]
-    rows = []
-
-    def share(name, target, better, hits, n):
-        low, high = wilson(hits, n)
-        rows.append({"name": name, "target": target, "better": better, "value": hits / n if n else math.nan, "low": low,
-                     "high": high, "hits": hits, "cases": n})
-
-    def number(name, target, better, values):
-        low, high = median_interval(values)
-        rows.append({"name": name, "target": target, "better": better, "value": median(values), "low": low,
-                     "high": high, "cases": len(values)})
-
+    board = Board()
+    rows, share, number = board.rows, board.share, board.number
     share("effect named where there is none", 0.02, "lower", sum(bool(c.named) for c in none), len(none))
     gaps = single + pair
     share("gap detected", 0.97, "higher", sum(c.answer in ("effects", "ambiguous", "unknown") for c in gaps), len(gaps))

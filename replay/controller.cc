@@ -306,8 +306,7 @@ double Controller::Sum(std::vector<Term>& terms, double period_s) {
   return sum;
 }
 
-double Controller::Swing(double angle, double period_s) {
-  const SwingUp& swing = *spec_.swing_up;
+double Controller::Swing(const SwingUp& swing, double angle, double period_s) {
   const double turned = first_ ? 0 : std::remainder(angle - swing_angle_, 2 * std::numbers::pi);
   swing_speed_ = FilteredDerivative(swing_speed_, turned, swing.filter_rad_per_s, period_s);
   swing_angle_ = angle;
@@ -336,7 +335,7 @@ double Controller::Step(std::size_t row, std::span<const double> readings) {
     errors_[i] = references_now_[i] - inputs_now_[i];
   }
   double pumped = 0;
-  if (spec_.swing_up) pumped = Swing(inputs_now_[swing_input_], period);
+  if (spec_.swing_up) pumped = Swing(*spec_.swing_up, inputs_now_[swing_input_], period);
   asked_ = errors_;
   // The observer hears what was really sent, saturation included. All laws run on, so that their filters are where the
   // motion is when they take over.

@@ -95,7 +95,7 @@ class Controller {
   double Evaluate(Term& term, double error, double period_s) const;
   // Outer loops first: what they ask for moves the inner references.
   double Sum(std::vector<Term>& terms, double period_s);
-  double Swing(double angle, double period_s);
+  double Swing(const SwingUp& swing, double angle, double period_s);
 
   ControllerSpec spec_;
   const Recording* recording_ = nullptr;

@@ -333,7 +333,7 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
     for (std::size_t c = 0; c < earlier_.size(); ++c)
       d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
     mj_forward(m, d);
-    const double norm = mju_norm(d->qacc, m->nv);
+    const double norm = mju_norm(d->qacc, static_cast<int>(m->nv));
     mj_resetData(m, d);
     return norm;
   };

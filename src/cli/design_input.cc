@@ -30,7 +30,7 @@ Error PassesLimits(const Rehearsal& rehearsal, const std::string& where, const s
 }
 
 Result<int> RunInput(const InputFlags& flags) {
-  GS_ASSIGN(const Rig rig, LoadRig(flags.rig));
+  GS_ASSIGN(const DesignRig rig, LoadRig(flags.rig));
   Waveform wave{.shape = flags.shape,
                 .duration_s = flags.rig.duration_s,
                 .low_hz = flags.low_hz,

@@ -15,7 +15,7 @@ struct OptimalFlags {
 };
 
 // The rig's own size, from a sweep as large as its limits allow.
-Result<ScaleTable> ScalesOf(const Rig& rig, double duration_s) {
+Result<ScaleTable> ScalesOf(const DesignRig& rig, double duration_s) {
   GS_ASSIGN(const auto wave, SampleWaveform({.shape = WaveShape::kChirp,
                                              .duration_s = duration_s,
                                              .low_hz = 0.1,
@@ -32,8 +32,8 @@ Result<ScaleTable> ScalesOf(const Rig& rig, double duration_s) {
 }
 
 // A rival: the base model and one effect, at --set's values or else at a typical size.
-Result<Hypothesis> MakeRival(const Rig& rig, const EffectUse& use, const ScaleTable& scales, const RigFlags& flags,
-                             std::vector<std::string>* assumed) {
+Result<Hypothesis> MakeRival(const DesignRig& rig, const EffectUse& use, const ScaleTable& scales,
+                             const RigFlags& flags, std::vector<std::string>* assumed) {
   GS_ASSIGN(const auto model, Model::Build(rig.model->rig(), {use}, scales));
   std::vector<double> values = model->Nominal();
   std::copy(rig.values.begin(), rig.values.end(), values.begin());
@@ -75,7 +75,7 @@ std::string ReproducingCommand(const OptimalFlags& flags, const InputScore& best
 }
 
 // The input that tells --separate's effects apart.
-Result<OptimalDesign> DesignToSeparate(const OptimalFlags& flags, const Rig& rig, const Hypothesis& base,
+Result<OptimalDesign> DesignToSeparate(const OptimalFlags& flags, const DesignRig& rig, const Hypothesis& base,
                                        const OptimalOptions& options, ThreadPool& pool) {
   GS_ASSIGN(const ScaleTable scales, ScalesOf(rig, flags.rig.duration_s));
   std::vector<Hypothesis> rivals;
@@ -108,7 +108,7 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
     return Error{.what = "one effect has nothing to be told apart from",
                  .where = "--separate",
                  .cure = "add a second --separate EFFECT@ON, or --separate none"};
-  GS_ASSIGN(const Rig rig, LoadRig(flags.rig));
+  GS_ASSIGN(const DesignRig rig, LoadRig(flags.rig));
   ThreadPool pool(flags.rig.common.jobs > 0 ? flags.rig.common.jobs : DefaultWorkers());
   const OptimalOptions options{.rehearsal = rig.rehearsal,
                                .duration_s = flags.rig.duration_s,

@@ -47,8 +47,8 @@ std::vector<Option> OptionsOf(RigFlags& flags) {
                CommonOptions(flags.common)});
 }
 
-Result<Rig> LoadRig(const RigFlags& flags) {
-  Rig rig;
+Result<DesignRig> LoadRig(const RigFlags& flags) {
+  DesignRig rig;
   GS_ASSIGN(const Experiment experiment, LoadExperiment(flags.experiment));
   rig.experiment = WithLimitSignals(experiment);
   GS_ASSIGN(rig.model, Model::Load(rig.experiment));

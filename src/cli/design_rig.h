@@ -20,7 +20,7 @@ struct RigFlags {
 
 std::vector<Option> OptionsOf(RigFlags& flags);
 
-struct Rig {
+struct DesignRig {
   Experiment experiment;  // with limit signals
   std::shared_ptr<const Model> model;
   std::vector<double> values;
@@ -30,7 +30,7 @@ struct Rig {
 };
 
 // Assignments of parameters that effects will add are left for later. Errors: the files; a name that does not exist.
-Result<Rig> LoadRig(const RigFlags& flags);
+Result<DesignRig> LoadRig(const RigFlags& flags);
 
 // Writes `csv` to --out, if it was given, and says so on stderr unless quiet.
 Status WriteInput(const std::string& out, const std::string& csv, bool quiet);

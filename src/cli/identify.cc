@@ -5,6 +5,7 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/session.h"
+#include "src/core/collect.h"
 #include "src/report/identify_report.h"
 #include "src/report/write_run.h"
 
@@ -25,8 +26,7 @@ struct IdentifyFlags {
 // One CSV per table of points beside the result.
 Status WriteIdentification(const std::string& out, const Identification& result, const nlohmann::ordered_json& json) {
   constexpr int kDigits = 10;
-  std::vector<std::vector<std::vector<double>>> columns;  // that the tables point to
-  for (const auto& points : result.tables) columns.push_back(ColumnsOf(points));
+  const auto columns = Collect(result.tables, ColumnsOf);  // that the tables point to
   RunFiles files;
   for (std::size_t t = 0; t < columns.size(); ++t) {
     RunTable table{.path = result.tables[t].name + ".csv", .columns = {}, .digits = kDigits};

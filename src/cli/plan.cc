@@ -5,6 +5,7 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/plan_file.h"
+#include "src/core/collect.h"
 #include "src/core/file.h"
 
 namespace gapscope::cli {
@@ -27,8 +28,7 @@ Result<int> RunPlan(const PlanFlags& flags) {
   ModelFlags model = flags.model;
   model.experiment = absolute(model.experiment);
   for (auto& path : model.params) path = absolute(path);
-  std::vector<std::string> logs;
-  for (const auto& log : model.logs) logs.push_back(absolute(log));
+  std::vector<std::string> logs = Collect(model.logs, absolute);
   std::sort(logs.begin(), logs.end());
   logs.erase(std::unique(logs.begin(), logs.end()), logs.end());
   ordered_json plan = {{"schema", kPlanSchema},

@@ -89,7 +89,7 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   if (flags.nuisances) {
     const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
     result.logs =
-        Evaluate(*session.model, session.recordings, session.values, std::nullopt, options.mode, fit, *session.pool);
+        Evaluate(*session.model, session.recordings, {session.values, std::nullopt}, options.mode, fit, *session.pool);
   }
   std::optional<LoopStatistics> loop;
   if (controller) loop = LoopStatisticsOf(replayed, session.recordings, *controller);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/core/collect.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -10,10 +11,8 @@ namespace gapscope::cli {
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales) {
   GS_ASSIGN(const auto json, ReadJson(path));
   GS_ASSIGN(const RunModel held, ReadRunModel(json, path));
-  std::vector<std::string> texts;
-  for (const auto& use : held.effects) texts.push_back(use.Text());
   ResultModel result;
-  GS_ASSIGN(const auto uses, ParseEffects(texts, *rig));
+  GS_ASSIGN(const auto uses, ParseEffects(Collect(held.effects, &EffectUse::Text), *rig));
   GS_ASSIGN(result.model, Model::Build(std::move(rig), uses, scales));
   result.values = result.model->Nominal();
   for (const auto& [name, value] : held.values) {

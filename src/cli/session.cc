@@ -114,12 +114,12 @@ Option TimeStepOption(double& time_step_s) {
 
 Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,
                                               ThreadPool& pool) {
-  std::vector<std::optional<Result<Recording>>> loaded(paths.size());
+  std::vector<Result<Recording>> loaded(paths.size(), Error{.what = "not loaded"});
   pool.ForEach(paths.size(), [&](std::size_t i, int) { loaded[i] = LoadRecording(experiment, paths[i]); });
   std::vector<Recording> recordings;
   for (auto& result : loaded) {
-    if (!result->ok()) return result->error();
-    recordings.push_back(std::move(*result).value());
+    if (!result.ok()) return result.error();
+    recordings.push_back(std::move(result).value());
   }
   return recordings;
 }

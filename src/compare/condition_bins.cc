@@ -66,9 +66,16 @@ int BinOf(double value, const std::vector<double>& limits) {
   return static_cast<int>(above - limits.begin()) - 1;
 }
 
-Partition ByLimits(ConditionFamily family, std::span<const double> values, const std::vector<char>& used,
-                   bool magnitude, const std::vector<double>& limits, const std::string& name,
-                   const std::string& unit) {
+// What ByLimits divides.
+struct Divided {
+  ConditionFamily family;
+  std::span<const double> values;
+  bool magnitude;  // is divided, not the value itself
+  std::string name, unit;
+};
+
+Partition ByLimits(const Divided& divided, const std::vector<char>& used, const std::vector<double>& limits) {
+  const auto& [family, values, magnitude, name, unit] = divided;
   Partition partition{.family = family, .names = {}, .bin = std::vector<int>(values.size(), -1)};
   for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
     partition.names.push_back(name + " " + NumberText(limits[i]) + ".." + NumberText(limits[i + 1]) +
@@ -185,22 +192,22 @@ std::vector<Partition> MakePartitions(const ConditionInput& input, const std::ve
   const bool moves = speed_limits.size() > 1;
   if (moves) {
     partitions.push_back(
-        ByLimits(ConditionFamily::kSpeed, input.speed, used, true, speed_limits, "speed", input.speed_unit));
+        ByLimits({ConditionFamily::kSpeed, input.speed, true, "speed", input.speed_unit}, used, speed_limits));
     partitions.push_back(ByDirection(input, used, speed_limits[1]));
   }
   if (!input.command.empty()) {
     const std::vector<double> limits = MagnitudeLimits(SortedMagnitudes(input.command, used));
     partitions.push_back(
-        ByLimits(ConditionFamily::kCommand, input.command, used, true, limits, "|command|", input.command_unit));
+        ByLimits({ConditionFamily::kCommand, input.command, true, "|command|", input.command_unit}, used, limits));
   }
   if (moves) partitions.push_back(ByReversal(input, used, speed_limits[1]));
   if (!input.angle.empty()) {
-    partitions.push_back(ByLimits(ConditionFamily::kAngle, input.angle, used, false, AngleLimits(input.angle, used),
-                                  "angle", input.angle_unit));
+    partitions.push_back(ByLimits({ConditionFamily::kAngle, input.angle, false, "angle", input.angle_unit}, used,
+                                  AngleLimits(input.angle, used)));
   }
   if (input.time_s.size() > 1) {
-    partitions.push_back(ByLimits(ConditionFamily::kTime, input.time_s, used, false,
-                                  EqualLimits(input.time_s.front(), input.time_s.back(), kTimeBins), "time", "s"));
+    partitions.push_back(ByLimits({ConditionFamily::kTime, input.time_s, false, "time", "s"}, used,
+                                  EqualLimits(input.time_s.front(), input.time_s.back(), kTimeBins)));
   }
   return partitions;
 }

@@ -13,6 +13,7 @@
 #include "src/compare/condition_bins.h"
 #include "src/compare/noise.h"
 #include "src/compare/spectrum.h"
+#include "src/core/collect.h"
 #include "src/core/result.h"
 #include "src/core/statistics.h"
 
@@ -231,7 +232,7 @@ std::vector<ConditionShare> LocateError(const ConditionInput& input, const Condi
   std::vector<char> used(n);
   std::size_t used_rows = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    used[i] = std::isfinite(input.measured[i]) && std::isfinite(input.predicted[i]);
+    used[i] = static_cast<char>(std::isfinite(input.measured[i]) && std::isfinite(input.predicted[i]));
     used_rows += used[i] ? 1 : 0;
   }
   if (used_rows < kFewestRows) return {};
@@ -243,8 +244,8 @@ std::vector<ConditionShare> LocateError(const ConditionInput& input, const Condi
   if (used_rows >= kFewestRowsForFrequency) AddFrequencies(input, used, errors, &conditions);
 
   // Shares of the whole log, then their intervals. A family without any error has no shares.
-  std::vector<double> totals;
-  for (const auto& column : conditions.columns) totals.push_back(std::accumulate(column.begin(), column.end(), 0.0));
+  std::vector<double> totals = Collect(
+      conditions.columns, [](const auto& column) { return std::accumulate(column.begin(), column.end(), 0.0); });
   for (const auto& family : Families(conditions.list)) Shares(totals, family, totals);
   std::vector<ConditionShare> result;
   for (std::size_t c = 0; c < totals.size(); ++c) {

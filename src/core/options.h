@@ -46,7 +46,7 @@ Choice ChoiceOf(E& value) {
 template <class E>
 Choice ChoiceOf(std::optional<E>& value) {
   return {.names = NamesOf<E>(),
-          .set = [&value](const std::string& name) { value = *ValueOf<E>(name); },
+          .set = [&value](const std::string& name) { value = ValueOf<E>(name); },
           .get = [&value] { return value ? NameOf(*value) : std::string(); }};
 }
 

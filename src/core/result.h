@@ -63,10 +63,12 @@ inline Status Ok() { return std::monostate{}; }
 
 // GS_ASSIGN(auto x, Expression()): returns the Error, or assigns the value.
 #define GS_ASSIGN(target, expression) GS_ASSIGN_IMPL_(GS_CONCAT_(gs_result_, __LINE__), target, expression)
+// NOLINTBEGIN(bugprone-macro-parentheses): names that are declared, and the target may declare one.
 #define GS_ASSIGN_IMPL_(result, target, expression) \
   auto result = (expression);                       \
   if (!result.ok()) return result.error();          \
   target = std::move(result).value()
+// NOLINTEND(bugprone-macro-parentheses)
 // GS_RETURN_IF_ERROR(Expression()): returns the Error, if any.
 #define GS_RETURN_IF_ERROR(expression)                                            \
   do {                                                                            \

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/core/statistics.h"
 
@@ -59,8 +60,7 @@ double CommandLimit(const Experiment& experiment, const std::string& actuator) {
 Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalOptions& options) {
   if (experiment.commands.empty())
     return Error{.what = "the experiment has no command to drive", .where = experiment.path};
-  std::vector<std::string> names;
-  for (const auto& command : experiment.commands) names.push_back(command.actuator);
+  const std::vector<std::string> names = Collect(experiment.commands, &CommandSpec::actuator);
   for (const auto& [name, value] : options.hold) {
     if (std::find(names.begin(), names.end(), name) == names.end())
       return NoSuch("no command drives that actuator", name, names, "--hold");
@@ -205,9 +205,10 @@ std::string InputCsv(const Experiment& experiment, const Rehearsal& rehearsal) {
   const double per_second = kPerSecond.at(experiment.timeline.time_unit);
   std::vector<std::size_t> commands;
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
-    if (!recording.commands[c].column) continue;
+    const auto& column = recording.commands[c].column;
+    if (!column) continue;
     commands.push_back(c);
-    text += "," + *recording.commands[c].column;
+    text += "," + *column;
   }
   for (const auto& measured : recording.measured) {
     if (!IsLimitSignal(measured.spec)) text += ",predicted." + measured.spec.signal;

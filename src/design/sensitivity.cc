@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/fit/policy.h"
 
@@ -68,9 +69,7 @@ double FloorOf(const MeasuredSpec& spec, const std::vector<double>& values) {
 }
 
 std::vector<double> FloorsOf(const Recording& predicted) {
-  std::vector<double> floors;
-  for (const auto& measured : predicted.measured) floors.push_back(FloorOf(measured.spec, measured.values));
-  return floors;
+  return Collect(predicted.measured, [](const auto& measured) { return FloorOf(measured.spec, measured.values); });
 }
 
 ForetoldFit::ForetoldFit(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors)
@@ -91,10 +90,8 @@ std::vector<double> ForetoldFit::Deviations(const std::vector<std::size_t>& want
   }
   const Eigen::VectorXd variances =
       Ldlt(information).Solve(Eigen::MatrixXd::Identity(information.rows(), information.cols())).diagonal();
-  std::vector<double> deviations;
-  for (Eigen::Index i = 0; i < problem_.space().size(); ++i)
-    deviations.push_back(std::sqrt(std::max(0.0, variances[i])));
-  return deviations;
+  return Collect(variances.head(problem_.space().size()),
+                 [](double variance) { return std::sqrt(std::max(0.0, variance)); });
 }
 
 double ForetoldFit::Misfit(int jacobians) {

@@ -41,8 +41,9 @@ bool NestsTooDeep(const std::string& bytes) {
     const std::size_t end = std::min(bytes.find('\n', line_start), bytes.size());
     const std::size_t first = std::min(bytes.find_first_not_of(" -?\t", line_start), end);
     indent_levels = std::max(indent_levels, first - line_start);
-    dashes = std::max<std::size_t>(dashes, std::count_if(bytes.begin() + line_start, bytes.begin() + first,
-                                                         [](char c) { return c == '-' || c == '?'; }));
+    const std::string_view indent = std::string_view(bytes).substr(line_start, first - line_start);
+    dashes = std::max<std::size_t>(
+        dashes, std::count_if(indent.begin(), indent.end(), [](char c) { return c == '-' || c == '?'; }));
     line_start = end + 1;
   }
   return deepest > kMaxNesting || indent_levels > 4 * kMaxNesting || dashes > kMaxNesting;
@@ -140,7 +141,7 @@ YAML::Node YamlMap::Take(const char* key) {
 bool YamlMap::Has(const char* key) { return Take(key).IsDefined(); }
 YAML::Node YamlMap::Child(const char* key) { return Take(key); }
 
-std::string YamlMap::Text(const char* key, std::optional<std::string> fallback) {
+std::string YamlMap::Text(const char* key, const std::optional<std::string>& fallback) {
   const YAML::Node node = Take(key);
   if (!node.IsDefined() || node.IsNull()) {
     if (!fallback) {

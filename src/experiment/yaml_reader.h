@@ -19,7 +19,7 @@ class YamlMap {
   // `what` names the map in errors: "measured signal".
   YamlMap(const YAML::Node& node, std::string file, std::string what);
 
-  std::string Text(const char* key, std::optional<std::string> fallback = std::nullopt);
+  std::string Text(const char* key, const std::optional<std::string>& fallback = std::nullopt);
   double Number(const char* key, std::optional<double> fallback = std::nullopt);
   bool Flag(const char* key, bool fallback);
   std::vector<std::string> TextList(const char* key);  // a scalar or a list of scalars; empty when absent

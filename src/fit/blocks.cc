@@ -3,6 +3,7 @@
 #include <map>
 #include <utility>
 
+#include "src/core/collect.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -39,9 +40,7 @@ std::vector<BlockCost> CostsByBlock(const FitProblem& problem, const Residuals& 
       }
     }
   }
-  std::vector<BlockCost> costs;
-  for (const auto& [key, block] : blocks) costs.push_back(block);
-  return costs;
+  return Collect(blocks, [](const auto& entry) { return entry.second; });
 }
 
 }  // namespace gapscope

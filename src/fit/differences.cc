@@ -30,7 +30,7 @@ class FitProblem::Differences {
   // False: the window cannot be simulated at the point.
   bool Make() {
     if (residual_.size() == 0) {
-      if (!problem_.Simulate(worker_, window_, point_, values_, state_, shift_, worker_.base)) return false;
+      if (!problem_.Simulate(worker_, {window_, point_, values_, state_, shift_}, worker_.base)) return false;
       problem_.ResidualsOf(window_, point_, worker_.base, residual_);
     }
     const Eigen::Index n = layout_.low.size();
@@ -49,7 +49,7 @@ class FitProblem::Differences {
  private:
   // The residuals elsewhere, in worker_.other; false: they cannot be had.
   bool Replay(const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift) {
-    if (!problem_.Simulate(worker_, window_, point, values, state, shift, worker_.perturbed)) return false;
+    if (!problem_.Simulate(worker_, {window_, point, values, state, shift}, worker_.perturbed)) return false;
     problem_.ResidualsOf(window_, point_, worker_.perturbed, worker_.other);
     return true;
   }
@@ -148,7 +148,7 @@ Derivatives FitProblem::Differentiate(const FitPoint& point, const DifferenceOpt
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
     Differences differences(*this, GetWorker(index), w, point, values, options, result.residuals[w],
                             result.jacobians[w]);
-    good[w] = differences.Make();
+    good[w] = static_cast<char>(differences.Make());
   });
   result.valid = std::all_of(good.begin(), good.end(), [](char g) { return g != 0; });
   result.work.steps = TakeSteps();

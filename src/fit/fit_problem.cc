@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/fit/fit_worker.h"
 #include "src/fit/policy.h"
@@ -73,8 +74,8 @@ std::size_t FitProblem::TakeSteps() {
   return steps;
 }
 
-void FitProblem::PlaceStart(Worker& worker, const FitWindow& window, const FitPoint& point,
-                            const std::vector<double>& values, const Eigen::VectorXd& state) const {
+void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
+  const auto& [window, point, values, state, shift_s] = place;
   const Recording& recording = recordings_[window.log];
   const std::vector<double>& first = space_.start();
   // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
@@ -110,14 +111,13 @@ void FitProblem::PlaceStart(Worker& worker, const FitWindow& window, const FitPo
   }
 }
 
-bool FitProblem::Simulate(Worker& worker, const FitWindow& window, const FitPoint& point,
-                          const std::vector<double>& values, const Eigen::VectorXd& state, double shift,
-                          std::vector<double>& predicted) const {
+bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double>& predicted) const {
+  const FitWindow& window = place.window;
   const Recording& recording = recordings_[window.log];
   predicted.resize(window.rows.rows() * recording.measured.size());
-  worker.simulator.set_shift_s(shift);
-  if (!worker.simulator.SetParameters(values, recording)) return false;
-  PlaceStart(worker, window, point, values, state);
+  worker.simulator.set_shift_s(place.shift_s);
+  if (!worker.simulator.SetParameters(place.values, recording)) return false;
+  PlaceStart(worker, place);
   const RunResult run = worker.simulator.Run(recording, window.rows, worker.start, predicted);
   worker.steps += run.steps;
   return run.outcome == Outcome::kCompleted;
@@ -153,7 +153,7 @@ Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMa
     if (!mask.empty() && !mask[w]) return;
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
-    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) {
+    if (!Simulate(worker, {window, point, values, point.states[w], shift}, worker.base)) {
       costs[w] = kInfinity;
       return;
     }
@@ -173,15 +173,14 @@ Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMa
 }
 
 std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
-  std::vector<LogReplay> logs;
-  for (const auto& recording : recordings_) logs.push_back(EmptyTraces(recording));
+  std::vector<LogReplay> logs = Collect(recordings_, EmptyTraces);
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<char> failed(windows_.size(), 0);
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
-    if (!Simulate(worker, window, point, values, point.states[w], shift, worker.base)) {
+    if (!Simulate(worker, {window, point, values, point.states[w], shift}, worker.base)) {
       failed[w] = 1;
       return;
     }

@@ -93,15 +93,21 @@ class FitProblem {
 
  private:
   struct Worker;
+  // Where a window is simulated: at a point, or beside it in its values, the window's state or the shift.
+  struct Place {
+    const FitWindow& window;
+    const FitPoint& point;
+    const std::vector<double>& values;
+    const Eigen::VectorXd& state;
+    double shift_s;
+  };
 
   Worker& GetWorker(int index);
   // Simulator steps since they were last taken.
   std::size_t TakeSteps();
-  // Writes where a window starts at a point.
-  void PlaceStart(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values,
-                  const Eigen::VectorXd& state) const;
-  bool Simulate(Worker& worker, const FitWindow& window, const FitPoint& point, const std::vector<double>& values,
-                const Eigen::VectorXd& state, double shift, std::vector<double>& predicted) const;
+  // Writes where the window starts.
+  void PlaceStart(Worker& worker, const Place& place) const;
+  bool Simulate(Worker& worker, const Place& place, std::vector<double>& predicted) const;
   void ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
                    Eigen::VectorXd& residual) const;
   class Differences;  // the columns of one window

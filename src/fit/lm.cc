@@ -88,7 +88,7 @@ void LmRun::SecantSteps(Derivatives& derivatives) {
 // and Sethna, "Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares minimization",
 // arXiv:1201.5885, 2012): one replay, where straight steps down such a valley take many Jacobians.
 FitPoint LmRun::BentStep(const Derivatives& derivatives, const Linearization& at, const Eigen::VectorXd& step) {
-  const FitPoint straight = Move(problem_, s_.point, at, step);
+  FitPoint straight = Move(problem_, s_.point, at, step);
   const double share = kLmPolicy.bend_share;
   FitPoint probe = s_.point;
   probe.y += share * (straight.y - s_.point.y);
@@ -96,7 +96,7 @@ FitPoint LmRun::BentStep(const Derivatives& derivatives, const Linearization& at
     probe.states[w] += share * (straight.states[w] - s_.point.states[w]);
   Residuals residuals;
   if (!std::isfinite(Cost(probe, &residuals))) return straight;
-  const Linearization bend = Bend(problem_, at, derivatives, s_.point, straight, share, residuals);
+  const Linearization bend = Bend(problem_, at, derivatives, s_.point, straight, {share, residuals});
   const Eigen::VectorXd correction = DampedStep(bend, straight);
   const auto length = [&](const Eigen::VectorXd& v) {
     return std::sqrt(std::max(0.0, v.dot(at.hessian * v) + s_.damping * v.cwiseAbs2().dot(at.hessian.diagonal())));

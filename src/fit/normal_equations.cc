@@ -180,7 +180,7 @@ void UpdateSecant(const FitProblem& problem, Derivatives& derivatives, const Fit
 }
 
 Linearization Bend(const FitProblem& problem, const Linearization& at, const Derivatives& derivatives,
-                   const FitPoint& from, const FitPoint& to, double share, const Residuals& probe) {
+                   const FitPoint& from, const FitPoint& to, const Probe& probe) {
   const Eigen::Index n = problem.layout().low.size();
   const Eigen::VectorXd dy = to.y - from.y;
   std::vector<Eigen::VectorXd> gradients(problem.windows().size());
@@ -198,7 +198,8 @@ Linearization Bend(const FitProblem& problem, const Linearization& at, const Der
     Eigen::VectorXd moved(jacobian.cols());
     moved << dy, to.states[w] - from.states[w];
     // r(x + s v) = r + s J v + s^2/2 r_vv; of r_vv, the half that a step takes.
-    const Eigen::VectorXd half = ((probe[w] - derivatives.residuals[w]) / share - jacobian * moved) / share;
+    const Eigen::VectorXd half =
+        ((probe.residuals[w] - derivatives.residuals[w]) / probe.share - jacobian * moved) / probe.share;
     const Eigen::VectorXd slope = jacobian.transpose() * half;
     gradients[w] = slope.head(n);
     if (const Eigen::Index m = jacobian.cols() - n; m > 0) {

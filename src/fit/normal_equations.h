@@ -55,10 +55,16 @@ FitPoint Move(const FitProblem& problem, const FitPoint& point, const Linearizat
 void UpdateSecant(const FitProblem& problem, Derivatives& derivatives, const FitPoint& from, const FitPoint& to,
                   Residuals residuals);
 
+// The residuals a share of the way from one point to another.
+struct Probe {
+  double share;
+  const Residuals& residuals;
+};
+
 // What bends the way from `from` to `to` (a step of `at`): half the residuals' second derivative along it, answered as
-// Reduce answers residuals. `probe`: residuals at `from` + share (to - from).
+// Reduce answers residuals.
 Linearization Bend(const FitProblem& problem, const Linearization& at, const Derivatives& derivatives,
-                   const FitPoint& from, const FitPoint& to, double share, const Residuals& probe);
+                   const FitPoint& from, const FitPoint& to, const Probe& probe);
 
 // Gives each window of `point` the state of `other` (of the same y) where that costs less; `residuals` and `others` are
 // the residuals there. Returns the cost.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "src/compare/noise.h"
+#include "src/core/collect.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -60,6 +61,7 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
   }
   if (options.max_windows == 0 || windows.size() <= options.max_windows) return windows;
   std::vector<FitWindow> kept;
+  kept.reserve(options.max_windows);
   for (std::size_t i = 0; i < options.max_windows; ++i)
     kept.push_back(std::move(windows[i * windows.size() / options.max_windows]));
   return kept;
@@ -68,8 +70,7 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
 std::vector<Eigen::VectorXd> StatePriorsByNoise(const Model& model, const std::vector<Recording>& recordings,
                                                 const FitLayout& layout, const std::vector<FitWindow>& windows,
                                                 const Residuals& residuals) {
-  std::vector<Eigen::VectorXd> priors;
-  for (const FitWindow& window : windows) priors.push_back(window.prior);
+  std::vector<Eigen::VectorXd> priors = Collect(windows, &FitWindow::prior);
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     const auto& signals = layout.signals[l];
     const std::vector<double> mismatch = MismatchOf(l, signals.size(), windows, residuals);

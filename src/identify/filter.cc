@@ -182,6 +182,7 @@ Result<int> DrivenJoint(const Model& model, const std::string& name) {
     const int joint = mj_name2id(&m, mjOBJ_JOINT, name.c_str());
     if (joint >= 0) return joint;
     std::vector<std::string> names;
+    names.reserve(static_cast<std::size_t>(m.njnt));
     for (int j = 0; j < m.njnt; ++j) names.push_back(JointName(model, j));
     return NoSuch("no such joint", name, names, "--joint");
   }

@@ -174,9 +174,9 @@ PointTable ByErrorSize(const Servo& servo, double delay_s, Reading reading, doub
     Rows part(all.columns());
     for (std::size_t i = 0; i < all.size(); ++i) {
       if (envelope[i] < low || envelope[i] > high) continue;
-      std::vector<double> row;
-      for (Eigen::Index c = 0; c < x.cols(); ++c) row.push_back(x(static_cast<Eigen::Index>(i), c));
-      part.Add(all.logs()[i], all.times()[i], y[static_cast<Eigen::Index>(i)], row);
+      const auto at = static_cast<Eigen::Index>(i);
+      const auto row = x.row(at);
+      part.Add(all.logs()[i], all.times()[i], y[at], {row.begin(), row.end()});
     }
     const auto fit = Regress(part, dt);
     if (!fit.ok()) continue;

@@ -194,7 +194,7 @@ void AddCarrier(const Model& model, const Recording& recording, int joint, Stret
   if (parent_body <= 0 || m.body_jntnum[parent_body] != 1) return;
   const auto* carrier = FindSignal(model, recording, SignalKind::kPosition, m.body_jntadr[parent_body]);
   if (!carrier) return;
-  double low = INFINITY, high = -INFINITY;
+  double low = kInfinity, high = -kInfinity;
   for (std::size_t k = 0; k < recording.rows(); ++k) {
     if (recording.time_s[k] >= stretch.first && recording.time_s[k] <= stretch.second)
       low = std::min(low, carrier->values[k]), high = std::max(high, carrier->values[k]);
@@ -403,7 +403,7 @@ void AddValues(const RingDown& all, double inertia, Identification* result) {
   const auto known = [](double value) {
     return Estimate{.name = "", .unit = "", .value = value, .low = kNaN, .high = kNaN};
   };
-  const auto scaled = [&](Estimate e) {
+  const auto scaled = [&](const Estimate& e) {
     return Estimate{
         .name = "", .unit = "", .value = e.value * inertia, .low = e.low * inertia, .high = e.high * inertia};
   };

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/torque.h"
 
 namespace gapscope {
 
 bool Slides::MayPull() const {
-  double lowest = INFINITY, highest = -INFINITY;
+  double lowest = kInfinity, highest = -kInfinity;
   for (const auto& s : rows) lowest = std::min(lowest, s.angle), highest = std::max(highest, s.angle);
   return highest - lowest < 12.6;
 }

@@ -312,7 +312,7 @@ struct Inequality {
 
 // Least squares of the rows within bounds and with the link's inertia finite. `where` of an error: the log.
 Result<Coefficients> FitWithStructure(const StackedRows& rows, const NominalUnits& units, const std::string& where) {
-  const double n = static_cast<double>(rows.y.size() / 2);
+  const double n = static_cast<double>(rows.y.size()) / 2;
   const Coefficients& scale = units.scale;
   const Eigen::MatrixXd scaled = rows.x * scale.asDiagonal();
   Quadratic problem{
@@ -373,6 +373,7 @@ PointTable DiscreteTable(const char* name, const System& system, double dt_s) {
   PointTable table{.name = name, .columns = {"A1", "A2", "A3", "A4", "B"}, .rows = {}};
   for (int r = 0; r < 4; ++r) {
     std::vector<double> row;
+    row.reserve(5);
     for (int c = 0; c < 4; ++c) row.push_back((r == c ? 1 : 0) + dt_s * system.a(r, c));
     row.push_back(dt_s * system.b[r]);
     table.rows.push_back(row);

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -358,7 +359,8 @@ Result<Log> ReadBamJson(const std::string& path, std::string_view bytes) {
   }
   Handler handler(path, bytes, longer, &log);
   try {
-    const WatchedBytes first(bytes.data(), &handler.reached), last(bytes.data() + bytes.size(), &handler.reached);
+    const std::span<const char> text = bytes;
+    const WatchedBytes first(text.data(), &handler.reached), last(text.data() + text.size(), &handler.reached);
     const bool complete = Json::sax_parse(first, last, &handler);
     if (!complete && !handler.error)
       handler.error = Error{.what = "not valid JSON", .where = At(path, 1), .actual = "", .allowed = "", .cure = ""};

@@ -95,9 +95,8 @@ FieldValue ParseField(std::string_view text, bool comma_allowed) {
     result.decimal_comma = true;
   }
   if (text.starts_with('+') && text.size() > 1 && text[1] != '-') text.remove_prefix(1);
-  const char* end = text.data() + text.size();
-  const auto [stop, failure] = std::from_chars(text.data(), end, result.value);
-  if (failure == std::errc::invalid_argument || stop != end) return {FieldKind::kText, 0, false};
+  const auto [stop, failure] = std::from_chars(text.data(), text.data() + text.size(), result.value);
+  if (failure == std::errc::invalid_argument || stop != text.data() + text.size()) return {FieldKind::kText, 0, false};
   if (failure == std::errc::result_out_of_range) {
     // Too small is zero, too large is refused. The exponent's sign tells (or a run of zeros behind the point).
     const std::size_t exponent = text.find_first_of("eE");

@@ -41,8 +41,7 @@ class BodyReader {
 
   Status Read() {
     Reserve();
-    const Status status = dialect_.delimiter == kBlanks ? ReadLines<true>() : ReadLines<false>();
-    if (!status.ok()) return status;
+    GS_RETURN_IF_ERROR(dialect_.delimiter == kBlanks ? ReadLines<true>() : ReadLines<false>());
     if (row_ == 0) {
       return Error{.what = "no rows after the line of names",
                    .where = At(path_, dialect_.header_line),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/log/inspect_parts.h"
 #include "src/log/signal_checks.h"
@@ -100,10 +101,9 @@ InspectReport Inspect(const Timeline& timeline, const std::vector<InspectChannel
     GS_CHECK(channel.values.size() == report.rows);
     report.channels.push_back(Describe(channel));
   }
-  std::vector<UniformSignal> signals;
-  for (const auto& channel : channels) {
-    signals.push_back(ResampleUniform(timeline.time_s, channel.values, step_s, channel.role == ChannelRole::kCommand));
-  }
+  const auto signals = Collect(channels, [&](const InspectChannel& channel) {
+    return ResampleUniform(timeline.time_s, channel.values, step_s, channel.role == ChannelRole::kCommand);
+  });
   for (std::size_t c = 0; c < channels.size(); ++c) {
     if (IsConstant(report.channels[c])) continue;
     if (channels[c].role == ChannelRole::kMeasured) {

@@ -37,8 +37,8 @@ BestShift FindDelay(const UniformSignal& x, const UniformSignal& y, double longe
   BestShift best;
   const std::size_t count = std::min(x.values.size(), y.values.size());
   if (count < 4) return best;
-  const auto longest =
-      static_cast<std::ptrdiff_t>(std::min(longest_s / x.step_s, static_cast<double>((count - 1) / 3)));
+  const std::size_t third = (count - 1) / 3;
+  const auto longest = static_cast<std::ptrdiff_t>(std::min(longest_s / x.step_s, static_cast<double>(third)));
   const auto margin = static_cast<std::size_t>(longest);
   std::size_t size = 1;
   while (size < count + margin + 1) size *= 2;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/log/inspect_parts.h"
 
@@ -121,9 +122,7 @@ MotionCoverage MeasureCoverage(const InspectChannel& channel, const ChannelRepor
     }
     threshold /= 2 * static_cast<double>(half) * signal.step_s;
   }
-  std::vector<double> sizes;
-  for (const double v : speed) sizes.push_back(std::abs(v));
-  coverage.speed_max = Quantile(sizes, 0.999);
+  coverage.speed_max = Quantile(Collect(speed, [](double v) { return std::abs(v); }), 0.999);
   threshold = std::max(threshold, 0.005 * coverage.speed_max);
 
   std::size_t moving = 0, slow = 0, positive = 0;

@@ -11,7 +11,7 @@ namespace gapscope {
 namespace {
 
 constexpr double kOneAmplitude = 1.5;  // ratio of amplitudes below which there is one
-constexpr double kFewReversals = 4;
+constexpr std::size_t kFewReversals = 4;
 constexpr double kSlowEnough = 0.02;  // share of time
 constexpr double kRestEnough = 0.02;
 constexpr double kOneSided = 0.9;  // share of the moving time in one direction

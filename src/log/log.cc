@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <new>
 
+#include "src/core/collect.h"
 #include "src/core/file.h"
 #include "src/log/bam_reader.h"
 #include "src/log/csv_reader.h"
@@ -112,11 +113,7 @@ const Column* Log::Find(std::string_view name) const {
   return nullptr;
 }
 
-std::vector<std::string> Log::ColumnNames() const {
-  std::vector<std::string> names;
-  for (const auto& column : columns) names.push_back(column.name);
-  return names;
-}
+std::vector<std::string> Log::ColumnNames() const { return Collect(columns, &Column::name); }
 
 std::string Log::Where(std::size_t row) const {
   const auto after =

@@ -47,13 +47,14 @@ constexpr std::array<std::string_view, 18> kTimeWords = {
     "elapsed", "elapsed_time", "elapsedtime", "sim_time",   "simtime",    "header.stamp",
     "clock",   "log_time",     "zeit",        "temps",      "tiempo",     "tempo"};
 
-std::optional<double> SecondsPer(std::string_view unit) {
+// One of the units of kUnitWords.
+double SecondsPer(std::string_view unit) {
   if (unit == "s") return 1;
   if (unit == "ms") return 1e-3;
   if (unit == "us") return 1e-6;
   if (unit == "ns") return 1e-9;
-  if (unit == "min") return 60;
-  return std::nullopt;
+  GS_CHECK(unit == "min");
+  return 60;
 }
 
 std::string_view UnitOfWord(std::string_view word) {
@@ -106,15 +107,16 @@ struct RawSteps {
 };
 std::optional<RawSteps> MedianRawStep(const Column& column) {
   std::vector<double> steps;
-  std::optional<double> previous, first;
+  std::optional<double> previous;
+  double first = 0;
   for (const double t : column.values) {
     if (!std::isfinite(t)) continue;
-    if (!first) first = t;
+    if (!previous) first = t;
     if (previous && t > *previous) steps.push_back(t - *previous);
     previous = t;
   }
   if (steps.empty()) return std::nullopt;
-  return RawSteps{Median(std::move(steps)), *first};
+  return RawSteps{Median(std::move(steps)), first};
 }
 
 TimeUnit Guess(const Column& column) {
@@ -123,14 +125,14 @@ TimeUnit Guess(const Column& column) {
   // Wall-clock stamps betray their unit: the years 2000 to 2100 in seconds since 1970.
   constexpr double kYear2000_s = 946684800, kYear2100_s = 4102444800;
   for (const char* unit : {"s", "ms", "us", "ns"}) {
-    const double factor = *SecondsPer(unit), stamp_s = steps->first * factor;
+    const double factor = SecondsPer(unit), stamp_s = steps->first * factor;
     if (stamp_s >= kYear2000_s && stamp_s < kYear2100_s) {
       return {unit, factor,
               fmt::format("taken to be in {}, since its first value {:.10g} is then a date", unit, steps->first)};
     }
   }
   const char* unit = steps->median < 1 ? "s" : steps->median < 500 ? "ms" : steps->median < 5e5 ? "us" : "ns";
-  return {unit, *SecondsPer(unit), fmt::format("taken to be in {}, from its median step {:.6g}", unit, steps->median)};
+  return {unit, SecondsPer(unit), fmt::format("taken to be in {}, from its median step {:.6g}", unit, steps->median)};
 }
 
 std::string Joined(const std::vector<std::string>& names) {
@@ -221,13 +223,13 @@ Result<TimeUnit> FindTimeUnit(const Log& log, const Column& column, const std::s
                    .allowed = "s, ms, us, ns, min",
                    .cure = "correct it, or state the unit in the experiment file"};
     }
-    return TimeUnit{std::string(unit), *SecondsPer(unit), ""};
+    return TimeUnit{std::string(unit), SecondsPer(unit), ""};
   }
   const std::string_view trimmed = TrimBlanks(column.name);
   if (trimmed == "%time") return TimeUnit{"ns", 1e-9, ""};
   if (trimmed == "__time") return TimeUnit{"s", 1, ""};
   const auto [stem, unit] = SplitUnitSuffix(Normalised(column.name));
-  if (!unit.empty()) return TimeUnit{std::string(unit), *SecondsPer(unit), ""};
+  if (!unit.empty()) return TimeUnit{std::string(unit), SecondsPer(unit), ""};
   return Guess(column);
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "src/core/mujoco_handles.h"
+#include "src/core/statistics.h"
 #include "src/core/units.h"
 #include "src/model/drive_facts.h"
 
@@ -136,7 +137,7 @@ std::vector<double> Derivative(const std::vector<double>& y) {
 }
 
 double Spread(const std::vector<double>& y) {
-  double low = INFINITY, high = -INFINITY;
+  double low = kInfinity, high = -kInfinity;
   for (const double v : y) {
     if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
   }
@@ -382,8 +383,14 @@ class Drafter {
     return name;
   }
 
-  void Propose(const std::string& element, const std::string& unit, double nominal, double low, double high,
-               const std::string& field, const std::string& comment) {
+  struct Proposal {
+    std::string element, unit;
+    double nominal, low, high;
+    std::string field, comment;
+  };
+
+  void Propose(const Proposal& proposal) {
+    const auto& [element, unit, nominal, low, high, field, comment] = proposal;
     const std::string name = ParameterName(element);
     parameters_ += "  " + Quote(name) + ": {unit: " + Quote(unit) + ", nominal: " + Num(nominal) + ", bounds: [" +
                    Num(low) + ", " + Num(high) + "]}" + (comment.empty() ? "" : "  # " + comment) + "\n";
@@ -398,16 +405,16 @@ class Drafter {
       const double inertia = m_.dof_M0[dof], damping = m_.dof_damping[dof];
       // Without a value to start from: a damping that stops the joint within about ten seconds.
       const double scale = damping > 0 ? damping : 0.1 * inertia;
-      Propose(name + ".damping", unit + " s/rad", damping, 0, 20 * scale, "joint/" + name + "/damping",
-              damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia");
-      Propose(name + ".armature", "kg m^2", m_.dof_armature[dof], 0, std::max(5 * m_.dof_armature[dof], inertia),
-              "joint/" + name + "/armature", "");
+      Propose({name + ".damping", unit + " s/rad", damping, 0, 20 * scale, "joint/" + name + "/damping",
+               damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
+      Propose({name + ".armature", "kg m^2", m_.dof_armature[dof], 0, std::max(5 * m_.dof_armature[dof], inertia),
+               "joint/" + name + "/armature", ""});
       if (m_.jnt_stiffness[j] > 0)
-        Propose(name + ".stiffness", unit + "/rad", m_.jnt_stiffness[j], 0.2 * m_.jnt_stiffness[j],
-                5 * m_.jnt_stiffness[j], "joint/" + name + "/stiffness", "");
+        Propose({name + ".stiffness", unit + "/rad", m_.jnt_stiffness[j], 0.2 * m_.jnt_stiffness[j],
+                 5 * m_.jnt_stiffness[j], "joint/" + name + "/stiffness", ""});
       if (m_.dof_frictionloss[dof] > 0)
-        Propose(name + ".frictionloss", unit, m_.dof_frictionloss[dof], 0, 10 * m_.dof_frictionloss[dof],
-                "joint/" + name + "/frictionloss", "");
+        Propose({name + ".frictionloss", unit, m_.dof_frictionloss[dof], 0, 10 * m_.dof_frictionloss[dof],
+                 "joint/" + name + "/frictionloss", ""});
     }
     for (int a = 0; a < m_.nactuator; ++a) {
       const char* name = mj_id2name(&m_, mjOBJ_ACTUATOR, a);
@@ -416,10 +423,10 @@ class Drafter {
                    b2 = m_.actuator_biasprm[a * mjNBIAS + 2];
       const std::string base = name, field = "actuator/" + base;
       if (gain > 0 && b1 == -gain)
-        Propose(base + ".kp", "N m/rad", gain, 0.5 * gain, 2 * gain, field + "/kp", "");
+        Propose({base + ".kp", "N m/rad", gain, 0.5 * gain, 2 * gain, field + "/kp", ""});
       else if (gain > 0)
-        Propose(base + ".gain", "N m per unit of command", gain, 0.5 * gain, 2 * gain, field + "/gain", "");
-      if (b2 < 0) Propose(base + ".kv", "N m s/rad", -b2, -0.3 * b2, -3 * b2, field + "/kv", "");
+        Propose({base + ".gain", "N m per unit of command", gain, 0.5 * gain, 2 * gain, field + "/gain", ""});
+      if (b2 < 0) Propose({base + ".kv", "N m s/rad", -b2, -0.3 * b2, -3 * b2, field + "/kv", ""});
     }
     if (!parameters_.empty()) yaml_ += "parameters:\n" + parameters_ + "set:\n" + set_;
   }

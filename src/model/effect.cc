@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/model/effects/catalogue.h"
 
@@ -172,9 +173,7 @@ std::vector<EffectUse> ActuatorModel(const Rig& rig) {
   for (const EffectUse& use : AllUses(rig)) {
     if (const int stage = EffectOf(use, rig).actuator_stage; stage > 0) stages.emplace(stage, use);
   }
-  std::vector<EffectUse> uses;
-  for (const auto& [stage, use] : stages) uses.push_back(use);
-  return uses;
+  return Collect(stages, [](const auto& entry) { return entry.second; });
 }
 
 const Effect& EffectOf(const EffectUse& use, const Rig& rig) {

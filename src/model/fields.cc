@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "src/core/collect.h"
 #include "src/core/names.h"
 
 namespace gapscope {
@@ -84,9 +85,7 @@ std::vector<std::string> NamesOf(const mjModel& m, mjtObj type) {
 
 template <class Map>
 std::vector<std::string> Keys(const Map& map) {
-  std::vector<std::string> keys;
-  for (const auto& [key, value] : map) keys.push_back(key);
-  return keys;
+  return Collect(map, [](const auto& entry) { return entry.first; });
 }
 
 // kp, kv, gain, bias0..2 of an actuator, wherever they stand: in a native actuator's prm, or in the numerics of a

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/model/parameter_writer.h"
 #include "src/model/structure.h"
@@ -176,11 +177,7 @@ Result<int> Model::Find(const std::string& name, const std::string& where) const
   return NoSuch("no such parameter", name, names, where);
 }
 
-std::vector<double> Model::Nominal() const {
-  std::vector<double> values;
-  for (const auto& p : parameters_) values.push_back(p.nominal);
-  return values;
-}
+std::vector<double> Model::Nominal() const { return Collect(parameters_, &Parameter::nominal); }
 
 std::vector<int> Model::FreeParameters() const {
   std::vector<int> free;

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/core/collect.h"
+
 namespace gapscope {
 
 std::vector<std::string> VariableNames(const std::vector<Parameter>& parameters, const Experiment& experiment) {
-  std::vector<std::string> names;
-  for (const auto& p : parameters) names.push_back(p.name);
+  std::vector<std::string> names = Collect(parameters, &Parameter::name);
   for (const auto& v : experiment.values) names.push_back(v.name);
   return names;
 }

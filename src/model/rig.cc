@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "src/core/collect.h"
+
 namespace gapscope {
 namespace {
 
@@ -101,11 +103,7 @@ bool Rig::HasFriction(const std::string& joint) const {
   return id >= 0 && compiled_->dof_frictionloss[compiled_->jnt_dofadr[id]] > 0;
 }
 
-std::vector<std::string> Rig::Signals() const {
-  std::vector<std::string> names;
-  for (const auto& measured : experiment_.measured) names.push_back(measured.signal);
-  return names;
-}
+std::vector<std::string> Rig::Signals() const { return Collect(experiment_.measured, &MeasuredSpec::signal); }
 
 std::string Rig::JointOfSignal(const std::string& signal) const {
   for (const auto& measured : experiment_.measured) {

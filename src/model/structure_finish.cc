@@ -40,7 +40,8 @@ void AddInstance(mjSpec* spec, const std::string& plugin, const std::string& ins
   mjs_setString(element->name, instance.c_str());
   mjs_setString(element->plugin_name, plugin.c_str());
   element->active = 1;
-  for (const auto& [key, value] : attributes) AddText(spec, instance + "." + key, value);
+  const std::string prefix = instance + ".";
+  for (const auto& [key, value] : attributes) AddText(spec, prefix + key, value);
 }
 
 void Attach(mjsPlugin* use, const std::string& plugin, const std::string& instance) {
@@ -78,9 +79,10 @@ double Structure::NominalOf(const std::string& expression) const {
 }
 
 void Structure::AddLive(const std::string& instance, const Terms& terms) {
+  const std::string prefix = instance + ".", field = "numeric/" + prefix;
   for (const auto& [key, expression] : terms) {
-    AddNumeric(instance + "." + key, NominalOf(expression));
-    Set("numeric/" + instance + "." + key, {expression});
+    AddNumeric(prefix + key, NominalOf(expression));
+    Set(field + key, {expression});
   }
 }
 

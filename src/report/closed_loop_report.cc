@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/core/collect.h"
 #include "src/report/json.h"
 
 namespace gapscope {
@@ -79,9 +80,7 @@ std::string ToTable(const LoopStatistics& loop, const std::vector<std::string>& 
 
 std::vector<RunTable> SentTables(const std::vector<LogReplay>& logs, const std::vector<std::vector<double>>& sent,
                                  const std::vector<Recording>& recordings, const ControllerSpec& spec) {
-  std::vector<std::string> paths;
-  for (const auto& log : logs) paths.push_back(log.log_path);
-  const std::vector<std::string> names = CsvNames(paths);
+  const std::vector<std::string> names = CsvNames(Collect(logs, &LogReplay::log_path));
   std::vector<RunTable> tables;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const auto* logged = Logged(recordings[l], spec);

@@ -33,7 +33,7 @@ std::vector<std::string> CsvNames(const std::vector<std::string>& log_paths) {
   std::set<std::string> used;
   for (std::size_t i = 0; i < log_paths.size(); ++i) {
     std::string name = std::filesystem::path(log_paths[i]).stem().string();
-    if (!used.insert(name).second) name = std::to_string(i) + "_" + name;
+    if (!used.insert(name).second) name.insert(0, std::to_string(i) + "_");
     names.push_back(name + ".csv");
   }
   return names;

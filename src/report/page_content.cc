@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "src/core/collect.h"
+
 namespace gapscope {
 namespace {
 
@@ -49,8 +51,7 @@ PageContent PageOf(const DiagnoseRun& run) {
   if (d.model) page.values = RunModelOf(*d.model, d.values).values;
   page.where = {{.title = {}, .shares = First(d.where)}};
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) {
-    std::vector<std::string> found;
-    for (const auto& effect : d.effects) found.push_back(Words(effect.use));
+    const auto found = Collect(d.effects, [](const auto& effect) { return Words(effect.use); });
     page.where.push_back(
         {.title = "Of what " + Listed(found) + (found.size() > 1 ? " leave" : " leaves"), .shares = First(d.remains)});
   }
@@ -60,8 +61,7 @@ PageContent PageOf(const DiagnoseRun& run) {
       page.fitted.push_back({.name = effect.use.Text() + "." + p.key, .value = p.value, .low = p.low, .high = p.high});
   }
   if (!d.next_command.empty()) {
-    std::vector<std::string> rivals;
-    for (const auto& rival : d.next_separates) rivals.push_back(Words(rival));
+    const std::vector<std::string> rivals = Collect(d.next_separates, [](const auto& rival) { return Words(rival); });
     page.next_command = d.next_command;
     page.next_text =
         rivals.empty() ? "It would tell more about what is left." : "It tells " + Listed(rivals, "from") + " apart.";

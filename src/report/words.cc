@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 
 namespace gapscope {
@@ -37,9 +38,7 @@ void AddStage(std::vector<Stage>* stages, const std::string& name, double error,
 }
 
 std::vector<std::string> WordsOf(const std::vector<EffectUse>& uses) {
-  std::vector<std::string> words;
-  for (const auto& use : uses) words.push_back(Words(use));
-  return words;
+  return Collect(uses, [](const EffectUse& use) { return Words(use); });
 }
 
 const char* HowItFollows(const ReplayRun& run) {
@@ -74,13 +73,10 @@ std::string TitleOf(const Diagnosis& d, const std::string& found) {
     case Verdict::kEffects:
       return "The model lacks " + found + ".";
     case Verdict::kAmbiguous: {
-      std::vector<std::string> groups;
-      for (const auto& group : d.ambiguous) {
-        std::vector<std::string> names;
-        for (const auto& use : group) names.push_back(EffectTitle(use.effect));
-        groups.push_back(Listed(names, "or"));
-      }
-      return "The model lacks " + Listed(groups) + ": these logs cannot tell which.";
+      const auto told_as_one = [](const std::vector<EffectUse>& group) {
+        return Listed(Collect(group, [](const EffectUse& use) { return EffectTitle(use.effect); }), "or");
+      };
+      return "The model lacks " + Listed(Collect(d.ambiguous, told_as_one)) + ": these logs cannot tell which.";
     }
     case Verdict::kUnknown:
       return d.effects.empty() ? "Something is missing that no known effect explains."
@@ -159,8 +155,7 @@ Headline HeadlineOf(const TuneRun& run) {
 
 Headline HeadlineOf(const DiagnoseRun& run) {
   const Diagnosis& d = run.diagnosis;
-  std::vector<std::string> found;
-  for (const auto& effect : d.effects) found.push_back(Words(effect.use));
+  const auto found = Collect(d.effects, [](const auto& effect) { return Words(effect.use); });
   Headline headline{.kind = "Diagnosis",
                     .title = TitleOf(d, Listed(found)),
                     .confidence = d.probability,

@@ -3,15 +3,14 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/core/collect.h"
 #include "src/core/file.h"
 #include "src/report/html_report.h"
 
 namespace gapscope {
 
 std::vector<RunTable> TraceTables(const std::vector<LogReplay>& logs, const std::vector<Recording>& recordings) {
-  std::vector<std::string> paths;
-  for (const auto& log : logs) paths.push_back(log.log_path);
-  const std::vector<std::string> names = CsvNames(paths);
+  const std::vector<std::string> names = CsvNames(Collect(logs, &LogReplay::log_path));
   std::vector<RunTable> tables;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     RunTable table{.path = "traces/" + names[l], .columns = {{"__time", logs[l].time_s}}};

@@ -175,9 +175,10 @@ Found FitFrom(const Fit& fit, const std::optional<std::vector<double>>& random) 
 void Score(const Model& model, const DataSplit& data, const TuneOptions& options, ThreadPool& pool,
            TuneSummary* summary) {
   const ReplayMode mode = model.experiment().replay.mode;
-  summary->error_nominal = ReplayError(Evaluate(model, data.held_out, model.Nominal(), 0, mode, options, pool));
-  summary->train = Evaluate(model, data.train, summary->values, summary->shift_s, mode, options, pool);
-  summary->held_out = Evaluate(model, data.held_out, summary->values, summary->shift_s, mode, options, pool);
+  const FixedParameters tuned{summary->values, summary->shift_s};
+  summary->error_nominal = ReplayError(Evaluate(model, data.held_out, {model.Nominal(), 0}, mode, options, pool));
+  summary->train = Evaluate(model, data.train, tuned, mode, options, pool);
+  summary->held_out = Evaluate(model, data.held_out, tuned, mode, options, pool);
   summary->error_train = ReplayError(summary->train);
   summary->error_held_out = ReplayError(summary->held_out);
 }
@@ -208,15 +209,15 @@ Found FitFromAll(const Fit& fit, TuneSummary* summary) {
 }  // namespace
 
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
-                                const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
-                                const TuneOptions& options, ThreadPool& pool) {
+                                const FixedParameters& fixed, ReplayMode mode, const TuneOptions& options,
+                                ThreadPool& pool) {
   if (recordings.empty()) return {};
   FitOptions fit =
       MakeFitOptions(options, {}, mode == ReplayMode::kWindows ? ObjectiveKind::kWindows : ObjectiveKind::kFreeRun);
   fit.lead_in_s = 0;
-  fit.fit_shift = !shift_s;
-  fit.shift_s = shift_s.value_or(0);
-  FitProblem problem(model, recordings, fit, values, pool);
+  fit.fit_shift = !fixed.shift_s;
+  fit.shift_s = fixed.shift_s.value_or(0);
+  FitProblem problem(model, recordings, fit, fixed.values, pool);
   ProblemObjective objective(problem);
   Work work;
   Solved found = SolveStatesAndWeigh(problem, objective, problem.Start(), &work);

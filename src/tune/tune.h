@@ -51,10 +51,14 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
                          const TuneOptions& options, ThreadPool& pool);
 
 // Replays at fixed parameters with only the nuisances fitted (offsets per log and initial states): how held-out data is
-// scored. `shift_s`: of the commands; none: fitted too, within one sample.
+// scored.
+struct FixedParameters {
+  const std::vector<double>& values;
+  std::optional<double> shift_s;  // of the commands; none: fitted too, within one sample
+};
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
-                                const std::vector<double>& values, std::optional<double> shift_s, ReplayMode mode,
-                                const TuneOptions& options, ThreadPool& pool);
+                                const FixedParameters& fixed, ReplayMode mode, const TuneOptions& options,
+                                ThreadPool& pool);
 
 }  // namespace gapscope
 

@@ -76,6 +76,7 @@ Result<std::unique_ptr<Encoder>> Encoder::Start(const std::string& path, VideoFo
   if (pipe2(ends, O_CLOEXEC) != 0) return Error{.what = "cannot make a pipe to ffmpeg", .actual = std::strerror(errno)};
   std::vector<std::string> arguments = Arguments(format, width, height, frames_per_s, "file:" + made->temporary_);
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (auto& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;

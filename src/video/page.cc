@@ -8,6 +8,7 @@
 
 #include "src/compare/decimate.h"
 #include "src/core/file.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -147,7 +148,7 @@ Page::Page(PageOptions options, PageTraces traces, std::vector<PageModel> models
   };
   double top = kTopGap * unit_;
   for (const auto& signal : traces_.signals) {
-    double low = INFINITY, high = -INFINITY;
+    double low = kInfinity, high = -kInfinity;
     for (std::size_t r = 0; r < traces_.time_s.size(); ++r) {
       if (within(r) && std::isfinite(signal.measured[r]))
         low = std::min(low, signal.measured[r]), high = std::max(high, signal.measured[r]);
@@ -167,7 +168,7 @@ Page::Page(PageOptions options, PageTraces traces, std::vector<PageModel> models
     top += (kSignalRow + kRowGap) * unit_;
   }
   if (!traces_.commands.empty()) {
-    double low = INFINITY, high = -INFINITY;
+    double low = kInfinity, high = -kInfinity;
     for (const double value : traces_.commands.front().values) {
       if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
     }

@@ -205,7 +205,7 @@ Status PaintAll(const Stage& stage, const std::vector<double>& times, const Vide
       if (!go_on) return;
     }
   });
-  if (order.error()) return *order.error();
+  if (const auto& error = order.error()) return *error;
   return Ok();
 }
 

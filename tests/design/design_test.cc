@@ -122,7 +122,9 @@ TEST(OptimalTest, DeviationsGrowAsTheAmplitudeShrinks) {
     EXPECT_LE(inputs[i].rehearsal.worst, 0.9 * (1 + 1e-6));
     ASSERT_EQ(inputs[i].per_target.size(), 1u);
     EXPECT_NEAR(inputs[i].score, -std::log(inputs[i].per_target[0]), 1e-12);
-    if (i > 0) EXPECT_GE(inputs[i].per_target[0], inputs[i - 1].per_target[0]);
+    if (i > 0) {
+      EXPECT_GE(inputs[i].per_target[0], inputs[i - 1].per_target[0]);
+    }
     if (inputs[i].wave.shape == WaveShape::kChirp) chirps[inputs[i].amplitude] = inputs[i].per_target[0];
   }
   ASSERT_EQ(chirps.size(), 2u);

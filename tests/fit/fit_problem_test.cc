@@ -295,11 +295,11 @@ TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
   to.y[0] += 0.3;
   probe.y[0] += 0.03;
   Residuals residuals = problem.Evaluate(probe, Keep::kResiduals).residuals;
-  EXPECT_LT(Bend(problem, at, snapshot, from, to, 0.1, residuals).gradient.norm(), 1e-6 * at.gradient.norm());
+  EXPECT_LT(Bend(problem, at, snapshot, from, to, {0.1, residuals}).gradient.norm(), 1e-6 * at.gradient.norm());
   // Residuals that are off by share^2 times their Jacobian's first column are what a bend of the unit vector's size
   // makes.
   for (std::size_t w = 0; w < residuals.size(); ++w) residuals[w] += 0.01 * snapshot.jacobians[w].col(0);
-  const Linearization bent = Bend(problem, at, snapshot, from, to, 0.1, residuals);
+  const Linearization bent = Bend(problem, at, snapshot, from, to, {0.1, residuals});
   Eigen::MatrixXd hessian = at.hessian;
   hessian.diagonal() -= problem.prior().weight;
   EXPECT_LT((bent.gradient - hessian.col(0)).norm(), 1e-5 * hessian.col(0).norm());

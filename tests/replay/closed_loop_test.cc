@@ -278,7 +278,9 @@ TEST_F(ClosedLoopTest, CatchHasHysteresis) {
   for (const auto& [alpha, caught] : walk) {
     const double readings[] = {0, kPi - alpha}, sent = controller.value().Step(row++, readings);
     EXPECT_EQ(controller.value().caught(), caught) << alpha;
-    if (!caught) EXPECT_LE(std::abs(sent), 1) << alpha;
+    if (!caught) {
+      EXPECT_LE(std::abs(sent), 1) << alpha;
+    }
   }
 }
 

@@ -33,10 +33,11 @@ class JournalTest : public ::testing::Test {
 
   Result<TuneSummary> Run(const std::string& journal, bool resume, int jobs = 1, unsigned long seed = 0) {
     ThreadPool pool(jobs);
-    TuneOptions options{.free = {rig_.Index("cart.gain"), rig_.Index("cart.damping")},
-                        .starts = 2,
-                        .journal = journal,
-                        .resume = resume};
+    TuneOptions options;
+    options.free = {rig_.Index("cart.gain"), rig_.Index("cart.damping")};
+    options.starts = 2;
+    options.journal = journal;
+    options.resume = resume;
     options.solve.seed = seed;
     options.solve.max_iterations = 8;
     options.solve.optimizer = optimizer_;

@@ -46,11 +46,17 @@ inline std::string UnknownNumeric(const mjModel* m, int instance, const char* co
     std::string all;
     for (int k = 0; k < count; ++k) {
       known = known || key == keys[k];
-      all += (k ? ", " : "") + std::string(keys[k]);
+      if (k > 0) all += ", ";
+      all += keys[k];
     }
     if (!known) {
-      return "plugin instance '" + prefix.substr(0, prefix.size() - 1) + "': numeric '" + name +
-             "' sets no parameter; allowed keys: " + all + "; correct the key or rename the numeric";
+      return std::string("plugin instance '")
+          .append(prefix, 0, prefix.size() - 1)
+          .append("': numeric '")
+          .append(name)
+          .append("' sets no parameter; allowed keys: ")
+          .append(all)
+          .append("; correct the key or rename the numeric");
     }
   }
   return {};

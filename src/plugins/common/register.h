@@ -24,7 +24,7 @@ inline std::vector<const char*> AttributesOf(std::span<const ParameterSpec> spec
 
 template <class T>
 T* InstanceOf(const mjData* d, int instance) {
-  return reinterpret_cast<T*>(d->plugin_data[instance]);
+  return reinterpret_cast<T*>(d->plugin_data[instance]);  // NOLINT(performance-no-int-to-ptr): so MuJoCo keeps it
 }
 
 // A plugin whose instances are T: made by T::Create(m, instance) (null: `init` must fail, see refusal.h), with a state

@@ -115,7 +115,7 @@ class History {
   }
   void Write(double* row, double t, double q, double qdot, const double* ctrl) const {
     row[0] = t, row[1] = q, row[2] = qdot;
-    std::copy_n(ctrl, inputs_, row + kFixed);
+    if (ctrl) std::copy_n(ctrl, inputs_, row + kFixed);  // null: an encoder has no inputs
   }
   void Step() {
     state_[1] = state_[1] + 1 < capacity_ ? state_[1] + 1 : 0;

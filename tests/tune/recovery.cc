@@ -33,7 +33,7 @@ int main(int argc, char** argv) {
     for (int i = 3; i < argc; ++i) asked = asked || std::string(argv[i]) == c.rig;
     if (!asked) continue;
     const auto begin = std::chrono::steady_clock::now();
-    const Rig rig = LoadRig(c.rig);
+    const auto rig = LoadRig(c.rig);
     const auto& parameters = rig.model->parameters();
     std::vector<int> inside(parameters.size(), 0), known(parameters.size(), 0);
     std::vector<double> width(parameters.size(), 0);

@@ -207,9 +207,18 @@ int Simulator::StepToNext(const Recording& recording, std::size_t row) {
   for (int step = 0; step < steps; ++step) {
     if (command_delay_s_ != 0)
       SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
+    if (probe_.joint >= 0) ApplyProbe();
     mj_step(m, data_.get());
   }
   return steps;
+}
+
+void Simulator::ApplyProbe() {
+  const mjModel* m = mujoco_.get();
+  const int dof = m->jnt_dofadr[probe_.joint];
+  const double q = data_->qpos[m->jnt_qposadr[probe_.joint]], w = data_->qvel[dof];
+  data_->qfrc_applied[dof] =
+      probe_.amplitude_n_m * std::sin(probe_.per_rad * q + probe_.s_per_rad * w + probe_.phase_rad);
 }
 
 RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,

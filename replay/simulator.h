@@ -35,6 +35,13 @@ struct InitialState {
 // The model's initial pose, at rest.
 InitialState AtRest(const Model& model);
 
+// A smooth torque that no catalogue holds: amplitude sin(per_rad q + per_speed w + phase) on one joint, held over each
+// step. What a model may miss is judged beside such torques.
+struct ProbeTorque {
+  int joint = -1;  // hinge or slide; -1: none
+  double amplitude_n_m = 0, per_rad = 0, s_per_rad = 0, phase_rad = 0;
+};
+
 // Half width of the fit that gives the initial state from a log (see FitLocally).
 inline constexpr double kInitialFitHalfWidth_s = 0.02;
 
@@ -62,10 +69,12 @@ class Simulator {
   // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next
   // SetParameters.
   void set_shift_s(double shift) { shift_s_ = shift; }
+  void set_probe(const ProbeTorque& probe) { probe_ = probe; }
   const mjModel& mujoco_model() const { return *mujoco_; }
   mjData& data() { return *data_; }
 
  private:
+  void ApplyProbe();
   // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp.
   void Begin(const Recording& recording, Window window, const InitialState& start);
   // From a row's stamp to the next one's, under its commands. Returns the steps that it took.
@@ -89,6 +98,7 @@ class Simulator {
   ParameterWriter writer_;
   double max_step_s_;
   double shift_s_ = 0, command_delay_s_ = 0;
+  ProbeTorque probe_;
   bool reads_forces_ = false;
   bool remembers_ = false;  // has states beside position and speed
   std::vector<std::pair<double, double>>

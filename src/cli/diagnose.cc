@@ -17,7 +17,8 @@ struct DiagnoseFlags {
   CommonFlags common;
   ModelFlags model;
   std::vector<std::string> hold_out;
-  double budget_s = 60, window_s = 0;
+  SearchEffort effort = SearchEffort::kNormal;
+  double budget_s = 0, window_s = 0;
 };
 
 // `log_values`: of the first log, for the MJCF.
@@ -52,6 +53,7 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   const auto log_values = recordings.front().values;
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);
   DiagnoseOptions options{.budget_s = flags.budget_s,
+                          .effort = flags.effort,
                           .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s,
                           .seed = flags.common.seed};
   const bool live = !flags.common.quiet && isatty(2);
@@ -79,9 +81,14 @@ Command DiagnoseCommand() {
       {.flag = "--budget",
        .value = &flags->budget_s,
        .unit = "s",
-       .range = Above(0),
+       .range = Above(0, 0),
+       .unset = "no limit of time",
        .help = "Time; the best verdict so far when it is spent",
-       .more = "A diagnosis that ends by itself before that does not depend on it, nor on the machine"},
+       .more = "Without it the work is limited by --effort alone, and the verdict is the same on any machine"},
+      {.flag = "--effort",
+       .value = ChoiceOf(flags->effort),
+       .help = "How much work the search may take",
+       .more = "Work is counted in simulated steps: 0.3, 1 and 4 times 9000 replays of the training windows"},
       WindowOption(flags->window_s)};
   return {.name = "diagnose",
           .what = "Where the gap lies, which unmodelled effect causes it, how far it shrinks",

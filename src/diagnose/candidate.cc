@@ -4,22 +4,11 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
-#include "src/diagnose/rules.h"
-#include "src/diagnose/score_test.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
 
 namespace {
-
-bool LastEffectAtBound(const Workbench& bench, const Candidate& candidate) {
-  if (candidate.effects.empty()) return false;
-  const auto placed = PlacedParameters(candidate.effects.back(), *bench.rig, bench.scales);
-  return std::any_of(placed.begin(), placed.end(), [&](const PlacedParameter& p) {
-    const bool shape = p.trials.empty();  // what was not screened, the logs hardly know
-    return !shape && IsStretched(p, candidate.values[candidate.model->IndexOf(p.name)]);
-  });
-}
 
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known
 // beforehand.
@@ -72,6 +61,8 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
                              .give_up = std::move(give_up),
                              .deadline = bench.deadline};
   const SolveResult solved = Solve(*candidate->problem, start, options);
+  *bench.work += solved.work;
+  candidate->scored = false;
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
   candidate->converged = solved.termination == Termination::kConverged;
@@ -99,7 +90,9 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
                              .secant = false,
                              .deadline = bench.deadline};
   const SolveResult solved = Solve(*problem, start, options);
+  *bench.work += solved.work;
   if (!std::isfinite(solved.cost)) return;
+  candidate->scored = false;
   candidate->problem = std::move(problem);
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
@@ -119,27 +112,23 @@ std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& c
       std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
   *point = problem->Start();
   if (!std::isfinite(problem->Evaluate(*point, Keep::kCost).cost)) return nullptr;
-  *point =
-      Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01}).point;
+  const SolveResult solved =
+      Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01});
+  *bench.work += solved.work;
+  *point = solved.point;
   return problem;
 }
 
 }  // namespace
 
 void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
+  if (std::exchange(candidate->scored, true)) return;
   candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors = kInfinity;
-  candidate->at_bound = LastEffectAtBound(bench, *candidate);
-  candidate->held_out_blocks.clear();
-  candidate->train_blocks = BlockCosts(*candidate->problem, candidate->point);
   FitPoint point;
   const auto problem = OnHeldOut(bench, *candidate, bench.Options(*candidate->model, false), &point);
   if (!problem) return;
-  candidate->held_out_blocks = BlockCosts(*problem, point);
-  if (candidate->held_out_blocks.empty()) return;
-  candidate->held_out_cost = 0;
-  for (const double cost : candidate->held_out_blocks) candidate->held_out_cost += cost;
+  candidate->held_out_cost = problem->Evaluate(point, Keep::kCost).cost;
   const double rows = static_cast<double>(std::max<std::size_t>(1, problem->residuals()));
-  candidate->block_floor = 0.5 * rows / static_cast<double>(candidate->held_out_blocks.size());
   candidate->held_out_floors = std::sqrt(2 * candidate->held_out_cost / rows);
   candidate->held_out = problem->Predict(point);
   candidate->held_out_error = ReplayError(candidate->held_out);
@@ -153,6 +142,13 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   FitPoint point;
   const auto problem = OnHeldOut(bench, candidate, options, &point);
   return problem ? ReplayError(problem->Predict(point)) : kInfinity;
+}
+
+bool IsStretched(const PlacedParameter& p, double value) {
+  constexpr double kEdge = 1e-3;  // of the range
+  const double at = p.low > 0 ? std::log(std::max(value, p.low) / p.low) / std::log(p.high / p.low)
+                              : (value - p.low) / (p.high - p.low);
+  return (at <= kEdge && p.neutral != p.low) || (at >= 1 - kEdge && p.neutral != p.high);
 }
 
 }  // namespace gapscope

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_CANDIDATE_H_
 #define GAPSCOPE_DIAGNOSE_CANDIDATE_H_
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,12 +19,9 @@ struct Candidate {
   FitPoint point;
   double train_cost = 0;
   bool converged = false;
-  bool at_bound = false;  // a parameter of its last effect ended on a bound that does not mean "no effect"
+  bool scored = false;
   std::vector<double> values;
   double shift_s = 0;
-  std::vector<double> train_blocks;     // cost per half second, of the training logs
-  std::vector<double> held_out_blocks;  // likewise held out; empty: cannot be simulated there
-  double block_floor = 1;               // what noise alone costs in such a block
   double held_out_cost = 0;
   double held_out_floors = 0;       // root mean square of residual over noise
   double held_out_error = 0;        // normalised: see ReplayError; in windows
@@ -31,6 +29,8 @@ struct Candidate {
   std::size_t parameters = 0;       // of the effects
   std::string Name() const;
 };
+
+using Say = std::function<void(const std::string&)>;
 
 // What all candidates share.
 struct Workbench {
@@ -44,10 +44,13 @@ struct Workbench {
   double sample_s = 0;  // of the logs as they are: what a delay must exceed
   std::size_t max_windows = 0;
   Deadline deadline;
+  std::shared_ptr<Work> work = std::make_shared<Work>();  // done so far
+  std::size_t most_steps = 0;                             // of the simulator; 0: no limit
   bool by_windows = false;  // train and held-out logs are the same: every third window is held out
 
   FitOptions Options(const Model& model, bool train) const;
-  bool Late() const { return deadline && std::chrono::steady_clock::now() >= *deadline; }
+  // The budget is spent: of work, or of time where one was asked for.
+  bool Late() const { return (most_steps > 0 && work->steps > most_steps) || IsLate(deadline); }
 };
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.
@@ -57,12 +60,16 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
                   GiveUp give_up = {});
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
 void PolishCandidate(const Workbench& bench, Candidate* candidate);
-// Fills the blocks and the held-out fields.
+// Fills the held-out fields, once.
 void ScoreCandidate(const Workbench& bench, Candidate* candidate);
 
 // Error on the held-out logs when each is one free run (see ReplayError), with zero offsets and the initial state
 // fitted; infinity where that diverges.
 double FreeRunError(const Workbench& bench, const Candidate& candidate);
+
+// Whether a parameter ended on a bound that does not mean "no effect": on a positive range of decades, in its
+// logarithm, as it is searched.
+bool IsStretched(const PlacedParameter& parameter, double value);
 
 }  // namespace gapscope
 

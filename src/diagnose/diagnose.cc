@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 
 #include "src/compare/noise.h"
@@ -10,8 +11,8 @@
 #include "src/diagnose/coarsen.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/explain.h"
-#include "src/diagnose/rules.h"
-#include "src/diagnose/verdict.h"
+#include "src/diagnose/judge.h"
+#include "src/diagnose/policy.h"
 
 namespace gapscope {
 namespace {
@@ -82,133 +83,131 @@ std::vector<ConditionShare> Locate(const Candidate& candidate, const std::vector
   return MostTelling(where, {.limit = 12});
 }
 
-// The accepted effects with their parameters, and what each takes of the gap: alone, and after the other one, averaged
-// (Shapley, 1953).
-Result<std::vector<FoundEffect>> DescribeEffects(const SearchResult& found, const Judgement& judgement,
-                                                 const ScaleTable& scales) {
-  std::vector<FoundEffect> effects;
-  const Candidate &chosen = *found.chosen, &base = *found.base;
-  if (&chosen == &base) return effects;
-  const Uncertainty uncertainty =
-      EstimateUncertainty(*chosen.problem, chosen.point,
-                          Linearize(*chosen.problem, chosen.point, {.columns = DifferenceOptions::Columns::kCentral}));
-  const auto alone = [&](const EffectUse& use) {
-    for (const auto& c : found.first.children) {
-      if (c->effects.front() == use && std::isfinite(c->held_out_error)) return c->held_out_error;
-    }
-    return base.held_out_error;
-  };
-  const auto probability = [&](const EffectUse& use) {
-    double p = 0;
-    for (std::size_t i = 0; i < judgement.explanations.size(); ++i) {
-      const auto& effect = judgement.explanations[i]->effects;
-      if (!effect.empty() && effect.front() == use) p = judgement.probabilities[i];
-    }
-    return std::max(p, chosen.effects.size() == 2 ? judgement.probability : 0.0);
-  };
-  const double gap = base.held_out_error - chosen.held_out_error;
-  for (std::size_t e = 0; e < chosen.effects.size(); ++e) {
-    const EffectUse& use = chosen.effects[e];
-    const Effect& entry = EffectOf(use, *chosen.model->rig());
-    FoundEffect effect{.use = use,
-                       .meaning = entry.meaning,
-                       .signature = entry.signature,
-                       .probability = probability(use),
-                       .error_before = base.held_out_error,
-                       .error_after = chosen.held_out_error,
-                       .share_of_gap = 1};
-    for (const auto& p : PlacedParameters(use, *chosen.model->rig(), scales)) {
+// Sizes of a candidate's effects with their intervals.
+std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate) {
+  std::map<EffectUse, std::vector<EffectEstimate>> sizes;
+  if (candidate.effects.empty()) return sizes;
+  const Linearization at =
+      Linearize(*candidate.problem, candidate.point, {.columns = DifferenceOptions::Columns::kCentral});
+  const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at);
+  for (const EffectUse& use : candidate.effects) {
+    for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {
       for (const auto& tuned : uncertainty.tuned) {
-        if (chosen.model->parameters()[tuned.index].name == p.name)
-          effect.parameters.push_back({p.key, p.unit, tuned.value, tuned.low, tuned.high});
+        if (candidate.model->parameters()[tuned.index].name == p.name)
+          sizes[use].push_back({p.key, p.unit, tuned.value, tuned.low, tuned.high});
       }
     }
-    if (chosen.effects.size() == 2 && gap > 0) {
-      effect.error_before = alone(chosen.effects[1 - e]);
-      effect.share_of_gap =
-          0.5 * ((base.held_out_error - alone(use)) + (effect.error_before - chosen.held_out_error)) / gap;
-    }
-    effects.push_back(std::move(effect));
+  }
+  return sizes;
+}
+
+// What each effect takes of the gap: averaged over taking it out of the whole and adding it to nothing (of two effects
+// Shapley's value, 1953). Errors of sets by held-out logs.
+double ShareOf(const Workbench& bench, const SearchResult& found, const Candidate& final, const EffectUse& use) {
+  const double gap = found.base->held_out_error - final.held_out_error;
+  if (!(gap > 0)) return 0;
+  const auto error = [&](const EffectSet& set, double otherwise) {
+    Candidate* candidate = found.ledger.Find(set);
+    if (!candidate) return otherwise;
+    ScoreCandidate(bench, candidate);
+    return candidate->held_out_error;
+  };
+  const double alone = error({use}, kNaN), without = error(Without(final.effects, use), kNaN);
+  const double first = found.base->held_out_error - alone, last = without - final.held_out_error;
+  if (std::isfinite(first) && std::isfinite(last)) return std::clamp(0.5 * (first + last) / gap, 0.0, 1.0);
+  return std::clamp((std::isfinite(last) ? last : gap) / gap, 0.0, 1.0);
+}
+
+// The effects that are there, the largest share first.
+std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& found, const Candidate& final,
+                                         std::vector<Statement>* statements) {
+  std::vector<FoundEffect> effects;
+  const auto sizes = EstimateSizes(bench, final);
+  for (Statement& s : *statements) {
+    const auto place = sizes.find(s.use);
+    if (place == sizes.end()) continue;
+    s.parameters = place->second;
+    s.share_of_gap = ShareOf(bench, found, final, s.use);
+    const Effect& entry = EffectOf(s.use, *bench.rig);
+    effects.push_back({.use = s.use,
+                       .meaning = entry.meaning,
+                       .signature = entry.signature,
+                       .probability = s.probability,
+                       .parameters = s.parameters,
+                       .error_before = found.base->held_out_error,
+                       .error_after = final.held_out_error,
+                       .share_of_gap = s.share_of_gap});
+  }
+  std::stable_sort(effects.begin(), effects.end(),
+                   [](const auto& a, const auto& b) { return a.share_of_gap > b.share_of_gap; });
+  // What stands before each: the base model with the effects that are listed earlier.
+  EffectSet before;
+  for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
+    before = With(before, effects[i].use);
+    Candidate* part = found.ledger.Find(before);
+    if (!part) part = found.ledger.Refit(before, final, {}, {}, Effort::kTry);
+    if (!part) continue;
+    ScoreCandidate(bench, part);
+    effects[i + 1].error_before = part->held_out_error;
   }
   return effects;
 }
 
-Explanation ExplanationOf(const Candidate& c) {
-  return c.effects.empty() ? Explanation{} : Explanation(c.effects.front());
-}
-
-// Every effect that was tried, and why it was or was not accepted.
-std::vector<CandidateReport> DescribeCandidates(const SearchResult& found, const Judgement& judgement) {
+// The base model and every single effect, those that were refitted with what they cost.
+std::vector<CandidateReport> DescribeCandidates(const Workbench& bench, const SearchResult& found,
+                                                const Judgement& judgement) {
   std::vector<CandidateReport> reports;
-  std::set<EffectUse> named;
-  for (std::size_t i = 0; i < judgement.explanations.size(); ++i) {
-    const Candidate& c = *judgement.explanations[i];
-    CandidateReport report{.effect = ExplanationOf(c),
-                           .probability = judgement.probabilities[i],
-                           .held_out_error = c.held_out_error,
-                           .refitted = true,
-                           .converged = c.converged,
-                           .bic = Bic(c),
-                           .reason = Reason(c, found)};
-    for (const auto& s : found.first.screen) {
-      if (!c.effects.empty() && s.use == c.effects.front())
-        report.screen_drop = s.trial.drop, report.absorbed = s.trial.absorbed;
-    }
-    if (report.effect) named.insert(*report.effect);
-    reports.push_back(std::move(report));
-  }
-  for (const auto& s : found.first.screen) {
-    if (named.contains(s.use)) continue;
-    reports.push_back(
-        {.effect = s.use,
-         .held_out_error = kNaN,
-         .screen_drop = s.trial.drop,
-         .absorbed = s.trial.absorbed,
-         .reason = !s.left_out.empty() ? s.left_out
-                   : !s.trial.visible
-                       ? "cannot be seen in these logs: the base model's parameters imitate it fully"
-                       : fmt::format("the score test promises {:.2g} % of the error at most, less than the leaders",
-                                     100 * s.trial.drop)});
-  }
-  std::stable_sort(reports.begin(), reports.end(),
-                   [](const auto& a, const auto& b) { return a.probability > b.probability; });
-  return reports;
-}
-
-// Every second effect that was tried beside the first one.
-std::vector<CandidateReport> DescribeSeconds(const SearchResult& found) {
-  std::vector<CandidateReport> reports;
-  for (const auto& s : found.second.screen) {
-    CandidateReport report{.effect = s.use,
-                           .held_out_error = kNaN,
-                           .screen_drop = s.trial.drop,
-                           .absorbed = s.trial.absorbed,
-                           .reason = s.left_out};
-    for (const auto& c : found.second.children) {
-      if (c->effects.back() != s.use) continue;
-      const Evidence more = Compare(*found.second_parent, *c);
-      report.held_out_error = c->held_out_error;
+  const auto report_of = [&](const Explanation& effect, Candidate* fitted) {
+    CandidateReport report{.effect = effect, .held_out_error = kNaN};
+    if (fitted) {
+      ScoreCandidate(bench, fitted);
+      report.held_out_error = fitted->held_out_error;
       report.refitted = true;
-      report.converged = c->converged;
-      report.bic = Bic(*c);
-      report.reason =
-          fmt::format("removes {:.1f} % of what {} leaves ({:.1f} standard errors); {:.1f} times the noise is left",
-                      100 * more.held_out, found.second_parent->Name(), more.z, c->held_out_floors);
+      report.converged = fitted->converged;
+      report.bic = Bic(*fitted);
+      report.reason = fmt::format("alone it leaves {:.1f} times the noise", fitted->held_out_floors);
     }
+    return report;
+  };
+  double total = 0;
+  for (const Statement& s : judgement.statements) {
+    CandidateReport report = report_of(s.use, found.ledger.Find({s.use}));
+    report.probability = s.probability;
+    for (std::size_t t = 0; t < found.columns.trials.size(); ++t) {
+      if (found.columns.trials[t].use == s.use)
+        report.promise = std::max(report.promise, 1 - SetCost(found.columns, {t}) / found.columns.cost);
+    }
+    report.reason = report.reason.empty() ? s.rule : s.rule + "; " + report.reason;
+    total += s.probability;
     reports.push_back(std::move(report));
   }
+  double none = 1;
+  for (const auto& report : reports) none *= 1 - report.probability;
+  // Over single explanations, adding up to one.
+  reports.insert(reports.begin(), report_of({}, found.base));
+  reports.front().probability = none;
+  for (auto& report : reports) {
+    if (report.effect) report.probability *= total > 0 ? (1 - none) / total : 0;
+  }
+  std::stable_sort(reports.begin(), reports.end(), [](const auto& a, const auto& b) {
+    return a.probability != b.probability ? a.probability > b.probability : a.promise > b.promise;
+  });
   return reports;
 }
 
-// The experiment that tells the leader from its nearest rival.
-void SuggestNext(const SearchResult& found, const std::string& experiment, Diagnosis* result) {
+// The experiment that tells the first of a group from the second, or the leader from its nearest rival.
+void SuggestNext(const SearchResult& found, const Judgement& judgement, const std::string& experiment,
+                 Diagnosis* result) {
   std::vector<Explanation> rivals;
-  if (found.single != found.base.get()) rivals.push_back(ExplanationOf(*found.single));
-  for (const auto& child : found.first.children) {
-    if (rivals.size() < 2 && child.get() != found.single && !Contains(*child, *found.single) &&
-        !Contains(*found.single, *child))
-      rivals.push_back(ExplanationOf(*child));
+  for (const auto& group : result->ambiguous) {
+    if (rivals.empty() && group.size() > 1) rivals = {group[0], group[1]};
   }
+  if (rivals.empty()) {
+    for (const auto& member : found.members) {
+      if (rivals.empty() && !member.rivals.empty()) rivals = {member.use, member.rivals.front().use};
+    }
+  }
+  if (rivals.empty() && !judgement.statements.empty()) rivals = {judgement.statements.front().use};
   if (rivals.empty()) return;
   result->next_command = "gapscope design optimal " + experiment;
   for (const auto& rival : rivals) result->next_command += " --separate " + NameOf(rival);
@@ -216,11 +215,30 @@ void SuggestNext(const SearchResult& found, const std::string& experiment, Diagn
   result->next_separates = rivals;
 }
 
-Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, const std::vector<double>& noise,
-                           std::uint64_t seed) {
+// The set of the effects that are there, refitted to the end.
+Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement& judgement) {
+  EffectSet set;
+  for (const EffectUse& use : found.chosen->effects) {
+    if (std::any_of(judgement.statements.begin(), judgement.statements.end(),
+                    [&](const Statement& s) { return s.use == use && s.answer == Answer::kPresent; }))
+      set = With(set, use);
+  }
+  if (set.empty()) return found.base;
+  Candidate* final = found.ledger.Find(set);
+  if (!final || final != found.chosen) final = found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kFinish);
+  if (!final) return found.chosen;
+  PolishCandidate(bench, final);
+  ScoreCandidate(bench, final);
+  return final;
+}
+
+Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const std::vector<double>& noise,
+                           std::uint64_t seed, const Say& say) {
   Diagnosis result;
-  const Candidate &base = *found.base, &chosen = *found.chosen;
-  const Judgement judgement = Judge(found);
+  Judgement judgement = Judge(bench, found, say);
+  const Candidate& base = *found.base;
+  const Candidate& chosen = *FinalSet(bench, found, judgement);
+  judgement.evidence.floors_left = chosen.held_out_floors;
   result.verdict = judgement.verdict;
   result.probability = judgement.probability;
   result.evidence = judgement.evidence;
@@ -231,17 +249,26 @@ Result<Diagnosis> Describe(const SearchResult& found, const Workbench& bench, co
   result.closed = result.refit > result.floor
                       ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0)
                       : 0;
-  GS_ASSIGN(result.effects, DescribeEffects(found, judgement, bench.scales));
-  // Of what an `unknown` accepted too.
-  if (result.verdict == Verdict::kAmbiguous || result.verdict == Verdict::kUnknown) {
-    result.ambiguous = judgement.groups;
+  result.effects = DescribeEffects(bench, found, chosen, &judgement.statements);
+  for (const Statement& s : judgement.statements) {
+    if (s.group < 0 || s.answer != Answer::kPresent) continue;
+    const auto& group = judgement.groups[static_cast<std::size_t>(s.group)];
+    if (group.front() == s.use) result.ambiguous.push_back(group);
   }
-  result.candidates = DescribeCandidates(found, judgement);
-  result.seconds = DescribeSeconds(found);
-  SuggestNext(found, bench.rig->experiment().path, &result);
+  result.candidates = DescribeCandidates(bench, found, judgement);
+  result.statements = judgement.statements;
+  const double before = result.refit * result.refit;
+  if (before > 0) {
+    result.remainder.sensors = std::min(1.0, result.floor * result.floor / before);
+    result.remainder.explained = std::clamp(1 - result.final * result.final / before, 0.0, 1.0);
+    result.remainder.systematic = std::max(0.0, 1 - result.remainder.explained - result.remainder.sensors);
+  }
+  SuggestNext(found, judgement, bench.rig->experiment().path, &result);
   result.where = Locate(base, bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);
-  result.budget_spent = found.budget_spent;
+  result.cut = found.cut;
+  result.work = *bench.work;
+  result.most_steps = bench.most_steps;
   result.model = chosen.model;
   result.values = chosen.values;
   result.refit_model = base.model;
@@ -270,6 +297,45 @@ std::string VerdictName(Verdict verdict) {
   return "";
 }
 
+template <>
+std::span<const EnumName<SearchEffort>> EnumNames<SearchEffort>() {
+  static constexpr EnumName<SearchEffort> kNames[] = {
+      {SearchEffort::kQuick, "quick"}, {SearchEffort::kNormal, "normal"}, {SearchEffort::kThorough, "thorough"}};
+  return kNames;
+}
+
+std::string AnswerName(Answer answer) {
+  return answer == Answer::kPresent ? "present" : answer == Answer::kAbsent ? "absent" : "unseen";
+}
+
+namespace {
+
+// Every third window of each log held out: for logs of which only some show the gap.
+DataSplit InWindows(const DataSplit& data) {
+  DataSplit blocks;
+  for (const auto* part : {&data.train, &data.held_out})
+    blocks.train.insert(blocks.train.end(), part->begin(), part->end());
+  std::sort(blocks.train.begin(), blocks.train.end(),
+            [](const Recording& a, const Recording& b) { return a.log_path < b.log_path; });
+  blocks.held_out = blocks.train;
+  blocks.how = "every third window of each log: only some logs show the gap";
+  return blocks;
+}
+
+double ShareOfWork(SearchEffort effort) {
+  return effort == SearchEffort::kQuick ? 0.3 : effort == SearchEffort::kNormal ? 1 : 4;
+}
+
+// Steps of one replay of the training windows.
+std::size_t StepsOfReplay(const Workbench& bench) {
+  auto made = MakeCandidate(bench, {});
+  if (!made.ok()) return 0;
+  Candidate candidate = std::move(made).value();
+  return candidate.problem->Evaluate(candidate.problem->Start(), Keep::kCost).work.steps;
+}
+
+}  // namespace
+
 Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, const DiagnoseOptions& options,
                            ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
@@ -282,53 +348,46 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   GS_ASSIGN(const auto model, Model::Load(experiment));
   const ScaleTable scales = EstimateScales(*model, fine.train);
   const std::vector<double> noise = SignalNoise(experiment, fine);
-  Workbench bench{.rig = model->rig(),
-                  .data = data,
-                  .scales = scales,
-                  .pool = pool,
-                  .weights = {},
-                  .window_s = options.window_s,
-                  .max_windows = options.max_windows};
-  bench.sample_s = kInfinity;
-  for (const auto* part : {&fine.train, &fine.held_out}) {
-    for (const auto& recording : *part) bench.sample_s = std::min(bench.sample_s, recording.timeline.median_step_s);
-  }
-  for (std::size_t i = 0; i < noise.size(); ++i)
-    bench.weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
-  bench.time_step_s =
-      ChooseTimeStep(*model, data.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool).step_s;
-  if (options.budget_s > 0)
-    bench.deadline = begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
   const Say say = options.progress ? options.progress : [](const std::string&) {};
-  GS_ASSIGN(const SearchResult found, Search(bench, !data.asked, say));
-  Diagnosis result;
-  if (!data.asked && found.uneven) {
-    // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
-    DataSplit blocks;
-    for (const auto* part : {&data.train, &data.held_out})
-      blocks.train.insert(blocks.train.end(), part->begin(), part->end());
-    std::sort(blocks.train.begin(), blocks.train.end(),
-              [](const Recording& a, const Recording& b) { return a.log_path < b.log_path; });
-    blocks.held_out = blocks.train;
-    blocks.how = "every third window of each log: only some logs show the gap";
-    Workbench again{.rig = model->rig(),
-                    .data = blocks,
+  const auto make_bench = [&](const DataSplit& part) {
+    Workbench bench{.rig = model->rig(),
+                    .data = part,
                     .scales = scales,
                     .pool = pool,
-                    .weights = bench.weights,
-                    .window_s = bench.window_s,
-                    .time_step_s = bench.time_step_s,
-                    .sample_s = bench.sample_s,
-                    .max_windows = bench.max_windows,
-                    .deadline = bench.deadline,
-                    .by_windows = true};
-    GS_ASSIGN(const SearchResult second, Search(again, false, say));
-    GS_ASSIGN(result, Describe(second, again, noise, options.seed));
+                    .weights = {},
+                    .window_s = options.window_s,
+                    .max_windows = options.max_windows};
+    bench.sample_s = kInfinity;
+    for (const auto* logs : {&fine.train, &fine.held_out}) {
+      for (const auto& recording : *logs) bench.sample_s = std::min(bench.sample_s, recording.timeline.median_step_s);
+    }
+    for (std::size_t i = 0; i < noise.size(); ++i)
+      bench.weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
+    bench.time_step_s =
+        ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
+            .step_s;
+    if (options.budget_s > 0)
+      bench.deadline = begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
+    bench.most_steps =
+        static_cast<std::size_t>(ShareOfWork(options.effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
+                                 static_cast<double>(StepsOfReplay(bench)));
+    return bench;
+  };
+  const Workbench bench = make_bench(data);
+  GS_ASSIGN(const auto found, Search(bench, !data.asked, say));
+  Diagnosis result;
+  if (!data.asked && found->uneven) {
+    // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
+    const DataSplit blocks = InWindows(data);
+    Workbench again = make_bench(blocks);
+    again.by_windows = true;
+    GS_ASSIGN(const auto second, Search(again, false, say));
+    GS_ASSIGN(result, Describe(*second, again, noise, options.seed, say));
     for (const auto& recording : blocks.train) result.train_logs.push_back(recording.log_path);
     result.held_out_logs = result.train_logs;
     result.split = blocks.how;
   } else {
-    GS_ASSIGN(result, Describe(found, bench, noise, options.seed));
+    GS_ASSIGN(result, Describe(*found, bench, noise, options.seed, say));
     for (const auto& recording : data.train) result.train_logs.push_back(recording.log_path);
     for (const auto& recording : data.held_out) result.held_out_logs.push_back(recording.log_path);
     result.split = data.how;

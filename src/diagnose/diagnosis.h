@@ -4,10 +4,12 @@
 #define GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "src/compare/conditions.h"
+#include "src/core/enum_names.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {
@@ -39,32 +41,57 @@ struct CandidateReport {
   Explanation effect;
   double probability = 0;     // over single explanations; adds up to one
   double held_out_error = 0;  // normalised; NaN: not refitted
-  double screen_drop = 0;     // share of the baseline's cost that the score test promises
-  double absorbed = 0;        // share of its trace that the baseline can imitate
+  double promise = 0;         // share of the refitted base model's cost that it takes away, by arithmetic
   bool refitted = false, converged = false;
   double bic = 0;      // lower is better
   std::string reason;  // why it was, or was not, accepted
 };
 
-// What the verdict and its probability rest on.
+enum class Answer { kPresent, kAbsent, kUnseen };
+std::string AnswerName(Answer answer);
+
+// The numbers that a statement rests on. Gains are ln(cost without / cost with).
+struct StatementNumbers {
+  double gain = 0;           // training logs, the set refitted without the effect
+  double gain_held_out = 0;  // the same two fits on logs that they did not see
+  double gain_free = 0;      // likewise, each log one free run; NaN: it tells nothing
+  double discrepancy = 0;    // gain in log marginal likelihood beside random torques
+  double mimicry = 1;        // share of random torques that the effect would hold as much of
+  bool smooth = false;       // a function of a joint's own motion: what roughness looks like
+};
+
+// What is said of one effect.
+struct Statement {
+  EffectUse use;
+  Answer answer = Answer::kAbsent;
+  double probability = 0;  // that it is there
+  std::vector<EffectEstimate> parameters;
+  double share_of_gap = 0;
+  int group = -1;  // statements of one group are told together
+  StatementNumbers numbers;
+  std::string rule;
+};
+
+// Shares of the refitted base model's squared misfit, held out.
+struct Remainder {
+  double explained = 0, systematic = 0, sensors = 0;
+};
+
+// What the verdict rests on as a whole.
 struct VerdictEvidence {
-  double floors_before = 0,
-         floors_left =
-             0;        // residual over the sensors' noise, root mean square, held out: refitted base model, final model
+  // Residual over the sensors' noise, root mean square, held out: refitted base model, final model.
+  double floors_before = 0, floors_left = 0;
   double removed = 0;  // share of what exceeds the noise that went away, in windows
-  double free_run_before = 0, free_run_left = 0,
-         free_run_removed =
-             0;  // normalised errors of one free run a log, and the share that went away; infinity, 0: it diverges
-  double gain_train = 0,
-         gain_held_out = 0;  // of the last effect (or the best one that was not accepted): shares of its parent's cost
-  double z = 0;              // over its standard error
-  double rival_lead = 0, rival_z = 0;  // lead over the nearest rival: share of that gain, standard errors
+  // Normalised errors of one free run a log, and the share that went away; infinity, 0: it diverges.
+  double free_run_before = 0, free_run_left = 0, free_run_removed = 0;
 };
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   double probability = 0;
   std::vector<FoundEffect> effects;
+  std::vector<Statement> statements;  // of every effect that was looked at, the surest first
+  Remainder remainder;
   std::vector<std::vector<EffectUse>> ambiguous;  // groups that these logs cannot tell apart
   // Held-out errors, normalised: see ReplayError; in windows.
   double nominal = 0, refit = 0, final = 0, floor = 0, closed = 0;
@@ -72,14 +99,14 @@ struct Diagnosis {
   std::vector<ConditionShare> where;    // the refitted base model's error, by condition
   std::vector<ConditionShare> remains;  // the final model's
   std::vector<CandidateReport> candidates;
-  std::vector<CandidateReport>
-      seconds;  // tried beside the first effect, the most promising by the score test first; without probabilities
   std::string next_command;
   std::vector<Explanation> next_separates;
   std::vector<std::string> train_logs, held_out_logs;
   std::string split, explanation;
   double wall_s = 0;
-  bool budget_spent = false;
+  Work work;                           // spent
+  std::size_t most_steps = 0;          // the budget, simulator steps
+  std::vector<std::string> cut;        // what the budget left out
   bool uneven = false;                 // train and held-out logs show the gap very differently
   std::shared_ptr<const Model> model;  // with the effects found
   std::vector<double> values;
@@ -87,8 +114,14 @@ struct Diagnosis {
   std::vector<double> refit_values;
 };
 
+// How much work the search may take: SearchPolicy::replays times 0.3, 1, 4.
+enum class SearchEffort { kQuick, kNormal, kThorough };
+template <>
+std::span<const EnumName<SearchEffort>> EnumNames<SearchEffort>();
+
 struct DiagnoseOptions {
-  double budget_s = 60;
+  double budget_s = 0;  // 0: no limit of time
+  SearchEffort effort = SearchEffort::kNormal;
   double window_s = 1.0;
   double sample_s = 0.004;  // logs are searched on stamps at least this far apart
   unsigned long seed = 0;

@@ -5,40 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/diagnose/rules.h"
-
 namespace gapscope {
-
-std::string Reason(const Candidate& candidate, const SearchResult& found) {
-  const Candidate &base = *found.base, &chosen = *found.chosen;
-  if (&candidate == &base) {
-    return &chosen == &base ? "no effect explains the logs better by more than chance"
-                            : fmt::format("{} removes {:.1f} % of its held-out cost", chosen.Name(),
-                                          100 * Compare(base, chosen).held_out);
-  }
-  if (candidate.held_out_blocks.empty()) return "its fit cannot be simulated along the held-out logs";
-  const std::string converged = candidate.converged ? "" : " (fit not converged)";
-  const Evidence gain = Compare(base, candidate);
-  if (chosen.effects.size() == 2 && candidate.effects.front() == chosen.effects.back()) {
-    const Evidence more = Compare(*found.single, chosen);
-    return fmt::format("accepted beside {}: removes {:.1f} % of what that leaves ({:.1f} standard errors)",
-                       found.single->Name(), 100 * more.held_out, more.z);
-  }
-  if (std::find(chosen.effects.begin(), chosen.effects.end(), candidate.effects.front()) != chosen.effects.end()) {
-    return fmt::format("accepted: removes {:.1f} % of the held-out cost ({:.1f} standard errors){}",
-                       100 * gain.held_out, gain.z, converged);
-  }
-  if (!Convincing(gain, FirstLimits(base))) {
-    const char* why =
-        Convincing(gain, kFirst) ? "too little where the base model is near the noise" : "not more than chance";
-    return fmt::format("removes {:.2f} % of the held-out cost ({:.1f} standard errors): {}{}", 100 * gain.held_out,
-                       gain.z, why, converged);
-  }
-  const Evidence behind = Compare(candidate, chosen);
-  return fmt::format(
-      "removes {:.1f} % of the held-out cost, but {} removes {:.1f} % of what it leaves ({:.1f} standard errors){}",
-      100 * gain.held_out, chosen.Name(), 100 * behind.held_out, behind.z, converged);
-}
 
 namespace {
 
@@ -98,7 +65,7 @@ std::string Explain(const Diagnosis& d) {
     text += fmt::format(" Over whole logs in one run the error goes from {:.3g} to {:.3g}.", e.free_run_before,
                         e.free_run_left);
   }
-  if (d.budget_spent) text += " The time budget ended the search early.";
+  if (!d.cut.empty()) text += " The budget ended the search early.";
   return text;
 }
 

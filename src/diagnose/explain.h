@@ -3,12 +3,9 @@
 #define GAPSCOPE_DIAGNOSE_EXPLAIN_H_
 
 #include "src/diagnose/diagnosis.h"
-#include "src/diagnose/search.h"
 
 namespace gapscope {
 
-// Why a candidate was, or was not, accepted.
-std::string Reason(const Candidate& candidate, const SearchResult& found);
 // The verdict in a paragraph. `floors_before`, `floors_left`: residual over noise of the refitted base model and of the
 // final one.
 std::string Explain(const Diagnosis& diagnosis);

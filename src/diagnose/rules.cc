@@ -42,96 +42,43 @@ bool IsFinding(const EffectUse& use, const Model& base) {
   return true;
 }
 
-bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
-  const bool of_signal = Of(a, model).place == EffectPlace::kSignal || Of(b, model).place == EffectPlace::kSignal;
-  if (!of_signal && JointOf(a.on, model) != JointOf(b.on, model)) return false;
-  for (const auto& [x, y] : {std::pair{&a, &b}, std::pair{&b, &a}}) {
-    for (const Effect& effect : Catalogue()) {
-      if (effect.name == x->effect &&
-          std::find(effect.partners.begin(), effect.partners.end(), y->effect) != effect.partners.end())
-        return true;
-    }
-  }
-  return false;
-}
-
-bool IsShape(const EffectUse& second, const EffectUse& first, const Model& model) {
-  return Of(first, model).character == EffectCharacter::kDryFriction &&
-         Of(second, model).character == EffectCharacter::kSecondMass;
-}
-
-bool Contains(const Candidate& richer, const Candidate& simpler, bool exactly) {
-  if (richer.effects.size() != simpler.effects.size()) return false;
-  const auto only_of = [](const Candidate& one, const Candidate& other) {
-    std::vector<EffectUse> own;
-    for (const auto& use : one.effects) {
-      if (std::find(other.effects.begin(), other.effects.end(), use) == other.effects.end()) own.push_back(use);
-    }
-    return own;
-  };
-  const auto of_richer = only_of(richer, simpler), of_simpler = only_of(simpler, richer);
-  if (of_richer.size() != 1 || of_simpler.size() != 1) return false;
-  const EffectUse &a = of_richer.front(), &b = of_simpler.front();
+bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig, bool exactly) {
   // On the same place: a motor's direction asymmetry is no joint's friction.
-  if (a.on != b.on) return false;
-  const std::vector<Contained>& contains = Of(a, *richer.model).contains;
+  if (richer.on != simpler.on) return false;
+  const std::vector<Contained>& contains = EffectOf(richer, rig).contains;
   return std::any_of(contains.begin(), contains.end(),
-                     [&](const Contained& c) { return b.effect == c.effect && (c.exactly || !exactly); });
+                     [&](const Contained& c) { return simpler.effect == c.effect && (c.exactly || !exactly); });
 }
 
-bool IsStretched(const PlacedParameter& p, double value) {
-  constexpr double kEdge = 1e-3;  // of the range
-  const double at = p.low > 0 ? std::log(std::max(value, p.low) / p.low) / std::log(p.high / p.low)
-                              : (value - p.low) / (p.high - p.low);
-  return (at <= kEdge && p.neutral != p.low) || (at >= 1 - kEdge && p.neutral != p.high);
+LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
+  const auto changes = [](const Recording::Command& command) {
+    return std::any_of(command.values.begin(), command.values.end(),
+                       [&](double value) { return value != command.values.front(); });
+  };
+  const auto of_force = [](const Recording::Measured& m) {
+    return TraitsOf(m.spec.kind).stage == SignalStage::kForces;
+  };
+  return {.one = std::all_of(recordings.begin(), recordings.end(),
+                             [&](const Recording& r) {
+                               return r.measured.size() == 1 &&
+                                      std::count_if(r.commands.begin(), r.commands.end(), changes) <= 1;
+                             }),
+          .torque = std::any_of(recordings.begin(), recordings.end(), [&](const Recording& r) {
+            return std::any_of(r.measured.begin(), r.measured.end(), of_force);
+          })};
 }
 
-namespace {
-
-std::size_t LateSensors(const Candidate& candidate) {
-  return static_cast<std::size_t>(
-      std::count_if(candidate.effects.begin(), candidate.effects.end(),
-                    [&](const EffectUse& use) { return Of(use, *candidate.model).place == EffectPlace::kSignal; }));
+bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, const LoggedSignals& logged) {
+  const Effect &x = Of(a, model), &y = Of(b, model);
+  if (logged.one && (x.same_on_one_signal == b.effect || y.same_on_one_signal == a.effect)) return true;
+  if (a.on != b.on || (x.same_but_constant != b.effect && y.same_but_constant != a.effect)) return false;
+  return model.rig()->HasSpring(a.on) || (!logged.torque && IsServoJoint(a.on, model));
 }
 
-}  // namespace
-
-bool MayBeRivals(const Candidate& a, const Candidate& b) {
-  // Two sensors late are one late command and what one of them is late beyond it: the same motion, told in a less
-  // likely way.
-  const bool same = a.effects.size() == 2 && b.effects.size() == 2 && LateSensors(a) + LateSensors(b) == 3;
-  return !same && !Contains(a, b, true) && !Contains(b, a, true) && !a.at_bound && !b.at_bound;
-}
-
-bool IsOneSignal(const std::vector<Recording>& recordings) {
-  return std::all_of(recordings.begin(), recordings.end(), [](const Recording& recording) {
-    const auto changing =
-        std::count_if(recording.commands.begin(), recording.commands.end(), [](const Recording::Command& command) {
-          return std::any_of(command.values.begin(), command.values.end(),
-                             [&](double value) { return value != command.values.front(); });
-        });
-    return recording.measured.size() == 1 && changing <= 1;
-  });
-}
-
-bool IsSameDelay(const EffectUse& a, const EffectUse& b, const Model& model) {
-  return Of(a, model).same_on_one_signal == b.effect || Of(b, model).same_on_one_signal == a.effect;
-}
-
-bool IsSameFriction(const EffectUse& a, const EffectUse& b, const Model& model) {
-  return a.on == b.on && (Of(a, model).same_but_constant == b.effect || Of(b, model).same_but_constant == a.effect);
-}
-
-bool IsLessLikely(const Candidate& a, const Candidate& b) {
-  if (LateSensors(a) == 2 && LateSensors(b) == 1 && b.effects.size() == 2 &&
-      IsSameDelay(b.effects.front(), b.effects.back(), *b.model))
-    return true;
-  if (a.effects.empty() || b.effects.size() != a.effects.size() ||
-      Of(a.effects.back(), *a.model).unlikely_beside != b.effects.back().effect ||
-      a.effects.back().on != b.effects.back().on)
-    return false;
-  const mjModel& m = a.model->compiled();
-  const int joint = mj_name2id(&m, mjOBJ_JOINT, a.effects.back().on.c_str());
+bool IsLessLikely(const EffectUse& a, const EffectUse& b, const Model& model) {
+  if (Of(a, model).unlikely_beside != b.effect || a.on != b.on) return false;
+  const mjModel& m = model.compiled();
+  const int joint = mj_name2id(&m, mjOBJ_JOINT, a.on.c_str());
   if (joint < 0) return false;
   const DataPtr data(mj_makeData(&m));
   mj_kinematics(&m, data.get());

@@ -2,249 +2,302 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <set>
 
-#include "src/diagnose/rules.h"
+#include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
 
 namespace gapscope {
-
 namespace {
 
-constexpr std::size_t kRefits = 5, kRefitsAtFloor = 2, kSecondRefits = 4,
-                      kExchangeRefits =
-                          2;  // leaders of the screen that are refitted, beside the partners of the first two
-constexpr double kFirstShare = 0.5,
-                 kSecondShare = 0.8;  // of the time left, for the refits of a first and of a second effect
-constexpr double
-    kFarOff = 20,
-    kFound = 0.4;  // floors of the base model, and share of the excess removed, below which shorter windows are tried
+constexpr const SearchPolicy& kPolicy = kDiagnosePolicy.search;
 
-// Far from the logs, 1 s is long enough for a prediction to lose the motion altogether, and no step leads back. What
-// windows of a third of it find is where the fits over whole windows start from.
-Status StartFromShortWindows(const Workbench& bench, const Say& say, SearchResult* result) {
-  constexpr double kShorter = 0.3, kShare = 0.6;
-  constexpr std::size_t kMost = 2;
-  say("searching in shorter windows");
-  Workbench near = Hurried(bench, kShare);
-  near.window_s = kShorter * bench.window_s;
-  GS_ASSIGN(Candidate base, MakeCandidate(near, {}));
-  FitCandidate(near, &base, base.problem->Start(), kFinalIterations, kFinalTolerance);
-  ScoreCandidate(near, &base);
-  Layer found;
-  Explore(near, base, base, kRefits, kShare, say, &found, nullptr);
-  auto& children = result->first.children;
-  for (std::size_t i = 0; i < std::min(kMost, found.children.size()) && !bench.Late(); ++i) {
-    const Candidate& start = *found.children[i];
-    auto child =
-        std::find_if(children.begin(), children.end(), [&](const auto& c) { return c->effects == start.effects; });
-    if (child == children.end()) {
-      GS_ASSIGN(Candidate made, MakeCandidate(bench, start.effects));
-      made.point = made.problem->Start();
-      made.train_cost = made.problem->Evaluate(made.point, Keep::kCost).cost;
-      child = children.insert(children.end(), std::make_unique<Candidate>(std::move(made)));
+double Gain(const Candidate& without, const Candidate& with) { return std::log(without.train_cost / with.train_cost); }
+
+// A set's cost with what each of its effects must gain.
+double Charged(const Candidate& candidate) {
+  return std::log(candidate.train_cost) + kPolicy.member * static_cast<double>(candidate.effects.size());
+}
+
+class Searcher {
+ public:
+  Searcher(const Workbench& bench, const Say& say, SearchResult* result) : bench_(bench), say_(say), result_(*result) {}
+
+  Status Fit() {
+    say_("refitting the baseline");
+    GS_ASSIGN(Candidate nominal, MakeCandidate(bench_, {}));
+    nominal.point = nominal.problem->Start();
+    nominal.train_cost = nominal.problem->Evaluate(nominal.point, Keep::kCost).cost;
+    if (!std::isfinite(nominal.train_cost)) {
+      return Error{.what = "the base model cannot be simulated along these logs, even in windows",
+                   .where = bench_.rig->experiment().path,
+                   .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
     }
-    StartFromValues(bench, start.values, child->get());
-    FitCandidate(bench, child->get(), (*child)->point, kFinalIterations, kFinalTolerance);
-    ScoreCandidate(bench, child->get());
+    nominal.values = nominal.model->Nominal();
+    ScoreCandidate(bench_, &nominal);
+    result_.nominal = std::make_unique<Candidate>(std::move(nominal));
+    result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kFinish);
+    ScoreCandidate(bench_, result_.base);
+    result_.chosen = result_.base;
+    for (const auto& use : AllUses(*bench_.rig)) {
+      if (IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
+    }
+    return Ok();
   }
-  SortByMisfit(*result->base, &children);
-  return Ok();
-}
 
-// A second effect worth naming: more than chance, more than a share of what the first left, and more than the first
-// one's own shape, which is never quite the real one: what is small and unlike effects explain equally well is that.
-bool IsSecond(const SearchResult& found, const Candidate& single, const Candidate& pair) {
-  const Evidence more = Compare(single, pair);
-  if (!Convincing(more, kSecond) || more.train < kSecondTrain) return false;
-  const bool shape = IsShape(pair.effects.back(), single.effects.back(), *single.model);
-  const double removed = RemovedExcess(single.held_out_floors, pair.held_out_floors),
-               typically = RemovedExcess(TypicalFloors(single), TypicalFloors(pair));
-  if (std::max(removed, typically) < kSecondExcess && (shape || !Convincing(more, kSureSecond))) return false;
-  const double size =
-      std::sqrt(std::max(0.0, std::pow(single.held_out_floors, 2) - std::pow(pair.held_out_floors, 2))) /
-      found.base->held_out_floors;
-  const bool told = std::none_of(found.second.children.begin(), found.second.children.end(), [&](const auto& rival) {
-    return rival.get() != &pair && !rival->held_out_blocks.empty() && !Contains(*rival, pair) &&
-           !Contains(pair, *rival) && !ArePartners(rival->effects.back(), pair.effects.back(), *single.model) &&
-           AreRivals(pair, *rival);
-  });
-  return size > (shape ? kShapeOfGap : told ? kSecondOfGap : kUntoldOfGap);
-}
+  void Find() {
+    say_("columns of all effects");
+    result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
+    if (!result_.columns.valid) return;
+    RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
+    Grow();
+    Lead();
+    for (int round = 0; round < 3; ++round) {
+      TakeOut();
+      if (!Exchange()) break;
+    }
+  }
 
-// The other way round: what goes best with the pair's second effect? The first one was chosen while the second was
-// missing, and may stand for another.
-void Exchange(const Workbench& bench, const Candidate& base, Candidate* second, const Say& say, SearchResult* result) {
-  say("looking for a better partner of " + second->Name());
-  result->exchange = {};
-  Layer& layer = result->exchange;
-  Explore(bench, base, *second, kExchangeRefits, kSecondShare, say, &layer, nullptr);
-  Candidate* other = Simplest(layer, *second, kSecond);
-  if (!other || other->effects.back() == result->single->effects.front()) return;
-  // A richer first effect did what the second one was missing for.
-  if (Contains(*result->chosen, *other) ? Pays(*result->chosen, *other, *second)
-                                        : LogMisfit(*other) > LogMisfit(*result->chosen))
-    return;
-  result->second_parent = result->single = second;
-  result->chosen = other;
-  result->second = std::move(layer);
-  layer = {};
-}
+ private:
+  bool Late(const char* what) {
+    if (!bench_.Late()) return false;
+    if (result_.cut.empty() || result_.cut.back() != what) result_.cut.emplace_back(what);
+    return true;
+  }
 
-// A second effect on the single one, if there is one worth naming. True when that one alone does as well: it then is
-// the single one, and a second is to be sought on it.
-Result<bool> SeekSecond(const Workbench& bench, const Candidate& base, const Say& say, SearchResult* result) {
-  say("looking for a second effect");
-  const bool first_time = result->second_parent == nullptr;
-  result->second = {};
-  result->exchange = {};
-  result->second_parent = result->single;
-  Explore(bench, base, *result->single, kSecondRefits, kSecondShare, say, &result->second, &result->first.children);
-  Candidate* pair = Simplest(result->second, *result->single, kSecond);
-  if (!pair || !IsSecond(*result, *result->single, *pair)) return false;
-  result->chosen = pair;
-  if (bench.Late()) return false;
-  // Backward: does the first one still matter?
-  GS_ASSIGN(Candidate other, MakeCandidate(bench, {pair->effects[1]}));
-  std::vector<double> values = other.model->Nominal();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (const int index = pair->model->IndexOf(other.model->parameters()[i].name); index >= 0)
-      values[i] = pair->values[index];
+  // Refits the best sets of each size on top of the parent, where arithmetic promises enough.
+  void RefitSets(const Candidate& parent, const ColumnTable& table, const std::vector<std::size_t>& counts) {
+    const auto levels = BeamSearch(table, counts.size(), kPolicy.beam);
+    double best = table.cost;
+    std::vector<Candidate*> tasted;
+    for (std::size_t size = 0; size < levels.size(); ++size) {
+      for (std::size_t i = 0; i < std::min(counts[size], levels[size].size()); ++i) {
+        const TrialSet& set = levels[size][i];
+        // More effects than the best smaller set must be worth it.
+        if (std::log(best / set.cost) < kPolicy.promise) break;
+        if (Late("sets of effects")) return;
+        if (Candidate* candidate = RefitTrials(parent, table, set)) tasted.push_back(candidate);
+      }
+      if (!levels[size].empty()) best = std::min(best, levels[size].front().cost);
+    }
+    GoOn(std::move(tasted), counts.size() > 2 ? kPolicy.go_on : 1);
   }
-  FitCandidate(bench, &other, CarryOver(*pair->problem, pair->point, *other.problem, values), kFinalIterations,
-               kFinalTolerance);
-  ScoreCandidate(bench, &other);
-  // In the place of an earlier fit of the same effect, if there is one.
-  auto& singles = result->first.children;
-  auto place = std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects == other.effects; });
-  if (place == singles.end()) place = singles.insert(singles.end(), nullptr);
-  *place = std::make_unique<Candidate>(std::move(other));
-  Candidate* alone = place->get();
-  if (!Convincing(Compare(*alone, *pair), kSecond)) {
-    result->single = result->chosen = alone;
-    return first_time;
-  }
-  if (!bench.Late()) Exchange(bench, base, alone, say, result);
-  return false;
-}
 
-// Second effects on the single one, and again where one of them took its place.
-Status SeekSeconds(const Workbench& bench, const Candidate& base, const Say& say, SearchResult* result) {
-  for (bool again = true; again && result->single->held_out_floors > kRemains && !bench.Late();) {
-    GS_ASSIGN(again, SeekSecond(bench, base, say, result));
+  // The cheapest of those that were begun.
+  void GoOn(std::vector<Candidate*> tasted, std::size_t most) {
+    std::stable_sort(tasted.begin(), tasted.end(),
+                     [](const auto* a, const auto* b) { return Charged(*a) < Charged(*b); });
+    if (tasted.size() > most) tasted.resize(most);
+    for (Candidate* candidate : tasted) {
+      if (Late("fits of sets")) return;
+      if (!candidate->converged) result_.ledger.Continue(candidate, Effort::kTry);
+    }
   }
-  return Ok();
-}
 
-// The two effects that fit the training logs best, far better than the base model does; one of several that contain
-// each other stands for all.
-std::vector<EffectUse> BestFitted(const Layer& layer, const Candidate& base) {
-  constexpr double kFarBetter = 0.7;
-  constexpr std::size_t kMost = 2;
-  std::vector<const Candidate*> order, best;
-  for (const auto& child : layer.children) {
-    if (child->train_cost < kFarBetter * base.train_cost && !child->held_out_blocks.empty())
-      order.push_back(child.get());
+  Candidate* RefitTrials(const Candidate& parent, const ColumnTable& table, const TrialSet& set) {
+    const BoundedSolution solution = SolveSet(table, set.trials);
+    EffectSet effects = parent.effects;
+    std::map<std::string, double> values;
+    for (const std::size_t t : set.trials) {
+      const Trial& trial = table.trials[t];
+      effects = With(effects, trial.use);
+      std::vector<double> coefficients;
+      for (const Eigen::Index c : trial.columns) coefficients.push_back(solution.values[c]);
+      const auto at = ValuesAt(bench_, trial, coefficients);
+      const auto placed = PlacedParameters(trial.use, *bench_.rig, bench_.scales);
+      for (std::size_t i = 0; i < placed.size(); ++i) values[placed[i].name] = at[i];
+    }
+    say_("refitting " + NameOfSet(effects));
+    return result_.ledger.Refit(effects, parent, values, solution.values.head(table.gram.parameters), Effort::kTaste);
   }
-  std::stable_sort(order.begin(), order.end(),
-                   [](const Candidate* a, const Candidate* b) { return a->train_cost < b->train_cost; });
-  for (const Candidate* c : order) {
-    if (best.size() < kMost && std::none_of(best.begin(), best.end(),
-                                            [&](const Candidate* b) { return Contains(*c, *b) || Contains(*b, *c); }))
-      best.push_back(c);
-  }
-  std::vector<EffectUse> uses;
-  for (const Candidate* c : best) uses.push_back(c->effects.front());
-  return uses;
-}
 
-// Where no effect is accepted alone two may be needed at once: each bends to do what the other one does, and fails
-// where it was not fitted.
-Status SeekTwoAtOnce(const Workbench& bench, Candidate& base, const Say& say, SearchResult* result) {
-  for (const EffectUse& use : BestFitted(result->first, base)) {
-    const auto& singles = result->first.children;
-    const auto first =
-        std::find_if(singles.begin(), singles.end(), [&](const auto& c) { return c->effects.front() == use; });
-    result->single = first->get();
-    GS_RETURN_IF_ERROR(SeekSeconds(bench, base, say, result));
-    const Candidate& found = *result->chosen;
-    if (Convincing(Compare(base, found), kFirst) &&
-        RemovedExcess(base.held_out_floors, found.held_out_floors) > kTwoAtOnce)
-      break;
-    result->single = result->chosen = &base;
-    result->second_parent = nullptr;
-    result->second = {};
-    result->exchange = {};
+  std::vector<Candidate*> Leaders() const {
+    std::vector<Candidate*> all = result_.ledger.All();
+    std::stable_sort(all.begin(), all.end(), [](const auto* a, const auto* b) { return Charged(*a) < Charged(*b); });
+    if (all.size() > kPolicy.leaders) all.resize(kPolicy.leaders);
+    return all;
   }
-  return Ok();
-}
+
+  bool AtNoise(const Candidate& candidate) const {
+    return 2 * candidate.train_cost < static_cast<double>(candidate.problem->residuals());
+  }
+
+  // Additions to the leaders, as long as one of them leads.
+  void Grow() {
+    std::set<EffectSet> grown = {{}};
+    for (std::size_t round = 0; round < kPolicy.most_effects; ++round) {
+      bool again = false;
+      std::vector<Candidate*> leaders = Leaders();
+      if (round > 0) leaders.resize(1);
+      for (Candidate* leader : leaders) {
+        if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) || !grown.insert(leader->effects).second)
+          continue;
+        if (Late("additions")) return;
+        say_("what could be added to " + NameOfSet(leader->effects));
+        ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
+        if (!table.valid) continue;
+        RefitSets(*leader, table, {kPolicy.additions, 1});
+        again = true;
+      }
+      if (!again) return;
+    }
+  }
+
+  // The cheapest set, its members charged.
+  void Lead() {
+    result_.chosen = Leaders().front();
+    result_.ledger.Continue(result_.chosen, Effort::kFinish);
+  }
+
+  // Each member's gain: the rest refitted from the leader's optimum, or an earlier fit that is better. Members that
+  // gain too little go.
+  void TakeOut() {
+    for (bool again = true; again;) {
+      again = false;
+      result_.members.clear();
+      for (const EffectUse& use : result_.chosen->effects) {
+        say_("taking out " + use.Text());
+        const EffectSet rest = Without(result_.chosen->effects, use);
+        // Known well enough, a look from the leader's optimum is all that it needs.
+        const Candidate* without = result_.ledger.Find(rest);
+        const bool known = without && without->converged;
+        if (!known || looked_.insert({result_.chosen->effects, use}).second)
+          without = result_.ledger.Refit(rest, *result_.chosen, {}, {}, known ? Effort::kTaste : Effort::kTry);
+        if (!without) without = result_.base;
+        result_.members.push_back({.use = use, .without = without, .gain = Gain(*without, *result_.chosen)});
+      }
+      const auto least = std::min_element(result_.members.begin(), result_.members.end(),
+                                          [](const Member& a, const Member& b) { return a.gain < b.gain; });
+      if (least == result_.members.end() || least->gain >= kPolicy.member) continue;
+      result_.chosen = result_.ledger.Find(Without(result_.chosen->effects, least->use));
+      again = true;
+    }
+  }
+
+  // What could stand in a member's place: what its columns hold of it, or what costs as little by arithmetic.
+  std::vector<EffectUse> Shortlist(const Member& member) const {
+    const ColumnTable& table = result_.columns;
+    std::vector<std::pair<double, EffectUse>> ranked;
+    for (const EffectUse& use : result_.uses) {
+      if (std::find(result_.chosen->effects.begin(), result_.chosen->effects.end(), use) !=
+          result_.chosen->effects.end())
+        continue;
+      const bool one = AreOneMotion(use, member.use, *result_.base->model, result_.logged) ||
+                       Contains(member.use, use, *bench_.rig) || Contains(use, member.use, *bench_.rig);
+      double most = one ? 1 : 0;
+      for (const Trial& own : table.trials) {
+        if (own.use != member.use) continue;
+        for (const Trial& by : table.trials) {
+          if (by.use == use) most = std::max(most, Imitated(table, own, by));
+        }
+      }
+      if (most >= kPolicy.imitates) ranked.emplace_back(-most, use);
+    }
+    std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::vector<EffectUse> uses;
+    for (const auto& [imitated, use] : ranked) {
+      if (uses.size() < kPolicy.rivals) uses.push_back(use);
+    }
+    return uses;
+  }
+
+  // Starts of a rival: its trial values by their cost where the leader stands.
+  Candidate* RefitRival(const Member& member, const EffectUse& use) {
+    const ColumnTable& table = result_.columns;
+    const EffectSet set = With(Without(result_.chosen->effects, member.use), use);
+    const auto placed = PlacedParameters(use, *bench_.rig, bench_.scales);
+    // The trial that does best beside the other members, by arithmetic at the base.
+    std::vector<std::size_t> others;
+    for (const EffectUse& other : result_.chosen->effects) {
+      if (other == member.use) continue;
+      std::size_t best = table.trials.size();
+      double least = kInfinity;
+      for (std::size_t t = 0; t < table.trials.size(); ++t) {
+        if (table.trials[t].use != other) continue;
+        std::vector<std::size_t> tried = others;
+        tried.push_back(t);
+        if (const double cost = SetCost(table, tried); cost < least) least = cost, best = t;
+      }
+      if (best < table.trials.size()) others.push_back(best);
+    }
+    TrialSet best{.cost = kInfinity};
+    for (std::size_t t = 0; t < table.trials.size(); ++t) {
+      if (table.trials[t].use != use) continue;
+      std::vector<std::size_t> tried = others;
+      tried.push_back(t);
+      if (const double cost = SetCost(table, tried); cost < best.cost) best = {.trials = tried, .cost = cost};
+    }
+    if (best.trials.empty()) return nullptr;
+    const Trial& trial = table.trials[best.trials.back()];
+    const BoundedSolution solution = SolveSet(table, best.trials);
+    std::vector<double> coefficients;
+    for (const Eigen::Index c : trial.columns) coefficients.push_back(solution.values[c]);
+    const auto at = ValuesAt(bench_, trial, coefficients);
+    std::map<std::string, double> values;
+    for (std::size_t i = 0; i < placed.size(); ++i) values[placed[i].name] = at[i];
+    Candidate* other = result_.ledger.Refit(set, *result_.chosen, values, {}, Effort::kTaste);
+    if (other && !other->converged && Gain(*result_.chosen, *other) > -kPolicy.hopeless)
+      result_.ledger.Continue(other, Effort::kTry);
+    return other;
+  }
+
+  // True: a rival took a member's place, and everything is asked again.
+  bool Exchange() {
+    for (Member& member : result_.members) {
+      member.rivals.clear();
+      for (const EffectUse& use : Shortlist(member)) {
+        if (Late("exchange")) return false;
+        say_("trying " + use.Text() + " for " + member.use.Text());
+        Candidate* other = RefitRival(member, use);
+        if (!other) continue;
+        const bool richer = Contains(use, member.use, *bench_.rig), simpler = Contains(member.use, use, *bench_.rig);
+        double ahead = Gain(*result_.chosen, *other);
+        if (ahead > 0.5 * kPolicy.exchange) {
+          result_.ledger.Continue(other, Effort::kFinish);
+          ahead = Gain(*result_.chosen, *other);
+        }
+        const double needed = richer ? kPolicy.simpler : simpler ? -kPolicy.simpler : kPolicy.exchange;
+        if (ahead > needed) {
+          result_.chosen = other;
+          result_.ledger.Continue(other, Effort::kFinish);
+          return true;
+        }
+        const bool same = Contains(use, member.use, *bench_.rig, true) || Contains(member.use, use, *bench_.rig, true);
+        if (!same) member.rivals.push_back({.use = use, .behind = -ahead});
+      }
+      std::stable_sort(member.rivals.begin(), member.rivals.end(),
+                       [](const Rival& a, const Rival& b) { return a.behind < b.behind; });
+    }
+    return false;
+  }
+
+  const Workbench& bench_;
+  const Say& say_;
+  SearchResult& result_;
+  std::set<std::pair<EffectSet, EffectUse>> looked_;  // members taken out from a leader's optimum
+};
 
 }  // namespace
 
-Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
-  SearchResult result;
-  result.one_signal = IsOneSignal(bench.data.train) && IsOneSignal(bench.data.held_out);
-  const auto& measured = bench.data.train.front().measured;
-  result.torque = std::any_of(measured.begin(), measured.end(),
-                              [](const auto& m) { return TraitsOf(m.spec.kind).stage == SignalStage::kForces; });
-  say("refitting the baseline");
-  GS_ASSIGN(Candidate nominal, MakeCandidate(bench, {}));
-  result.base = std::make_unique<Candidate>();
-  GS_ASSIGN(*result.base, MakeCandidate(bench, {}));
-  Candidate& base = *result.base;
-  const FitPoint start = base.problem->Start();
-  if (!std::isfinite(base.problem->Evaluate(start, Keep::kCost).cost)) {
-    return Error{.what = "the base model cannot be simulated along these logs, even in windows",
-                 .where = bench.rig->experiment().path,
-                 .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
-  }
-  nominal.point = start;
-  nominal.values = nominal.model->Nominal();
-  ScoreCandidate(bench, &nominal);
-  result.nominal = std::make_unique<Candidate>(std::move(nominal));
-  FitCandidate(bench, &base, start, kFinalIterations, kFinalTolerance);
-  ScoreCandidate(bench, &base);
-  result.single = result.chosen = &base;
-
-  const double train_floors =
-      std::sqrt(2 * base.train_cost / static_cast<double>(std::max<std::size_t>(1, base.problem->residuals())));
+Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
+  auto result = std::make_unique<SearchResult>(bench);
+  result->logged = WhatIsLogged(bench.data.train);
+  Searcher searcher(bench, say, result.get());
+  GS_RETURN_IF_ERROR(searcher.Fit());
+  const double train_floors = std::sqrt(
+      2 * result->base->train_cost / static_cast<double>(std::max<std::size_t>(1, result->base->problem->residuals())));
   constexpr double kUneven = 1.5;
-  result.uneven = std::max(train_floors / base.held_out_floors, base.held_out_floors / train_floors) > kUneven;
-  if (result.uneven && stop_if_uneven) return result;
-
-  say("screening");
-  // Where the base model is at the noise already, fewer refits show that nothing is missing.
-  Explore(bench, base, base, base.held_out_floors > kRemains ? kRefits : kRefitsAtFloor, kFirstShare, say,
-          &result.first, nullptr);
-  const auto& children = result.first.children;
-  if (base.held_out_floors > kFarOff &&
-      (children.empty() || RemovedExcess(base.held_out_floors, children.front()->held_out_floors) < kFound)) {
-    GS_RETURN_IF_ERROR(StartFromShortWindows(bench, say, &result));
-  }
-  Candidate* single = Simplest(result.first, base, FirstLimits(base));
-  if (!single || single->held_out_floors <= kRemains) {
-    // No second effect will be sought: the time is for rivals.
-    Refit(bench, base, say, &result.first);
-    FinishRivals(bench, base, &result.first);
-    SortByMisfit(base, &result.first.children);
-    single = Simplest(result.first, base, FirstLimits(base));
-  }
-  if (single && Convincing(Compare(base, *single), FirstLimits(base))) result.single = result.chosen = single;
-
-  if (result.single == single) {
-    GS_RETURN_IF_ERROR(SeekSeconds(bench, base, say, &result));
-  } else if (base.held_out_floors > kUnknownFloors) {
-    GS_RETURN_IF_ERROR(SeekTwoAtOnce(bench, base, say, &result));
-  }
-  // What the logs leave open goes to where the base model's nominal values pull it: undamped steps, as damping holds it
-  // where the search left it.
-  if (!bench.Late() && result.chosen != &base) {
-    PolishCandidate(bench, result.chosen);
-    ScoreCandidate(bench, result.chosen);
-  }
-  result.budget_spent = bench.Late();
-  result.free_run_before = FreeRunError(bench, base);
-  result.free_run_left = result.chosen == &base ? result.free_run_before : FreeRunError(bench, *result.chosen);
+  result->uneven =
+      std::max(train_floors / result->base->held_out_floors, result->base->held_out_floors / train_floors) > kUneven;
+  if (result->uneven && stop_if_uneven) return result;
+  searcher.Find();
   return result;
+}
+
+std::string NameOfSet(const EffectSet& set) {
+  std::string name;
+  for (const auto& use : set) name += (name.empty() ? "" : " + ") + use.Text();
+  return name.empty() ? "none" : name;
 }
 
 }  // namespace gapscope

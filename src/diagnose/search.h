@@ -1,31 +1,50 @@
-// The search for effects: refits the base model, screens all effects, refits the leaders, adds a second effect where
-// one is not enough.
+// The search for the effects that a model lacks: sets ordered by arithmetic on columns, the promising ones refitted,
+// members taken out and exchanged from the leader's optimum.
 #ifndef GAPSCOPE_DIAGNOSE_SEARCH_H_
 #define GAPSCOPE_DIAGNOSE_SEARCH_H_
 
-#include "src/diagnose/explore.h"
+#include <string>
+
+#include "src/diagnose/columns.h"
+#include "src/diagnose/ledger.h"
+#include "src/diagnose/rules.h"
 
 namespace gapscope {
 
+// Something that was tried in a member's place.
+struct Rival {
+  EffectUse use;
+  double behind = 0;  // ln(cost with it / cost of the set)
+};
+
+// What the search knows of an effect of the final set.
+struct Member {
+  EffectUse use;
+  const Candidate* without = nullptr;  // the best set without it
+  double gain = 0;                     // ln(cost without / cost of the set)
+  std::vector<Rival> rivals;           // the nearest first
+};
+
 struct SearchResult {
-  std::unique_ptr<Candidate> nominal, base;  // base: refitted
-  Layer first, second;                       // on top of the base; on top of `single`
-  Layer
-      exchange;  // of a pair: on top of its second effect alone, where another one in the first one's place was sought
-  Candidate* single = nullptr;                    // the accepted single effect, or the base
-  Candidate* chosen = nullptr;                    // single, or a pair
-  const Candidate* second_parent = nullptr;       // what `second` stands on; null where no second effect was sought
-  double free_run_before = 0, free_run_left = 0;  // see FreeRunError: of the base, of the chosen one
-  bool one_signal = false;                        // see IsOneSignal
-  bool torque = false;                            // a drive's torque is measured: a constant load on a servo shows
-  bool uneven =
-      false;  // train and held-out logs show the gap very differently; then nothing else was searched unless asked to
-  bool budget_spent = false;
+  explicit SearchResult(const Workbench& bench) : ledger(bench) {}
+  Ledger ledger;
+  std::unique_ptr<Candidate> nominal;  // as given, unfitted
+  Candidate* base = nullptr;           // refitted, without effects
+  Candidate* chosen = nullptr;         // the final set; the base where nothing was found
+  std::vector<Member> members;         // of it
+  ColumnTable columns;                 // at the base
+  std::vector<EffectUse> uses;         // all that were tried
+  LoggedSignals logged;
+  bool uneven = false;           // training and held-out logs show the gap very differently
+  std::vector<std::string> cut;  // what the budget left out
 };
 
 // `stop_if_uneven`: ends after the base model's refit when the split is a poor one. Errors: the base model cannot be
 // simulated along the logs.
-Result<SearchResult> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
+Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
+
+// Name of a set: "cable_spring@arm + coulomb_friction@arm"; "none".
+std::string NameOfSet(const EffectSet& set);
 
 }  // namespace gapscope
 

@@ -116,6 +116,7 @@ bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double
   const Recording& recording = recordings_[window.log];
   predicted.resize(window.rows.rows() * recording.measured.size());
   worker.simulator.set_shift_s(place.shift_s);
+  worker.simulator.set_probe(probe_);
   if (!worker.simulator.SetParameters(place.values, recording)) return false;
   PlaceStart(worker, place);
   const RunResult run = worker.simulator.Run(recording, window.rows, worker.start, predicted);

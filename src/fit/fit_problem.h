@@ -86,6 +86,9 @@ class FitProblem {
   // Predictions on all rows of the problem's windows, offsets added: one entry per recording.
   std::vector<LogReplay> Predict(const FitPoint& point);
 
+  // In all replays from now on.
+  void SetProbe(const ProbeTorque& probe) { probe_ = probe; }
+
   // By the residuals of a point whose states are solved: weighs the states by the sensors' noise (StatePriorsByNoise),
   // and sets Huber's threshold where the options ask for one.
   void WeighStates(const Residuals& residuals);
@@ -121,6 +124,7 @@ class FitProblem {
   std::vector<FitWindow> windows_;
   Huber huber_;
   Prior prior_;
+  ProbeTorque probe_;
   std::vector<std::unique_ptr<Worker>> workers_;
 };
 

@@ -87,10 +87,12 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
   if (!at.valid) return gram;
   std::vector<Residuals> others;
   for (const ExtraColumn& column : extra) {
+    column.child->SetProbe(column.probe);
     Evaluation there = column.child->Evaluate(CarryOver(parent, point, *column.child, column.values), Keep::kResiduals);
+    column.child->SetProbe({});
     gram.work += there.work;
-    if (!std::isfinite(there.cost)) return gram;
-    others.push_back(std::move(there.residuals));
+    gram.failed.push_back(!std::isfinite(there.cost));
+    others.push_back(gram.failed.back() ? at.residuals : std::move(there.residuals));
   }
   const std::size_t count = parent.windows().size();
   std::vector<std::vector<std::pair<RowBlock, Eigen::MatrixXd>>> parts(count);

@@ -29,15 +29,18 @@ struct GramSystem {
   Eigen::Index parameters = 0;       // y's part of them
   std::vector<GramBlock> blocks;     // in the order of logs and time
   std::vector<Eigen::MatrixXd> of_priors;  // per log: the rows of its states' priors
-  bool valid = false;                      // false: the point, or an extra column, cannot be simulated
+  std::vector<char> failed;                // per extra column: cannot be simulated, and is zero
+  bool valid = false;                      // false: the point cannot be simulated
   Work work;
 };
 
-// An effect at a trial value: residuals of `child`, at the parent's point carried over, less the parent's.
+// An effect at a trial value, or a torque that no effect makes: residuals of `child`, at the parent's point carried
+// over, less the parent's.
 struct ExtraColumn {
   std::string name;
   FitProblem* child = nullptr;  // of the same logs and windows, without parameters of its own that matter
   std::vector<double> values;   // of the child's model
+  ProbeTorque probe = {};
 };
 
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,

@@ -99,6 +99,7 @@ struct Effect {
   std::string signature;   // how it shows in a log
   std::string told_apart;  // what separates it from its partners
   std::vector<std::string> partners;
+  bool of_motion = false;  // a torque that only the joint's own angle and speed make: what roughness looks like
   EffectCharacter character = EffectCharacter::kOther;
   BaseTerm base_term = BaseTerm::kNone;
   int actuator_stage = 0;  // of a drive's own model (tune --actuator), in the order of its parameters; 0: none of it

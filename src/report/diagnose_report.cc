@@ -54,29 +54,59 @@ ordered_json Json(const VerdictEvidence& e) {
           {"removed", JsonNumber(e.removed)},
           {"free_run_before", JsonNumber(e.free_run_before)},
           {"free_run_left", JsonNumber(e.free_run_left)},
-          {"free_run_removed", JsonNumber(e.free_run_removed)},
-          {"gain_train", JsonNumber(e.gain_train)},
-          {"gain_held_out", JsonNumber(e.gain_held_out)},
-          {"standard_errors", JsonNumber(e.z)},
-          {"rival_lead", JsonNumber(e.rival_lead)},
-          {"rival_standard_errors", JsonNumber(e.rival_z)}};
+          {"free_run_removed", JsonNumber(e.free_run_removed)}};
 }
 
-// A first effect, or one that was tried beside it and has no probability of its own.
-enum class Rank { kFirst, kSecond };
-
-ordered_json Json(const CandidateReport& c, Rank rank) {
+ordered_json Json(const CandidateReport& c) {
   ordered_json entry = {{"name", c.effect ? c.effect->effect : "none"}};
   if (c.effect) entry["on"] = c.effect->on;
-  if (rank == Rank::kFirst) entry["probability"] = c.probability;
+  entry["probability"] = c.probability;
   entry["held_out_error"] = JsonNumber(c.held_out_error);
-  entry["screen_drop"] = c.screen_drop;
-  entry["absorbed"] = c.absorbed;
+  entry["promise"] = c.promise;
   entry["refitted"] = c.refitted;
   entry["converged"] = c.converged;
-  if (rank == Rank::kFirst) entry["bic"] = JsonNumber(c.bic);
+  entry["bic"] = JsonNumber(c.bic);
   entry["reason"] = c.reason;
   return entry;
+}
+
+ordered_json Json(const Statement& s) {
+  ordered_json parameters = ordered_json::object();
+  for (const auto& p : s.parameters)
+    parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
+  ordered_json entry = {{"name", s.use.effect},
+                        {"on", s.use.on},
+                        {"answer", AnswerName(s.answer)},
+                        {"probability", s.probability},
+                        {"parameters", parameters},
+                        {"share_of_gap", JsonNumber(s.share_of_gap)},
+                        {"group", s.group < 0 ? ordered_json() : ordered_json(s.group)},
+                        {"rule", s.rule}};
+  const StatementNumbers& n = s.numbers;
+  if (n.gain != 0)
+    entry["numbers"] = {{"gain", JsonNumber(n.gain)},
+                        {"gain_held_out", JsonNumber(n.gain_held_out)},
+                        {"gain_free", JsonNumber(n.gain_free)},
+                        {"discrepancy", JsonNumber(n.discrepancy)},
+                        {"mimicry", n.mimicry},
+                        {"smooth", n.smooth ? 1 : 0}};
+  return entry;
+}
+
+// What is there, what was considered and is not, and how many more.
+std::string StatementTable(const Diagnosis& d) {
+  std::string text = fmt::format("\n{:<34} {:<8} {:>11}  {}\n", "effect", "answer", "probability", "rests on");
+  std::size_t absent = 0, unseen = 0;
+  for (const auto& s : d.statements) {
+    const StatementNumbers& n = s.numbers;
+    if (n.gain == 0) {
+      ++(s.answer == Answer::kUnseen ? unseen : absent);
+      continue;
+    }
+    text += fmt::format("{:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", s.use.Text(),
+                        AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
+  }
+  return text + fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
 }
 
 }  // namespace
@@ -100,9 +130,13 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   json["where"] = JsonConditions(d.where);
   json["remains"] = JsonConditions(d.remains);
   json["candidates"] = ordered_json::array();
-  for (const auto& c : d.candidates) json["candidates"].push_back(Json(c, Rank::kFirst));
-  json["second_effects"] = ordered_json::array();
-  for (const auto& c : d.seconds) json["second_effects"].push_back(Json(c, Rank::kSecond));
+  for (const auto& c : d.candidates) json["candidates"].push_back(Json(c));
+  json["statements"] = ordered_json::array();
+  for (const auto& statement : d.statements) json["statements"].push_back(Json(statement));
+  json["remainder"] = {{"explained", JsonNumber(d.remainder.explained)},
+                       {"systematic", JsonNumber(d.remainder.systematic)},
+                       {"sensors", JsonNumber(d.remainder.sensors)},
+                       {"where", JsonConditions(d.remains)}};
   ordered_json separates = ordered_json::array();
   for (const auto& explanation : d.next_separates) separates.push_back(NameOf(explanation));
   json["next_experiment"] = {{"command", d.next_command}, {"separates", separates}};
@@ -111,7 +145,7 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   if (d.model) json["model"] = JsonModel(RunModelOf(*d.model, d.values));
   if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
   if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
-  json["budget_spent"] = d.budget_spent;
+  json["budget"] = {{"work", d.most_steps}, {"spent", d.work.steps}, {"unit", "steps"}, {"cut", d.cut}};
   json["seed"] = run.info.seed;
   json["versions"] = JsonVersions(run.info);
   return json;
@@ -137,14 +171,8 @@ std::string ToTable(const DiagnoseRun& run) {
   text += "\n" + Wrap(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);
-  text += fmt::format("\n{:<34} {:>11} {:>9}  {}\n", "candidate", "probability", "error", "why, or why not");
-  std::size_t shown = 0;
-  for (const auto& c : d.candidates) {
-    if (!c.refitted && ++shown > 4) continue;
-    text += fmt::format("{:<34} {:>11.3f} {:>9}  {}\n", NameOf(c.effect), c.probability,
-                        c.refitted ? fmt::format("{:.4g}", c.held_out_error) : "-", c.reason);
-  }
-  text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.budget_spent ? ", the whole budget" : "");
+  text += StatementTable(d);
+  text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.cut.empty() ? "" : ", the whole budget");
   return text;
 }
 

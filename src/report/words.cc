@@ -73,10 +73,20 @@ std::string TitleOf(const Diagnosis& d, const std::string& found) {
     case Verdict::kEffects:
       return "The model lacks " + found + ".";
     case Verdict::kAmbiguous: {
-      const auto told_as_one = [](const std::vector<EffectUse>& group) {
-        return Listed(Collect(group, [](const EffectUse& use) { return EffectTitle(use.effect); }), "or");
-      };
-      return "The model lacks " + Listed(Collect(d.ambiguous, told_as_one)) + ": these logs cannot tell which.";
+      std::vector<std::string> lacks;
+      for (const auto& effect : d.effects) {
+        const auto group = std::find_if(d.ambiguous.begin(), d.ambiguous.end(), [&](const auto& g) {
+          return std::find(g.begin(), g.end(), effect.use) != g.end();
+        });
+        if (group == d.ambiguous.end()) {
+          lacks.push_back(Words(effect.use));
+        } else if (group->front() == effect.use) {
+          std::vector<std::string> names;
+          for (const auto& use : *group) names.push_back(EffectTitle(use.effect));
+          lacks.push_back(Listed(names, "or"));
+        }
+      }
+      return "The model lacks " + Listed(lacks) + ": these logs cannot tell which.";
     }
     case Verdict::kUnknown:
       return d.effects.empty() ? "Something is missing that no known effect explains."

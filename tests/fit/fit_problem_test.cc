@@ -5,9 +5,10 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <numeric>
 #include <random>
 
-#include "src/diagnose/score_test.h"
+#include "src/fit/gram.h"
 #include "src/fit/optimizers.h"
 #include "src/fit/policy.h"
 #include "tests/tune/fixture.h"
@@ -374,9 +375,9 @@ TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   EXPECT_LT(CostOf(from_nothing, point), 1e-4 * before);
 }
 
-// A command later than one sample drives the nuisance shift onto its bound: the score test must still see what a delay
-// would explain.
-TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
+// A command later than one sample drives the nuisance shift onto its bound: a column must still tell what a delay would
+// explain.
+TEST(ExtraColumnTest, SeesADelayBeyondTheNuisanceShift) {
   const Rig truth = LoadRig("flexlink", {"command_delay@motor"}), rig = LoadRig("flexlink");
   const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
   const std::vector<Recording> logs = {
@@ -388,50 +389,23 @@ TEST(TestColumnTest, SeesADelayBeyondTheNuisanceShift) {
   FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
   const FitPoint point = Solve(parent, parent.Start(), {.tolerance = 1e-5}).point;
   EXPECT_NEAR(parent.Shift(point), 0.004, 1e-9);
-  const Snapshot base = Capture(parent, point, 0.01);
-  ASSERT_TRUE(base.valid);
   FitOptions of_child = options;
   of_child.free = {truth.Index("motor.torque_per_ampere"), truth.Index("hub.inertia"), truth.Index("link.stiffness"),
                    truth.Index("command_delay@motor.delay_s")};
   FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
   const auto drop = [&](double delay_s) {
-    return TestColumn(child, CarryOver(parent, point, child, truth.Values({{"command_delay@motor.delay_s", delay_s}})),
-                      parent, point, base)
-               .drop /
-           base.cost;
+    const ExtraColumn delay{
+        .name = "delay", .child = &child, .values = truth.Values({{"command_delay@motor.delay_s", delay_s}})};
+    const GramSystem gram = MakeGram(parent, point, {&delay, 1}, {.step = 0.01});
+    const Eigen::MatrixXd sum = Sum(gram);
+    const ColumnBounds bounds = BoundsAt(parent, point, gram, 2);
+    std::vector<Eigen::Index> all(static_cast<std::size_t>(gram.parameters) + 1);
+    std::iota(all.begin(), all.end(), 0);
+    const double without = SolveBounded(sum, std::span(all).first(all.size() - 1), bounds).cost;
+    return 1 - SolveBounded(sum, all, bounds).cost / without;
   };
   EXPECT_GT(drop(0.008), 0.3);
   EXPECT_LT(drop(0.001), 0.01);  // earlier than the shift already is
-}
-
-// Windows 0 and 2 of four: their costs add up, and they too ask for the column.
-TEST(TestColumnTest, FewWindowsAreTheirShareOfTheCost) {
-  const Rig truth = LoadRig("flexlink", {"coulomb_friction@hub"}), rig = LoadRig("flexlink");
-  const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
-  const std::vector<Recording> logs = {
-      MakeLog(truth, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}), command, 4, 0.004, 2e-4, 1)};
-  ThreadPool pool(2);
-  const FitOptions options{.free = {rig.Index("hub.inertia")}, .time_step_s = 0.004};
-  FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
-  ASSERT_EQ(parent.windows().size(), 4u);
-  const FitPoint start = parent.Start();  // where neither the states nor the parameters are pulled
-  const Snapshot first = Capture(parent, start, 0.01);
-  const std::vector<double> blocks = BlockCosts(parent, start);
-  ASSERT_EQ(blocks.size(), 8u);
-  EXPECT_NEAR(Thin(parent, first, start, 2).cost, blocks[0] + blocks[1] + blocks[4] + blocks[5], 1e-6 * first.cost);
-  EXPECT_DOUBLE_EQ(Thin(parent, first, start, 4).cost, first.cost);
-  const FitPoint point = Solve(parent, start, {.tolerance = 1e-5}).point;
-  const Snapshot base = Capture(parent, point, 0.01), thin = Thin(parent, base, point, 2);
-  ASSERT_TRUE(thin.valid);
-  FitOptions of_child = options;
-  of_child.free = {truth.Index("hub.inertia"), truth.Index("coulomb_friction@hub.friction_n_m")};
-  FitProblem child(*truth.model, logs, of_child, truth.model->Nominal(), pool);
-  const FitPoint at = CarryOver(parent, point, child, truth.Values({{"coulomb_friction@hub.friction_n_m", 0.01}}));
-  const ColumnTest of_all = TestColumn(child, at, parent, point, base),
-                   of_few = TestColumn(child, at, parent, point, thin);
-  ASSERT_TRUE(of_few.valid);
-  EXPECT_GT(of_few.drop, 0.3 * thin.cost);
-  EXPECT_LT(of_few.drop, of_all.drop);
 }
 
 }  // namespace

@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <random>
 
 #include "src/core/dense.h"
-#include "src/diagnose/score_test.h"
 #include "src/fit/blocks.h"
 #include "tests/tune/fixture.h"
 
@@ -87,33 +87,66 @@ TEST(GramTest, LogThatWeighsNothingIsNotThere) {
   EXPECT_EQ(gram.columns[0], "motor.kt");
 }
 
-TEST(GramTest, ExtraColumnSaysWhatTheScoreTestSays) {
+// Against the dense problem: the column, y and every state in one least-squares system, with the states' priors.
+TEST(GramTest, ExtraColumnDropsWhatTheDenseProblemDrops) {
   Bench bench;
   FitProblem parent(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
   const FitPoint point = Solve(parent, parent.Start(), {}).point;
   const auto values = bench.truth.Values({{"coulomb_friction@arm.friction_n_m", 3e-4}});
   FitProblem child(*bench.truth.model, bench.logs, bench.Options(bench.truth), values, bench.pool);
-  const FitPoint carried = CarryOver(parent, point, child, values);
-  const Snapshot base = Capture(parent, point, 0.01);
-  const ColumnTest test = TestColumn(child, carried, parent, point, base);
-  ASSERT_TRUE(test.valid && test.scale > 0 && test.scale < 2);
   const ExtraColumn friction{.name = "friction", .child = &child, .values = values};
   const GramSystem gram = MakeGram(parent, point, {&friction, 1}, {.step = 0.01});
   ASSERT_TRUE(gram.valid);
   const Eigen::MatrixXd sum = Sum(gram);
-  ColumnBounds bounds = BoundsAt(parent, point, gram, 2);
+  const ColumnBounds bounds = BoundsAt(parent, point, gram, 2);
   const Eigen::Index n = gram.parameters;
-  const BoundedSolution without = SolveBounded(sum, {}, bounds), with = SolveBounded(sum, First(n + 1), bounds);
-  // The score test keeps y where it is but for its answer: at the parent's optimum there is nothing else to gain.
-  EXPECT_NEAR(without.cost - with.cost, test.drop, 0.02 * test.drop);
-  EXPECT_NEAR(with.values[n], test.scale, 0.02 * test.scale);
-  // The score test counts what the states imitate too.
-  double raw = 0;
-  const Residuals moved = child.Evaluate(carried, Keep::kResiduals).residuals;
-  for (std::size_t w = 0; w < moved.size(); ++w) raw += (moved[w] - base.derivatives.residuals[w]).squaredNorm();
-  const double left = sum(n, n) * (1 - Absorbed(sum, First(n), bounds, n));
-  EXPECT_NEAR(1 - left / raw, test.absorbed, 0.02);
-  EXPECT_GE(gram.work.replays, 2u);
+  const BoundedSolution with = SolveBounded(sum, First(n + 1), bounds);
+  ASSERT_TRUE(with.at_bound.empty());
+  // Rows: all residuals, then the priors of states and of y.
+  const Derivatives at = parent.Differentiate(point, {.step = 0.01});
+  const Residuals moved = child.Evaluate(CarryOver(parent, point, child, values), Keep::kResiduals).residuals;
+  Eigen::Index rows = n, states = 0;
+  for (std::size_t w = 0; w < moved.size(); ++w) rows += moved[w].size() + point.states[w].size();
+  for (const auto& state : point.states) states += state.size();
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(rows, n + 1 + states);
+  Eigen::VectorXd b(rows);
+  Eigen::Index row = 0, column = n + 1;
+  for (std::size_t w = 0; w < moved.size(); ++w) {
+    const Eigen::Index k = moved[w].size(), m = point.states[w].size();
+    a.block(row, 0, k, n) = at.jacobians[w].leftCols(n);
+    a.block(row, n, k, 1) = moved[w] - at.residuals[w];
+    a.block(row, column, k, m) = at.jacobians[w].rightCols(m);
+    b.segment(row, k) = at.residuals[w];
+    a.block(row + k, column, m, m) = parent.windows()[w].prior.asDiagonal();
+    b.segment(row + k, m) = parent.windows()[w].prior.cwiseProduct(point.states[w]);
+    row += k + m, column += m;
+  }
+  a.block(row, 0, n, n) = bounds.prior_weight.cwiseSqrt().asDiagonal();
+  b.segment(row, n) = bounds.prior_weight.cwiseSqrt().cwiseProduct(bounds.prior_gone);
+  const Eigen::VectorXd x = SolveLu(a.transpose() * a, -a.transpose() * b);
+  EXPECT_NEAR(with.values[n], x[n], 1e-5 * std::abs(x[n]));
+  EXPECT_NEAR(with.cost, 0.5 * (a * x + b).squaredNorm(), 1e-6 * with.cost);
+}
+
+// A torque that is injected changes the motion as the same torque in the model does: a bias is its sine at a right
+// angle.
+TEST(GramTest, ProbeOfAConstantIsABias) {
+  Bench bench;
+  const Rig with = LoadRig("qube", {"torque_bias@arm"});
+  FitProblem parent(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  FitProblem child(*with.model, bench.logs, bench.Options(bench.rig), with.model->Nominal(), bench.pool);
+  constexpr double kBias_n_m = 2e-4;
+  const int joint = mj_name2id(&bench.rig.model->compiled(), mjOBJ_JOINT, "arm");
+  ASSERT_GE(joint, 0);
+  const Residuals plain = parent.Evaluate(parent.Start(), Keep::kResiduals).residuals;
+  parent.SetProbe({.joint = joint, .amplitude_n_m = kBias_n_m, .phase_rad = std::numbers::pi / 2});
+  const Residuals probed = parent.Evaluate(parent.Start(), Keep::kResiduals).residuals;
+  FitProblem biased(*with.model, bench.logs, bench.Options(bench.rig),
+                    with.Values({{"torque_bias@arm.torque_n_m", kBias_n_m}}), bench.pool);
+  const Residuals wanted = biased.Evaluate(biased.Start(), Keep::kResiduals).residuals;
+  for (std::size_t w = 0; w < wanted.size(); ++w) {
+    EXPECT_NEAR((probed[w] - wanted[w]).norm(), 0, 1e-3 * (wanted[w] - plain[w]).norm()) << w;
+  }
 }
 
 TEST(GramTest, BoundedStepOfALinearProblemIsItsSolution) {

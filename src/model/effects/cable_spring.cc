@@ -31,6 +31,7 @@ Effect Effect_cable_spring() {
       .signature = "linear in angle about a rest angle",
       .told_apart = "slow sweep of the range",
       .partners = {"gravity_offset", "torque_bias", "cogging"},
+      .of_motion = true,
       .base_term = BaseTerm::kSpring,
       .contains = {{.effect = "torque_bias", .exactly = false}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {

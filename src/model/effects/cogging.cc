@@ -41,6 +41,7 @@ Effect Effect_cogging() {
       .signature = "periodic in angle",
       .told_apart = "constant slow speed",
       .partners = {"cable_spring"},
+      .of_motion = true,
       .contains = {{.effect = "gravity_offset"}, {.effect = "cable_spring"}, {.effect = "torque_bias"}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cogging_n_m", names[0]));

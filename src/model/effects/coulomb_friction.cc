@@ -22,6 +22,7 @@ Effect Effect_coulomb_friction() {
       .signature = "sign of speed, amplitude-dependent",
       .told_apart = "slow triangle, coasting",
       .partners = {"dead_zone", "stribeck_friction", "load_friction"},
+      .of_motion = true,
       .character = EffectCharacter::kDryFriction,
       .base_term = BaseTerm::kDryFriction,
       .actuator_stage = 5,

@@ -30,6 +30,7 @@ Effect Effect_direction_friction() {
       .signature = "friction differs by direction",
       .told_apart = "both directions",
       .partners = {"torque_bias", "coulomb_friction"},
+      .of_motion = true,
       .character = EffectCharacter::kDryFriction,
       .contains = {{.effect = "coulomb_friction"}, {.effect = "torque_bias"}},
       .starts_from = {.effect = "coulomb_friction", .starts = {{{.of_simpler = 1}, {.of_simpler = 1}}}},

@@ -31,6 +31,7 @@ Effect Effect_gravity_offset() {
       .signature = "sine of the angle",
       .told_apart = "tilt the rig",
       .partners = {"cable_spring", "torque_bias"},
+      .of_motion = true,
       .contains = {{.effect = "torque_bias", .exactly = false}},
       .unlikely_beside = "cable_spring",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {

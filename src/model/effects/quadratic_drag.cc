@@ -21,6 +21,7 @@ Effect Effect_quadratic_drag() {
       .signature = "speed squared",
       .told_apart = "fast plateaus",
       .partners = {"torque_speed_curve"},
+      .of_motion = true,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "quadratic_n_m_s2_per_rad2", names[0]));
         return Ok();

@@ -21,6 +21,7 @@ Effect Effect_spring_hardening() {
       .signature = "frequency moves with amplitude",
       .told_apart = "two amplitudes",
       .partners = {"joint_compliance"},
+      .of_motion = true,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cubic_n_m_per_rad3", names[0]));
         return Ok();

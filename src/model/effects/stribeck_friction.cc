@@ -38,6 +38,7 @@ Effect Effect_stribeck_friction() {
       .signature = "hump at low speed, stick-slip",
       .told_apart = "creep",
       .partners = {"coulomb_friction"},
+      .of_motion = true,
       .character = EffectCharacter::kDryFriction,
       .contains = {{.effect = "coulomb_friction"}},
       // A hump over what slides.

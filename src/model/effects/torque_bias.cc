@@ -21,6 +21,7 @@ Effect Effect_torque_bias() {
       .signature = "constant",
       .told_apart = "both directions",
       .partners = {"cable_spring", "gravity_offset"},
+      .of_motion = true,
       .character = EffectCharacter::kConstantTorque,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "bias_n_m", names[0]));

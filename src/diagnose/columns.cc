@@ -1,0 +1,381 @@
+#include "src/diagnose/columns.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "src/core/dense.h"
+#include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
+
+namespace gapscope {
+namespace {
+
+constexpr double kMostSize = 2.5, kMostPart = 4;  // times the trial value
+
+// The two parameters that act linearly together, by their places in the list; -1: there are none.
+struct Pair {
+  int size = -1, other = -1;
+  Parameter::With with = Parameter::With::kNone;
+};
+
+Pair PairOf(const EffectUse& use, const Rig& rig) {
+  const Effect& effect = EffectOf(use, rig);
+  for (std::size_t i = 0; i < effect.parameters.size(); ++i) {
+    if (effect.parameters[i].with != Parameter::With::kNone)
+      return {.size = 0, .other = static_cast<int>(i), .with = effect.parameters[i].with};
+  }
+  return {};
+}
+
+// All combinations of trial values. The angle, or rest, of a pair has none: its columns span them.
+std::vector<std::vector<double>> Combinations(const std::vector<PlacedParameter>& placed, const Pair& pair) {
+  std::vector<std::vector<double>> all = {{}};
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const PlacedParameter& p = placed[i];
+    std::vector<double> values = p.trials.empty() ? std::vector<double>{p.start} : p.trials;
+    if (static_cast<int>(i) == pair.other) values = {0};
+    // A torque that acts linearly looks the same at every size, but where it changes the motion itself.
+    if (static_cast<int>(i) == pair.size && values.size() > 2) values = {values.front(), values.back()};
+    std::vector<std::vector<double>> next;
+    for (const auto& head : all) {
+      for (const double value : values) {
+        next.push_back(head);
+        next.back().push_back(value);
+      }
+    }
+    all = std::move(next);
+  }
+  std::erase_if(all, [&](const auto& values) {
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      if (!placed[i].trials.empty() && placed[i].role != ParameterRole::kPlace && values[i] != placed[i].neutral)
+        return false;
+    }
+    return true;
+  });
+  return all;
+}
+
+// Columns that wait for their gram.
+struct Wanted {
+  std::vector<Trial> trials;
+  std::vector<ExtraColumn> columns;
+  Eigen::Index first = 0;  // of the extra columns
+  Eigen::Index Add(std::string name, Candidate& child, const EffectUse& use, const Workbench& bench,
+                   const std::vector<double>& values) {
+    std::vector<double> all = child.model->Nominal();
+    const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+    for (std::size_t i = 0; i < placed.size(); ++i) all[child.model->IndexOf(placed[i].name)] = values[i];
+    columns.push_back({.name = std::move(name), .child = child.problem.get(), .values = std::move(all)});
+    return first + static_cast<Eigen::Index>(columns.size()) - 1;
+  }
+};
+
+// Trial values of an effect: all, or of very many those that did best at the base model.
+std::vector<std::vector<double>> TrialValues(const Workbench& bench, const EffectUse& use, const ColumnTable* scan) {
+  const SearchPolicy& policy = kDiagnosePolicy.search;
+  auto all = Combinations(PlacedParameters(use, *bench.rig, bench.scales), PairOf(use, *bench.rig));
+  if (!scan || all.size() <= policy.scan) return all;
+  std::vector<std::pair<double, std::vector<double>>> ranked;
+  for (std::size_t t = 0; t < scan->trials.size(); ++t) {
+    if (scan->trials[t].use == use) ranked.emplace_back(SetCost(*scan, {t}), scan->trials[t].values);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  all.clear();
+  for (auto& [cost, values] : ranked) {
+    if (all.size() < policy.scanned) all.push_back(std::move(values));
+  }
+  return all;
+}
+
+void AddTrials(const Workbench& bench, Candidate& child, const EffectUse& use, std::size_t effect,
+               const ColumnTable* scan, Wanted* wanted) {
+  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+  const Pair pair = PairOf(use, *bench.rig);
+  for (const auto& values : TrialValues(bench, use, scan)) {
+    Trial trial{.use = use, .effect = effect, .values = values};
+    trial.columns.push_back(wanted->Add(use.Text(), child, use, bench, values));
+    if (pair.other >= 0) {
+      const auto other = static_cast<std::size_t>(pair.other);
+      const bool angle = pair.with == Parameter::With::kAngle;
+      trial.form = angle ? Trial::Form::kAngle : Trial::Form::kRest;
+      std::vector<double> turned = values;
+      turned[other] =
+          angle ? std::numbers::pi / 2 : *std::max_element(placed[other].trials.begin(), placed[other].trials.end());
+      trial.columns.push_back(wanted->Add(use.Text(), child, use, bench, turned));
+    }
+    wanted->trials.push_back(std::move(trial));
+  }
+}
+
+// A size and its rest: the second column becomes that of the rest alone.
+void TakeRestApart(const ColumnTable& table, Eigen::MatrixXd* sum) {
+  for (const Trial& trial : table.trials) {
+    if (trial.form != Trial::Form::kRest) continue;
+    const Eigen::Index size = trial.columns[0], rest = trial.columns[1];
+    sum->col(rest) -= sum->col(size);
+    sum->row(rest) -= sum->row(size);
+  }
+}
+
+ColumnBounds BoundsOf(const ColumnTable& table, const FitProblem& problem, const FitPoint& point) {
+  ColumnBounds bounds = BoundsAt(problem, point, table.gram, kMostSize);
+  for (const Trial& trial : table.trials) {
+    for (std::size_t c = 0; c < trial.columns.size(); ++c) {
+      const bool both_signs = trial.form == Trial::Form::kAngle || (trial.form == Trial::Form::kRest && c == 1);
+      bounds.low[trial.columns[c]] = both_signs ? -kMostPart : 0;
+      bounds.high[trial.columns[c]] = both_signs ? kMostPart : kMostSize;
+    }
+  }
+  for (const Eigen::Index torque : table.torques) {
+    bounds.low[torque] = -1e6;
+    bounds.high[torque] = 1e6;
+  }
+  return bounds;
+}
+
+// y taken out of all other columns; coordinates on a bound stay there.
+Eigen::MatrixXd Reduce(const ColumnTable& table) {
+  const Eigen::Index n = table.gram.parameters, rest = table.sum.cols() - n;
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double room = std::min(-table.bounds.low[i], table.bounds.high[i]);
+    if (room > 1e-6 * (table.bounds.high[i] - table.bounds.low[i])) free.push_back(i);
+  }
+  const auto f = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd own(f, f), cross(f, rest);
+  for (Eigen::Index a = 0; a < f; ++a) {
+    const Eigen::Index i = free[static_cast<std::size_t>(a)];
+    for (Eigen::Index b = 0; b < f; ++b) own(a, b) = table.sum(i, free[static_cast<std::size_t>(b)]);
+    own(a, a) += table.bounds.prior_weight[i];
+    cross.row(a) = table.sum.row(i).tail(rest);
+    cross(a, rest - 1) += table.bounds.prior_weight[i] * table.bounds.prior_gone[i];
+  }
+  Eigen::MatrixXd reduced = table.sum.bottomRightCorner(rest, rest);
+  reduced(rest - 1, rest - 1) += table.bounds.prior_weight.cwiseProduct(table.bounds.prior_gone.cwiseAbs2()).sum();
+  if (f > 0) reduced -= cross.transpose() * Ldlt(own).Solve(cross);
+  return reduced;
+}
+
+ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, const std::vector<RandomTorque>& torques) {
+  ColumnTable table{.trials = std::move(wanted.trials)};
+  for (const RandomTorque& torque : torques) {
+    table.torques.push_back(wanted.first + static_cast<Eigen::Index>(wanted.columns.size()));
+    wanted.columns.push_back(
+        {.name = "torque", .child = parent.problem.get(), .values = parent.values, .probe = torque.probe});
+  }
+  table.gram = MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01});
+  *bench.work += table.gram.work;
+  if (!table.gram.valid) return table;
+  std::erase_if(table.trials, [&](const Trial& trial) {
+    return std::any_of(trial.columns.begin(), trial.columns.end(),
+                       [&](Eigen::Index c) { return table.gram.failed[static_cast<std::size_t>(c - wanted.first)]; });
+  });
+  table.sum = Sum(table.gram);
+  TakeRestApart(table, &table.sum);
+  table.bounds = BoundsOf(table, *parent.problem, parent.point);
+  table.reduced = Reduce(table);
+  table.cost = 0.5 * table.reduced(table.reduced.rows() - 1, table.reduced.cols() - 1);
+  table.valid = true;
+  return table;
+}
+
+Wanted WantedOf(const Candidate& parent) { return {.first = parent.problem->layout().low.size()}; }
+
+// Mean and deviation of a joint's angle and speed in the logs.
+struct JointMotion {
+  double angle = 0, angle_deviation = 0, speed = 0, speed_deviation = 0;
+};
+
+JointMotion MotionOf(const std::vector<Recording>& recordings, const std::string& joint) {
+  constexpr std::size_t kSamples = 400;
+  std::vector<double> angles, speeds;
+  for (const auto& recording : recordings) {
+    for (const auto& measured : recording.measured) {
+      if (!TraitsOf(measured.spec.kind).gives_angle || measured.spec.on != joint) continue;
+      for (std::size_t row = 0; row < recording.rows(); row += std::max<std::size_t>(1, recording.rows() / kSamples)) {
+        const auto fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
+        if (!std::isfinite(fit.value) || !std::isfinite(fit.slope)) continue;
+        angles.push_back(fit.value);
+        speeds.push_back(fit.slope);
+      }
+    }
+  }
+  const Moments angle = MomentsOf(angles), speed = MomentsOf(speeds);
+  return {angle.mean, angle.deviation, speed.mean, speed.deviation};
+}
+
+}  // namespace
+
+std::vector<RandomTorque> MakeTorques(const Workbench& bench) {
+  const EvidencePolicy& policy = kDiagnosePolicy.evidence;
+  std::vector<RandomTorque> torques;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> phase(0, 2 * std::numbers::pi);
+  const mjModel& m = bench.rig->compiled();
+  for (int joint = 0; joint < m.njnt; ++joint) {
+    const char* name = mj_id2name(&m, mjOBJ_JOINT, joint);
+    if (!name || !bench.scales.contains(name)) continue;
+    const JointMotion motion = MotionOf(bench.data.train, name);
+    if (!(motion.angle_deviation > 0) || !(motion.speed_deviation > 0)) continue;
+    for (std::size_t i = 0; i < policy.torques; ++i) {
+      const auto of = static_cast<RandomTorque::Of>(3 * i / policy.torques);
+      const double a = of == RandomTorque::Of::kSpeed ? 0 : policy.angle_waves * normal(random),
+                   b = of == RandomTorque::Of::kAngle ? 0 : policy.speed_waves * normal(random);
+      ProbeTorque probe{.joint = joint,
+                        .amplitude_n_m = policy.torque_share * bench.scales.at(name).torque_n_m,
+                        .per_rad = a / motion.angle_deviation,
+                        .s_per_rad = b / motion.speed_deviation,
+                        .phase_rad = phase(random)};
+      probe.phase_rad -= probe.per_rad * motion.angle + probe.s_per_rad * motion.speed;
+      torques.push_back({.of = of, .probe = probe});
+    }
+  }
+  return torques;
+}
+
+ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
+                        const std::vector<RandomTorque>& torques, const ColumnTable* scan) {
+  Wanted wanted = WantedOf(parent);
+  std::vector<std::unique_ptr<Candidate>> children;  // until the columns are made
+  for (std::size_t u = 0; u < uses.size(); ++u) {
+    if (std::find(parent.effects.begin(), parent.effects.end(), uses[u]) != parent.effects.end()) continue;
+    std::vector<EffectUse> effects = parent.effects;
+    effects.push_back(uses[u]);
+    auto made = MakeCandidate(bench, effects);
+    if (!made.ok()) continue;
+    children.push_back(std::make_unique<Candidate>(std::move(made).value()));
+    AddTrials(bench, *children.back(), uses[u], u, scan, &wanted);
+  }
+  return Finish(bench, parent, std::move(wanted), torques);
+}
+
+ColumnTable MakeColumnsOfFit(const Workbench& bench, Candidate& parent, Candidate& child,
+                             const std::vector<EffectUse>& uses, const std::vector<RandomTorque>& torques) {
+  Wanted wanted = WantedOf(parent);
+  Trial fitted{.use = uses.front()};
+  for (const EffectUse& use : uses) {
+    std::vector<double> values;
+    for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales))
+      values.push_back(child.values[child.model->IndexOf(p.name)]);
+    fitted.columns.push_back(wanted.Add(use.Text(), child, use, bench, values));
+  }
+  wanted.trials.push_back(std::move(fitted));
+  if (uses.size() == 1 && TrialValues(bench, uses.front(), nullptr).size() <= kDiagnosePolicy.search.scan)
+    AddTrials(bench, child, uses.front(), 0, nullptr, &wanted);
+  return Finish(bench, parent, std::move(wanted), torques);
+}
+
+std::vector<double> ValuesAt(const Workbench& bench, const Trial& trial, std::span<const double> c) {
+  constexpr double kLeastScale = 0.3, kMostScale = 2;
+  const auto placed = PlacedParameters(trial.use, *bench.rig, bench.scales);
+  std::vector<double> values = trial.values;
+  if (trial.form == Trial::Form::kSize) {
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      const PlacedParameter& p = placed[i];
+      if (p.trials.empty() || p.role == ParameterRole::kPlace || p.neutral == p.high) continue;
+      values[i] = p.neutral + std::clamp(c[0], kLeastScale, kMostScale) * (values[i] - p.neutral);
+    }
+  } else {
+    const auto other = static_cast<std::size_t>(PairOf(trial.use, *bench.rig).other);
+    if (trial.form == Trial::Form::kAngle) {
+      values[0] *= std::hypot(c[0], c[1]);
+      values[other] = std::atan2(c[1], c[0]);
+    } else {
+      const double unit = *std::max_element(placed[other].trials.begin(), placed[other].trials.end());
+      const double size = std::max(c[0], 0.02);
+      values[0] *= size;
+      values[other] = unit * c[1] / size;
+    }
+  }
+  for (std::size_t i = 0; i < placed.size(); ++i) values[i] = std::clamp(values[i], placed[i].low, placed[i].high);
+  return values;
+}
+
+namespace {
+
+// Indices of a set's columns in the reduced matrix.
+std::vector<Eigen::Index> ReducedColumns(const ColumnTable& table, const std::vector<std::size_t>& trials) {
+  std::vector<Eigen::Index> columns;
+  for (const std::size_t t : trials) {
+    for (const Eigen::Index c : table.trials[t].columns) columns.push_back(table.Reduced(c));
+  }
+  return columns;
+}
+
+ColumnBounds ReducedBounds(const ColumnTable& table) {
+  const Eigen::Index count = table.reduced.cols() - 1;
+  return {.low = table.bounds.low.tail(count),
+          .high = table.bounds.high.tail(count),
+          .prior_weight = Eigen::VectorXd::Zero(count),
+          .prior_gone = Eigen::VectorXd::Zero(count)};
+}
+
+}  // namespace
+
+double SetCost(const ColumnTable& table, const std::vector<std::size_t>& trials) {
+  return SolveBounded(table.reduced, ReducedColumns(table, trials), ReducedBounds(table)).cost;
+}
+
+std::vector<std::vector<TrialSet>> BeamSearch(const ColumnTable& table, std::size_t most, std::size_t width) {
+  std::vector<std::vector<TrialSet>> levels;
+  std::vector<TrialSet> heads = {{.trials = {}, .cost = table.cost}};
+  const ColumnBounds bounds = ReducedBounds(table);
+  for (std::size_t size = 1; size <= most; ++size) {
+    std::map<std::vector<std::size_t>, TrialSet> best;  // by the effects' numbers
+    for (const TrialSet& head : heads) {
+      for (std::size_t t = 0; t < table.trials.size(); ++t) {
+        std::vector<std::size_t> effects;
+        for (const std::size_t i : head.trials) effects.push_back(table.trials[i].effect);
+        if (std::find(effects.begin(), effects.end(), table.trials[t].effect) != effects.end()) continue;
+        effects.push_back(table.trials[t].effect);
+        std::sort(effects.begin(), effects.end());
+        TrialSet set{.trials = head.trials};
+        set.trials.push_back(t);
+        set.cost = SolveBounded(table.reduced, ReducedColumns(table, set.trials), bounds).cost;
+        const auto [place, fresh] = best.try_emplace(std::move(effects), set);
+        if (!fresh && set.cost < place->second.cost) place->second = std::move(set);
+      }
+    }
+    std::vector<TrialSet> level;
+    for (auto& [effects, set] : best) level.push_back(std::move(set));
+    std::stable_sort(level.begin(), level.end(), [](const auto& a, const auto& b) { return a.cost < b.cost; });
+    if (level.size() > width && size > 1) level.resize(width);
+    heads.assign(level.begin(), level.begin() + static_cast<long>(std::min(width, level.size())));
+    levels.push_back(std::move(level));
+  }
+  return levels;
+}
+
+BoundedSolution SolveSet(const ColumnTable& table, const std::vector<std::size_t>& trials) {
+  std::vector<Eigen::Index> set;
+  for (Eigen::Index i = 0; i < table.gram.parameters; ++i) set.push_back(i);
+  for (const std::size_t t : trials) {
+    for (const Eigen::Index c : table.trials[t].columns) set.push_back(c);
+  }
+  return SolveBounded(table.sum, set, table.bounds);
+}
+
+double Imitated(const ColumnTable& table, const Trial& trial, const Trial& by) {
+  Eigen::Index column = table.Reduced(trial.columns.front());
+  for (const Eigen::Index c : trial.columns) {
+    if (table.reduced(table.Reduced(c), table.Reduced(c)) > table.reduced(column, column)) column = table.Reduced(c);
+  }
+  const double own = table.reduced(column, column);
+  if (!(own > 0)) return 1;
+  const auto k = static_cast<Eigen::Index>(by.columns.size());
+  Eigen::MatrixXd square(k, k);
+  Eigen::VectorXd cross(k);
+  for (Eigen::Index a = 0; a < k; ++a) {
+    const Eigen::Index i = table.Reduced(by.columns[static_cast<std::size_t>(a)]);
+    for (Eigen::Index b = 0; b < k; ++b)
+      square(a, b) = table.reduced(i, table.Reduced(by.columns[static_cast<std::size_t>(b)]));
+    square(a, a) *= 1 + 1e-9;
+    cross[a] = table.reduced(i, column);
+  }
+  return std::clamp(cross.dot(Ldlt(square).Solve(cross)) / own, 0.0, 1.0);
+}
+
+}  // namespace gapscope

@@ -1,0 +1,22 @@
+// What an effect explains beside random smooth torques, the alternative that every rig has (Kennedy and O'Hagan,
+// J. R. Statist. Soc. B 63, 2001: a discrepancy is generated with, not fitted away).
+#ifndef GAPSCOPE_DIAGNOSE_DISCREPANCY_H_
+#define GAPSCOPE_DIAGNOSE_DISCREPANCY_H_
+
+#include "src/diagnose/columns.h"
+
+namespace gapscope {
+
+// Gain in log marginal likelihood when the effect's columns join a prior of the table's random torques, whose amplitude
+// is the likeliest each time. `columns`: of the effect, in the table; `blocks`: half seconds, `residuals`: numbers of
+// the logs.
+double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t blocks,
+                           std::size_t residuals);
+
+// Of random sums of torques in the residual's place: the share of which one of the trials holds at least `held` (of the
+// sum's square), with its own sign.
+double Mimicry(const ColumnTable& table, const std::vector<RandomTorque>& torques, double held);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_DISCREPANCY_H_

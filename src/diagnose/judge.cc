@@ -1,0 +1,226 @@
+#include "src/diagnose/judge.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/statistics.h"
+#include "src/diagnose/discrepancy.h"
+#include "src/diagnose/policy.h"
+
+namespace gapscope {
+namespace {
+
+double Log(double before, double after) {
+  const double most = kDiagnosePolicy.evidence.most_gain;
+  if (std::isinf(after)) return std::isinf(before) ? kNaN : -most;
+  return std::isinf(before) ? most : std::log(before / std::max(after, 1e-300));
+}
+
+// Errors of free runs as a gain; both beyond their signal: the motion was lost either way.
+double FreeGain(double before, double after) {
+  constexpr double kLost = 1;
+  return std::min(before, after) > kLost ? kNaN : 2 * Log(before, after);
+}
+
+class Judging {
+ public:
+  Judging(const Workbench& bench, SearchResult& found, const Say& say)
+      : bench_(bench),
+        found_(found),
+        say_(say),
+        torques_(MakeTorques(bench)),
+        free_left_(FreeRunError(bench, *found.chosen)) {
+    ScoreCandidate(bench_, found_.chosen);
+  }
+
+  // Of members taken out as a whole.
+  StatementNumbers Numbers(const std::vector<EffectUse>& uses) {
+    say_("judging " + NameOfSet(uses));
+    EffectSet rest = found_.chosen->effects;
+    for (const EffectUse& use : uses) rest = Without(rest, use);
+    Candidate* without = found_.ledger.Find(rest);
+    if (!without || uses.size() > 1) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
+    if (!without) without = found_.base;
+    ScoreCandidate(bench_, without);
+    StatementNumbers numbers;
+    numbers.gain = Log(without->train_cost, found_.chosen->train_cost);
+    numbers.gain_held_out = Log(without->held_out_cost, found_.chosen->held_out_cost);
+    numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
+    numbers.smooth = std::all_of(uses.begin(), uses.end(),
+                                 [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).of_motion; });
+    if (torques_.empty()) return numbers;
+    const ColumnTable table = MakeColumnsOfFit(bench_, *without, *found_.chosen, uses, torques_);
+    if (!table.valid || table.trials.empty()) return numbers;
+    const std::size_t residuals = without->problem->residuals();
+    numbers.discrepancy = DiscrepancyEvidence(table, table.trials.front().columns, table.gram.blocks.size(), residuals);
+    const double floor = 0.5 * static_cast<double>(residuals);
+    const double held =
+        (without->train_cost - found_.chosen->train_cost) / std::max(without->train_cost - floor, 1e-9 * floor);
+    numbers.mimicry = Mimicry(table, torques_, std::min(held, 1.0));
+    return numbers;
+  }
+
+  Judgement Make() {
+    Judgement result;
+    for (const Member& member : found_.members) {
+      Statement statement{.use = member.use, .numbers = Numbers({member.use})};
+      statement.numbers.gain = std::min(statement.numbers.gain, member.gain);
+      statement.probability = ProbabilityOf(statement.numbers);
+      statement.rule = "its own evidence";
+      result.statements.push_back(std::move(statement));
+    }
+    Couple(&result);
+    AddRivals(&result);
+    for (Statement& s : result.statements)
+      s.answer = s.probability >= kDiagnosePolicy.probability.present ? Answer::kPresent : Answer::kAbsent;
+    AddOthers(&result);
+    std::stable_sort(result.statements.begin(), result.statements.end(),
+                     [](const Statement& a, const Statement& b) { return a.probability > b.probability; });
+    Conclude(&result);
+    return result;
+  }
+
+ private:
+  // Members that stand in for each other are judged by taking both out.
+  void Couple(Judgement* result) {
+    constexpr double kImitates = 0.5;
+    const std::size_t members = result->statements.size();
+    for (std::size_t a = 0; a < members; ++a) {
+      for (std::size_t b = a + 1; b < members; ++b) {
+        Statement &x = result->statements[a], &y = result->statements[b];
+        const double present = kDiagnosePolicy.probability.present;
+        if (std::min(x.probability, y.probability) >= present || x.group >= 0 || y.group >= 0 ||
+            ImitatedBy(x.use, y.use) < kImitates)
+          continue;
+        const StatementNumbers numbers = Numbers({x.use, y.use});
+        const double together = ProbabilityOf(numbers);
+        if (together < present || together < std::max(x.probability, y.probability)) continue;
+        result->groups.push_back({x.use, y.use});
+        for (Statement* s : {&x, &y}) {
+          s->group = static_cast<int>(result->groups.size()) - 1;
+          s->probability = together;
+          s->numbers = numbers;
+          s->rule = "taken out together";
+        }
+      }
+    }
+  }
+
+  double ImitatedBy(const EffectUse& a, const EffectUse& b) const {
+    double most = 0;
+    for (const Trial& x : found_.columns.trials) {
+      for (const Trial& y : found_.columns.trials) {
+        if (x.use == a && y.use == b) most = std::max(most, Imitated(found_.columns, x, y));
+      }
+    }
+    return most;
+  }
+
+  // What costs as little in a member's place is told with it.
+  void AddRivals(Judgement* result) {
+    const SearchPolicy& policy = kDiagnosePolicy.search;
+    for (std::size_t m = 0; m < found_.members.size(); ++m) {
+      const Member& member = found_.members[m];
+      for (const Rival& rival : member.rivals) {
+        const Model& base = *found_.base->model;
+        const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
+        if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;
+        if (IsLessLikely(rival.use, member.use, base)) continue;
+        Statement& own = result->statements[m];
+        if (own.group < 0) {
+          own.group = static_cast<int>(result->groups.size());
+          result->groups.push_back({own.use});
+        }
+        result->groups[static_cast<std::size_t>(own.group)].push_back(rival.use);
+        Statement other{.use = rival.use,
+                        .probability = own.probability,
+                        .group = own.group,
+                        .numbers = own.numbers,
+                        .rule = "costs as little in its place"};
+        result->statements.push_back(std::move(other));
+      }
+    }
+  }
+
+  // Effects that were looked at and did not enter the set.
+  void AddOthers(Judgement* result) {
+    const ColumnTable& table = found_.columns;
+    for (const EffectUse& use : found_.uses) {
+      if (std::any_of(result->statements.begin(), result->statements.end(),
+                      [&](const Statement& s) { return s.use == use; }))
+        continue;
+      double seen = 0;
+      for (std::size_t t = 0; t < table.trials.size(); ++t) {
+        if (table.trials[t].use != use) continue;
+        const Eigen::Index c = table.trials[t].columns.front();
+        if (table.sum(c, c) > 0)
+          seen = std::max(seen, table.reduced(table.Reduced(c), table.Reduced(c)) / table.sum(c, c));
+      }
+      constexpr double kNothing = 1e-3;  // of a column is left beside the base model's parameters
+      Statement statement{.use = use, .answer = seen > kNothing ? Answer::kAbsent : Answer::kUnseen};
+      statement.rule = seen > kNothing ? "gains too little beside the effects of the final set"
+                                       : "the base model's parameters imitate it fully";
+      result->statements.push_back(std::move(statement));
+    }
+  }
+
+  void Conclude(Judgement* result) {
+    const Candidate &base = *found_.base, &chosen = *found_.chosen;
+    VerdictEvidence& e = result->evidence;
+    e.floors_before = base.held_out_floors;
+    e.floors_left = chosen.held_out_floors;
+    const double excess = e.floors_before - std::min(1.0, e.floors_left);
+    e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
+    e.free_run_left = free_left_;
+    e.free_run_before = &base == &chosen ? free_left_ : FreeRunError(bench_, base);
+    if (std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0)
+      e.free_run_removed = 1 - e.free_run_left / e.free_run_before;
+    VerdictFacts facts{.floors_left = e.floors_before};
+    double right = 1;
+    for (const Statement& s : result->statements) {
+      const bool present = s.answer == Answer::kPresent;
+      if (present && s.group >= 0) facts.told = false;
+      facts.present = facts.present || present;
+      if (std::any_of(chosen.effects.begin(), chosen.effects.end(), [&](const EffectUse& use) { return use == s.use; }))
+        right *= present ? s.probability : 1 - s.probability;
+    }
+    facts.retuned = found_.nominal->held_out_cost > 0
+                        ? (found_.nominal->held_out_cost - base.held_out_cost) / found_.nominal->held_out_cost
+                        : 0;
+    result->verdict = VerdictOf(facts);
+    result->probability = right;
+  }
+
+  const Workbench& bench_;
+  SearchResult& found_;
+  const Say& say_;
+  std::vector<RandomTorque> torques_;
+  double free_left_;
+};
+
+}  // namespace
+
+double ProbabilityOf(const StatementNumbers& n) {
+  const ProbabilityPolicy& w = kDiagnosePolicy.probability;
+  double gain = n.gain;
+  if (std::isfinite(n.gain_held_out)) gain = std::min(gain, n.gain_held_out);
+  if (std::isfinite(n.gain_free)) gain = std::min(gain, n.gain_free);
+  const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0, 5.0);
+  const double x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
+                   w.mimicry * std::log10(n.mimicry + 0.01) + w.discrepancy * evidence + (n.smooth ? w.smooth : 0);
+  return 1 / (1 + std::exp(-x));
+}
+
+Verdict VerdictOf(const VerdictFacts& facts) {
+  if (facts.present) return facts.told ? Verdict::kEffects : Verdict::kAmbiguous;
+  if (facts.floors_left > kDiagnosePolicy.verdict.much_missing) return Verdict::kUnknown;
+  return facts.retuned > kDiagnosePolicy.verdict.retuned ? Verdict::kParameters : Verdict::kNone;
+}
+
+Judgement Judge(const Workbench& bench, SearchResult& found, const Say& say) {
+  return Judging(bench, found, say).Make();
+}
+
+}  // namespace gapscope

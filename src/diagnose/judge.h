@@ -1,0 +1,33 @@
+// From what the search found to statements with probabilities, and the verdict that follows from them.
+#ifndef GAPSCOPE_DIAGNOSE_JUDGE_H_
+#define GAPSCOPE_DIAGNOSE_JUDGE_H_
+
+#include "src/diagnose/diagnosis.h"
+#include "src/diagnose/search.h"
+
+namespace gapscope {
+
+// Probability that an effect with these numbers is there (ProbabilityPolicy).
+double ProbabilityOf(const StatementNumbers& numbers);
+
+struct Judgement {
+  std::vector<Statement> statements;           // the surest first; sizes are left to whoever describes them
+  std::vector<std::vector<EffectUse>> groups;  // by Statement::group
+  Verdict verdict = Verdict::kNone;
+  double probability = 0;  // of the verdict as a whole
+  VerdictEvidence evidence;
+};
+
+Judgement Judge(const Workbench& bench, SearchResult& found, const Say& say);
+
+// What a verdict is derived from.
+struct VerdictFacts {
+  bool present = false, told = true;  // an effect is there; none of them stands in a group
+  double floors_left = 0;             // of the final model; of the base model where nothing is present
+  double retuned = 0;                 // share of the nominal model's held-out cost that refitting took
+};
+Verdict VerdictOf(const VerdictFacts& facts);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_JUDGE_H_

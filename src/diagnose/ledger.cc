@@ -1,0 +1,156 @@
+#include "src/diagnose/ledger.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/statistics.h"
+
+namespace gapscope {
+namespace {
+
+struct FitLimits {
+  int iterations = 0;
+  double tolerance = 0;
+};
+
+FitLimits LimitsOf(Effort effort) {
+  switch (effort) {
+    case Effort::kTaste:
+      return {.iterations = 3, .tolerance = 1e-2};
+    case Effort::kTry:
+      return {.iterations = 10, .tolerance = 3e-3};
+    case Effort::kFinish:
+      break;
+  }
+  return {.iterations = 40, .tolerance = 2e-4};
+}
+
+// Gives up where the better of the last two gains, made again in each iteration left, would not lead below `known`.
+GiveUp TooSlow(double known, int iterations) {
+  double last = kInfinity, gained = last;
+  return [=](double cost, int iteration) mutable {
+    const double gain = last - cost, best = std::max(gain, gained);
+    last = cost;
+    gained = gain;
+    return iteration > 1 && cost - best * (iterations - iteration) > known;
+  };
+}
+
+bool IsPart(const EffectSet& small, const EffectSet& large) {
+  return small.size() < large.size() && std::includes(large.begin(), large.end(), small.begin(), small.end());
+}
+
+}  // namespace
+
+EffectSet Without(const EffectSet& set, const EffectUse& use) {
+  EffectSet rest = set;
+  std::erase(rest, use);
+  return rest;
+}
+
+EffectSet With(const EffectSet& set, const EffectUse& use) {
+  EffectSet more = set;
+  more.insert(std::lower_bound(more.begin(), more.end(), use), use);
+  return more;
+}
+
+Candidate* Ledger::Find(const EffectSet& set) const {
+  const auto place = fitted_.find(set);
+  return place == fitted_.end() || !std::isfinite(place->second->train_cost) ? nullptr : place->second.get();
+}
+
+std::vector<Candidate*> Ledger::All() const {
+  std::vector<Candidate*> all;
+  for (const auto& [set, candidate] : fitted_) {
+    if (std::isfinite(candidate->train_cost)) all.push_back(candidate.get());
+  }
+  return all;
+}
+
+// Keeps the fit if it ends below the candidate's.
+bool Ledger::Try(Candidate* candidate, const FitPoint& start, Effort effort) {
+  const double known = candidate->train_cost;
+  const Evaluation there = candidate->problem->Evaluate(start, Keep::kCost);
+  *bench_.work += there.work;
+  if (!std::isfinite(there.cost)) return false;
+  const FitPoint before = candidate->point;
+  const std::vector<double> values = candidate->values;
+  const bool converged = candidate->converged, scored = candidate->scored;
+  const double shift_s = candidate->shift_s;
+  const auto [iterations, tolerance] = LimitsOf(effort);
+  FitCandidate(bench_, candidate, start, iterations, tolerance,
+               std::isfinite(known) && there.cost > known ? TooSlow(known, iterations) : GiveUp{});
+  if (candidate->train_cost < known) return true;
+  candidate->point = before;
+  candidate->values = values;
+  candidate->train_cost = known;
+  candidate->converged = converged;
+  candidate->scored = scored;
+  candidate->shift_s = shift_s;
+  return false;
+}
+
+Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std::map<std::string, double>& values,
+                         const Eigen::VectorXd& dy, Effort effort) {
+  auto& place = fitted_[set];
+  if (!place) {
+    auto made = MakeCandidate(bench_, set);
+    place = std::make_unique<Candidate>();
+    place->train_cost = kInfinity;
+    if (!made.ok()) return nullptr;
+    *place = std::move(made).value();
+    place->train_cost = kInfinity;
+  }
+  if (!place->problem) return nullptr;
+  Candidate& candidate = *place;
+  std::vector<double> all = candidate.model->Nominal();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::string& name = candidate.model->parameters()[i].name;
+    if (const int index = from.model->IndexOf(name); index >= 0) all[i] = from.values[index];
+    if (const auto given = values.find(name); given != values.end()) all[i] = given->second;
+  }
+  // With as much of the other one's answer as pays: far outside of where it was linear it leads along valleys.
+  FitPoint best;
+  double least = kInfinity;
+  for (const double share : {1.0, 0.0}) {
+    if (share > 0 && dy.size() != from.point.y.size()) continue;
+    FitPoint moved = from.point;
+    if (share > 0) moved.y = (moved.y + dy).cwiseMax(from.problem->layout().low).cwiseMin(from.problem->layout().high);
+    FitPoint start = CarryOver(*from.problem, moved, *candidate.problem, all);
+    const Evaluation there = candidate.problem->Evaluate(start, Keep::kCost);
+    *bench_.work += there.work;
+    if (best.y.size() > 0 && !(there.cost < least)) continue;
+    least = there.cost;
+    best = std::move(start);
+  }
+  Try(&candidate, best, effort);
+  if (!std::isfinite(candidate.train_cost)) return nullptr;
+  StartFromSubsets(&candidate, effort);
+  return &candidate;
+}
+
+void Ledger::Continue(Candidate* candidate, Effort effort) { Try(candidate, candidate->point, effort); }
+
+void Ledger::StartFromSubsets(Candidate* candidate, Effort effort) {
+  const Candidate* best = nullptr;
+  for (const auto& [set, other] : fitted_) {
+    if (other->problem && IsPart(set, candidate->effects) && other->train_cost < candidate->train_cost &&
+        (!best || other->train_cost < best->train_cost))
+      best = other.get();
+  }
+  if (!best) return;
+  // What the subset lacks begins small.
+  std::vector<double> values = candidate->model->Nominal();
+  for (const auto& use : candidate->effects) {
+    if (std::find(best->effects.begin(), best->effects.end(), use) != best->effects.end()) continue;
+    for (const auto& p : PlacedParameters(use, *bench_.rig, bench_.scales)) {
+      constexpr double kSmall = 0.1;
+      double& value = values[candidate->model->IndexOf(p.name)];
+      value = p.trials.empty() || p.role == ParameterRole::kPlace ? p.start
+                                                                  : p.neutral + kSmall * (p.trials.front() - p.neutral);
+    }
+  }
+  Try(candidate, CarryOver(*best->problem, best->point, *candidate->problem, values), effort);
+}
+
+}  // namespace gapscope

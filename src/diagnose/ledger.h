@@ -1,0 +1,47 @@
+// Every set of effects that was refitted, each once: the best fit so far stands for the set.
+#ifndef GAPSCOPE_DIAGNOSE_LEDGER_H_
+#define GAPSCOPE_DIAGNOSE_LEDGER_H_
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/diagnose/candidate.h"
+
+namespace gapscope {
+
+using EffectSet = std::vector<EffectUse>;  // sorted
+EffectSet Without(const EffectSet& set, const EffectUse& use);
+EffectSet With(const EffectSet& set, const EffectUse& use);
+
+// How far a fit goes: far enough to see whether it leads anywhere, to compare it, to its end.
+enum class Effort { kTaste, kTry, kFinish };
+
+class Ledger {
+ public:
+  explicit Ledger(const Workbench& bench) : bench_(bench) {}  // must outlive this
+
+  // Null: the set was not refitted, or cannot be.
+  Candidate* Find(const EffectSet& set) const;
+  // Every set that could be fitted, in the order of effects.
+  std::vector<Candidate*> All() const;
+  // Fits the set from another set's solution; `values`: of effects that the other one lacks, by the names of their
+  // parameters; `dy`: a step of the other one's y (empty: none). Keeps the better of this fit and an earlier one. A set
+  // that ends above one of its own subsets is fitted again from there. Null: it cannot be built or simulated.
+  Candidate* Refit(const EffectSet& set, const Candidate& from, const std::map<std::string, double>& values,
+                   const Eigen::VectorXd& dy, Effort effort);
+  // Fits on from where the set is.
+  void Continue(Candidate* candidate, Effort effort);
+
+ private:
+  void StartFromSubsets(Candidate* candidate, Effort effort);
+  bool Try(Candidate* candidate, const FitPoint& start, Effort effort);
+
+  const Workbench& bench_;
+  std::map<EffectSet, std::unique_ptr<Candidate>> fitted_;
+};
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_LEDGER_H_

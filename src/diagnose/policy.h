@@ -1,0 +1,58 @@
+// Every threshold of a diagnosis, in one place: written into its result.
+#ifndef GAPSCOPE_DIAGNOSE_POLICY_H_
+#define GAPSCOPE_DIAGNOSE_POLICY_H_
+
+#include <cstddef>
+
+namespace gapscope {
+
+// Gains are ln(cost without / cost with), costs those of refitted sets.
+struct SearchPolicy {
+  std::size_t beam = 8;                             // sets kept per size while arithmetic orders them
+  std::size_t singles = 5, pairs = 3, triples = 1;  // of the base model, that are refitted
+  std::size_t go_on = 2;                            // of the sets that were begun, how many are fitted on
+  double hopeless = 0.7;                            // a rival behind by more after a few steps is given up
+  std::size_t scan = 12, scanned = 6;               // an effect of more trials is tried on a leader at its best few
+  std::size_t leaders = 2, additions = 3;           // sets that are added to, and effects tried on each
+  std::size_t most_effects = 6;
+  double promise = 0.1;    // least gain by arithmetic for which a set is refitted
+  double member = 0.03;    // least gain of each effect of the final set
+  std::size_t rivals = 3;  // tried in each member's place
+  double imitates = 0.3;   // least share of a member's column that a rival's columns hold, to be tried in its place
+  double exchange = 0.02;  // least gain of a rival that takes a member's place
+  double tie = 0.1, tie_share = 0.05;  // what costs more by less than this, or this share of the member's gain, ties
+  double simpler = 0.05;               // a richer effect that gains less over one that it contains gives way to it
+  std::size_t replays = 5000;          // of all training windows: what a diagnosis of normal effort may take
+};
+
+struct EvidencePolicy {
+  std::size_t torques = 12;                     // random torques a joint: thirds of angle, speed, both
+  double angle_waves = 1.6, speed_waves = 1.1;  // deviations of their phase's slopes, a deviation of the motion
+  double torque_share = 0.05;                   // of the joint's torque: their amplitude
+  double per_block = 4;                         // what half a second of residuals counts for
+  std::size_t sums = 300;                       // random torques in the residual's place
+  double most_gain = 3;                         // above it a gain says nothing more
+};
+
+// P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).
+struct ProbabilityPolicy {
+  double constant = -4.99, gain = 1.42, mimicry = -0.67, discrepancy = 1.11, smooth = -2.21;
+  double present = 0.5;  // least probability of an effect that is listed
+};
+
+struct VerdictPolicy {
+  double much_missing = 2.5;  // residual over noise, from which on something is missing
+  double retuned = 0.05;      // least share of the held-out cost that retuned parameters gain to be worth saying
+};
+
+struct DiagnosePolicy {
+  SearchPolicy search;
+  EvidencePolicy evidence;
+  ProbabilityPolicy probability;
+  VerdictPolicy verdict;
+};
+inline constexpr DiagnosePolicy kDiagnosePolicy;
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_POLICY_H_

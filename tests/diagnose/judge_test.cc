@@ -1,0 +1,45 @@
+// From numbers to statements and verdicts.
+#include "src/diagnose/judge.h"
+
+#include <gtest/gtest.h>
+
+#include "src/core/statistics.h"
+
+namespace gapscope {
+namespace {
+
+constexpr StatementNumbers kClear{
+    .gain = 2, .gain_held_out = 2, .gain_free = 2, .discrepancy = 40, .mimicry = 0, .smooth = false};
+
+TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
+  const double clear = ProbabilityOf(kClear);
+  EXPECT_GT(clear, 0.9);
+  StatementNumbers weaker = kClear;
+  weaker.gain_held_out = 0;
+  EXPECT_LT(ProbabilityOf(weaker), clear);
+  weaker = kClear, weaker.discrepancy = -3;
+  EXPECT_LT(ProbabilityOf(weaker), clear);
+  weaker = kClear, weaker.mimicry = 0.9;
+  EXPECT_LT(ProbabilityOf(weaker), clear);
+  weaker = kClear, weaker.smooth = true;
+  EXPECT_LT(ProbabilityOf(weaker), clear);
+  EXPECT_LT(ProbabilityOf({}), 0.05);
+}
+
+// Free runs that lose the motion either way tell nothing.
+TEST(ProbabilityTest, WhatTellsNothingIsLeftOut) {
+  StatementNumbers numbers = kClear;
+  numbers.gain_free = kNaN;
+  EXPECT_EQ(ProbabilityOf(numbers), ProbabilityOf(kClear));
+}
+
+TEST(VerdictTest, FollowsFromWhatIsThereAndWhatIsLeft) {
+  EXPECT_EQ(VerdictOf({.present = true, .told = true, .floors_left = 30}), Verdict::kEffects);
+  EXPECT_EQ(VerdictOf({.present = true, .told = false, .floors_left = 1}), Verdict::kAmbiguous);
+  EXPECT_EQ(VerdictOf({.present = false, .floors_left = 30}), Verdict::kUnknown);
+  EXPECT_EQ(VerdictOf({.present = false, .floors_left = 1, .retuned = 0.5}), Verdict::kParameters);
+  EXPECT_EQ(VerdictOf({.present = false, .floors_left = 1, .retuned = 0}), Verdict::kNone);
+}
+
+}  // namespace
+}  // namespace gapscope

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_CANDIDATE_H_
 #define GAPSCOPE_DIAGNOSE_CANDIDATE_H_
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -28,6 +29,11 @@ struct Candidate {
   std::vector<LogReplay> held_out;  // predictions there
   std::size_t parameters = 0;       // of the effects
   std::string Name() const;
+  // Costs on the training and the held-out logs, none below the sensors' noise: what lies under that says nothing.
+  double TrainAboveNoise() const { return std::max(train_cost, 0.5 * static_cast<double>(problem->residuals())); }
+  double HeldOutAboveNoise() const {
+    return held_out_floors < 1 ? held_out_cost / (held_out_floors * held_out_floors) : held_out_cost;
+  }
 };
 
 using Say = std::function<void(const std::string&)>;

@@ -125,7 +125,7 @@ struct DiagnoseOptions {
   double window_s = 1.0;
   double sample_s = 0.004;  // logs are searched on stamps at least this far apart
   unsigned long seed = 0;
-  std::size_t max_windows = 36;  // of the training logs
+  std::size_t max_windows = 90;  // of the training logs
   std::function<void(const std::string&)> progress;
 };
 

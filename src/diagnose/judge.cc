@@ -45,8 +45,8 @@ class Judging {
     if (!without) without = found_.base;
     ScoreCandidate(bench_, without);
     StatementNumbers numbers;
-    numbers.gain = Log(without->train_cost, found_.chosen->train_cost);
-    numbers.gain_held_out = Log(without->held_out_cost, found_.chosen->held_out_cost);
+    numbers.gain = Log(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
+    numbers.gain_held_out = Log(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
     numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
     numbers.smooth = std::all_of(uses.begin(), uses.end(),
                                  [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).of_motion; });

@@ -14,9 +14,15 @@ constexpr const SearchPolicy& kPolicy = kDiagnosePolicy.search;
 
 double Gain(const Candidate& without, const Candidate& with) { return std::log(without.train_cost / with.train_cost); }
 
-// A set's cost with what each of its effects must gain.
-double Charged(const Candidate& candidate) {
-  return std::log(candidate.train_cost) + kPolicy.member * static_cast<double>(candidate.effects.size());
+// Of an effect, none below the noise.
+double GainAboveNoise(const Candidate& without, const Candidate& with) {
+  return std::log(without.TrainAboveNoise() / with.TrainAboveNoise());
+}
+
+// A set's cost with what each of its effects must gain; of sets that are at the noise alike, the cost itself decides.
+std::pair<double, double> Charged(const Candidate& candidate) {
+  return {std::log(candidate.TrainAboveNoise()) + kPolicy.member * static_cast<double>(candidate.effects.size()),
+          candidate.train_cost};
 }
 
 class Searcher {
@@ -164,10 +170,12 @@ class Searcher {
         if (!known || looked_.insert({result_.chosen->effects, use}).second)
           without = result_.ledger.Refit(rest, *result_.chosen, {}, {}, known ? Effort::kTaste : Effort::kTry);
         if (!without) without = result_.base;
-        result_.members.push_back({.use = use, .without = without, .gain = Gain(*without, *result_.chosen)});
+        result_.members.push_back({.use = use, .without = without, .gain = GainAboveNoise(*without, *result_.chosen)});
       }
-      const auto least = std::min_element(result_.members.begin(), result_.members.end(),
-                                          [](const Member& a, const Member& b) { return a.gain < b.gain; });
+      const auto least =
+          std::min_element(result_.members.begin(), result_.members.end(), [](const Member& a, const Member& b) {
+            return std::pair(a.gain, a.without->train_cost) < std::pair(b.gain, b.without->train_cost);
+          });
       if (least == result_.members.end() || least->gain >= kPolicy.member) continue;
       result_.chosen = result_.ledger.Find(Without(result_.chosen->effects, least->use));
       again = true;

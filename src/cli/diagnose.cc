@@ -7,6 +7,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
+#include "src/diagnose/policy.h"
 #include "src/report/diagnose_report.h"
 #include "src/report/write_run.h"
 
@@ -88,7 +89,8 @@ Command DiagnoseCommand() {
       {.flag = "--effort",
        .value = ChoiceOf(flags->effort),
        .help = "How much work the search may take",
-       .more = "Work is counted in simulated steps: 0.3, 1 and 4 times 9000 replays of the training windows"},
+       .more = fmt::format("Work is counted in simulated steps: 0.3, 1 and 4 times {} replays of the training windows",
+                           kDiagnosePolicy.search.replays)},
       WindowOption(flags->window_s)};
   return {.name = "diagnose",
           .what = "Where the gap lies, which unmodelled effect causes it, how far it shrinks",

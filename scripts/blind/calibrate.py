@@ -2,12 +2,12 @@
 """What a probability should be, from banks of twin cases: logistic fits of "right" on the evidence.
 
     scripts/blind/calibrate.py out/blind/902 [out/blind/...]
-    scripts/blind/calibrate.py --features lg,gp,p,smooth out/blind/rough_301 [...]
+    scripts/blind/calibrate.py --features least:-1:3,log_mimicry,log_discrepancy:-1:5,smooth out/blind/rough_301 [...]
 
-Without --features: of verdicts, one fit for each kind; prints the constants of `Confidence` in
-src/diagnose/verdict.cc. With: of statements, on the named members of each one's `numbers` (missing: 0; NAME:LOW:HIGH
-clips); prints weights, the AUC of every number alone, and the calibration error where each rig is judged by weights
-from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation 2 on each
+Without --features: of verdicts, one fit for each kind. With: of statements, on the named members of each one's
+`numbers` (missing: 0; NAME:LOW:HIGH clips; those of DERIVED are made of them): `ProbabilityPolicy` of
+src/diagnose/policy.h. Prints weights, the AUC of every number alone, and the calibration error where each rig is judged
+by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation 2 on each
 weight: banks are small."""
 import argparse, json, math, sys
 from pathlib import Path
@@ -17,6 +17,11 @@ import score  # noqa: E402
 import statements  # noqa: E402
 
 PRIOR = 2.0
+DERIVED = {  # as ProbabilityOf in src/diagnose/judge.cc has them
+    "least": lambda n: min(v for v in (n["gain"], n["gain_held_out"], n["gain_free"]) if v is not None),
+    "log_mimicry": lambda n: math.log10(n["mimicry"] + 0.01),
+    "log_discrepancy": lambda n: math.copysign(math.log1p(abs(n["discrepancy"])), n["discrepancy"]),
+}
 
 
 def features(verdict):
@@ -93,7 +98,7 @@ def read(features, numbers):
     row = []
     for feature in features:
         name, *limits = feature.split(":")
-        value = numbers.get(name)
+        value = DERIVED[name](numbers) if name in DERIVED else numbers.get(name)
         value = 0.0 if value is None or not math.isfinite(value) else float(value)
         row.append(min(max(value, float(limits[0])), float(limits[1])) if limits else value)
     return row

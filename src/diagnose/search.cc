@@ -79,8 +79,9 @@ class Searcher {
     for (std::size_t size = 0; size < levels.size(); ++size) {
       for (std::size_t i = 0; i < std::min(counts[size], levels[size].size()); ++i) {
         const TrialSet& set = levels[size][i];
-        // More effects than the best smaller set must be worth it.
-        if (std::log(best / set.cost) < kPolicy.promise) break;
+        // More effects than the best smaller set must promise something. A single one need not: where an effect sets in
+        // suddenly (a limit, a gap) its columns say little between their trial values.
+        if ((size > 0 || !parent.effects.empty()) && std::log(best / set.cost) < kPolicy.promise) break;
         if (Late("sets of effects")) return;
         if (Candidate* candidate = RefitTrials(parent, table, set)) tasted.push_back(candidate);
       }

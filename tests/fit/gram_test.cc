@@ -1,4 +1,4 @@
-// Sums of Gram blocks against the normal equations, the score test and problems solved in full.
+// Sums of Gram blocks against the normal equations and problems solved in full.
 #include "src/fit/gram.h"
 
 #include <gtest/gtest.h>

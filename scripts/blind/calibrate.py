@@ -2,14 +2,14 @@
 """What a probability should be, from banks of twin cases: logistic fits of "right" on the evidence.
 
     scripts/blind/calibrate.py out/blind/902 [out/blind/...]
-    scripts/blind/calibrate.py --features least:-1:3,log_mimicry,log_discrepancy:-1:5,smooth out/blind/rough_301 [...]
+    scripts/blind/calibrate.py --features middle_gain:-1:3,log_mimicry,log_discrepancy:-1:5,smooth out/blind/rough_1
 
 Without --features: of verdicts, one fit for each kind. With: of statements, on the named members of each one's
 `numbers` (missing: 0; NAME:LOW:HIGH clips; those of DERIVED are made of them): `ProbabilityPolicy` of
 src/diagnose/policy.h. Prints weights, the AUC of every number alone, and the calibration error where each rig is judged
 by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation 2 on each
 weight: banks are small."""
-import argparse, json, math, sys
+import argparse, json, math, statistics as stats, sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -18,7 +18,8 @@ import statements  # noqa: E402
 
 PRIOR = 2.0
 DERIVED = {  # as ProbabilityOf in src/diagnose/judge.cc has them
-    "least": lambda n: min(v for v in (n["gain"], n["gain_held_out"], n["gain_free"]) if v is not None),
+    "middle_gain": lambda n: stats.median(
+        n[k] for k in ("gain", "gain_held_out", "gain_free") if n[k] is not None),
     "log_mimicry": lambda n: math.log10(n["mimicry"] + 0.01),
     "log_discrepancy": lambda n: math.copysign(math.log1p(abs(n["discrepancy"])), n["discrepancy"]),
 }

@@ -204,9 +204,12 @@ class Judging {
 
 double ProbabilityOf(const StatementNumbers& n) {
   const ProbabilityPolicy& w = kDiagnosePolicy.probability;
-  double gain = n.gain;
-  if (std::isfinite(n.gain_held_out)) gain = std::min(gain, n.gain_held_out);
-  if (std::isfinite(n.gain_free)) gain = std::min(gain, n.gain_free);
+  // The middle one: a single kind of log that happens not to show the effect, or to show it alone, does not decide.
+  std::vector<double> gains;
+  for (const double gain : {n.gain, n.gain_held_out, n.gain_free}) {
+    if (std::isfinite(gain)) gains.push_back(gain);
+  }
+  const double gain = gains.empty() ? 0 : Median(gains);
   const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0, 5.0);
   const double x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
                    w.mimicry * std::log10(n.mimicry + 0.01) + w.discrepancy * evidence + (n.smooth ? w.smooth : 0);

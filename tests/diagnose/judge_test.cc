@@ -15,7 +15,7 @@ TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
   const double clear = ProbabilityOf(kClear);
   EXPECT_GT(clear, 0.9);
   StatementNumbers weaker = kClear;
-  weaker.gain_held_out = 0;
+  weaker.gain_held_out = weaker.gain_free = 0;
   EXPECT_LT(ProbabilityOf(weaker), clear);
   weaker = kClear, weaker.discrepancy = -3;
   EXPECT_LT(ProbabilityOf(weaker), clear);
@@ -24,6 +24,13 @@ TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
   weaker = kClear, weaker.smooth = true;
   EXPECT_LT(ProbabilityOf(weaker), clear);
   EXPECT_LT(ProbabilityOf({}), 0.05);
+}
+
+// A training log that does not reach the effect does not speak against what the others show.
+TEST(ProbabilityTest, OneKindOfLogDoesNotDecide) {
+  StatementNumbers numbers = kClear;
+  numbers.gain = 0.1;
+  EXPECT_EQ(ProbabilityOf(numbers), ProbabilityOf(kClear));
 }
 
 // Free runs that lose the motion either way tell nothing.

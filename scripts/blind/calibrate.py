@@ -7,8 +7,8 @@
 Without --features: of verdicts, one fit for each kind. With: of statements, on the named members of each one's
 `numbers` (missing: 0; NAME:LOW:HIGH clips; those of DERIVED are made of them): `ProbabilityPolicy` of
 src/diagnose/policy.h. Prints weights, the AUC of every number alone, and the calibration error where each rig is judged
-by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation 2 on each
-weight: banks are small."""
+by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation
+2 on each weight: banks are small."""
 import argparse, json, math, statistics as stats, sys
 from pathlib import Path
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 
 namespace gapscope {
@@ -21,9 +22,7 @@ Recording Coarsen(const Recording& recording, double least_step_s) {
   if (kept.size() == recording.rows() || kept.size() < 2) return recording;
   Recording coarse = recording;
   const auto pick = [&](const std::vector<double>& values) {
-    std::vector<double> picked;
-    for (const std::size_t row : kept) picked.push_back(values[row]);
-    return picked;
+    return Collect(kept, [&](std::size_t row) { return values[row]; });
   };
   coarse.time_s = pick(recording.time_s);
   for (auto& measured : coarse.measured) measured.values = pick(measured.values);

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <random>
 
+#include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
@@ -327,8 +329,7 @@ std::vector<std::vector<TrialSet>> BeamSearch(const ColumnTable& table, std::siz
     std::map<std::vector<std::size_t>, TrialSet> best;  // by the effects' numbers
     for (const TrialSet& head : heads) {
       for (std::size_t t = 0; t < table.trials.size(); ++t) {
-        std::vector<std::size_t> effects;
-        for (const std::size_t i : head.trials) effects.push_back(table.trials[i].effect);
+        auto effects = Collect(head.trials, [&](std::size_t i) { return table.trials[i].effect; });
         if (std::find(effects.begin(), effects.end(), table.trials[t].effect) != effects.end()) continue;
         effects.push_back(table.trials[t].effect);
         std::sort(effects.begin(), effects.end());
@@ -339,8 +340,7 @@ std::vector<std::vector<TrialSet>> BeamSearch(const ColumnTable& table, std::siz
         if (!fresh && set.cost < place->second.cost) place->second = std::move(set);
       }
     }
-    std::vector<TrialSet> level;
-    for (auto& [effects, set] : best) level.push_back(std::move(set));
+    auto level = Collect(best, [](const auto& entry) { return entry.second; });
     std::stable_sort(level.begin(), level.end(), [](const auto& a, const auto& b) { return a.cost < b.cost; });
     if (level.size() > width && size > 1) level.resize(width);
     heads.assign(level.begin(), level.begin() + static_cast<long>(std::min(width, level.size())));
@@ -350,8 +350,8 @@ std::vector<std::vector<TrialSet>> BeamSearch(const ColumnTable& table, std::siz
 }
 
 BoundedSolution SolveSet(const ColumnTable& table, const std::vector<std::size_t>& trials) {
-  std::vector<Eigen::Index> set;
-  for (Eigen::Index i = 0; i < table.gram.parameters; ++i) set.push_back(i);
+  std::vector<Eigen::Index> set(static_cast<std::size_t>(table.gram.parameters));
+  std::iota(set.begin(), set.end(), 0);
   for (const std::size_t t : trials) {
     for (const Eigen::Index c : table.trials[t].columns) set.push_back(c);
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/diagnose/policy.h"
 
@@ -87,8 +88,7 @@ double Mimicry(const ColumnTable& table, const std::vector<RandomTorque>& torque
         // As the residual would be lowered by a positive coefficient.
         if (cross[e] < 0 && m(e, e) > 0) most = std::max(most, cross[e] * cross[e] / m(e, e));
       } else {
-        std::vector<Eigen::Index> columns;
-        for (const Eigen::Index c : trial.columns) columns.push_back(table.Reduced(c));
+        const auto columns = Collect(trial.columns, [&](Eigen::Index c) { return table.Reduced(c); });
         Eigen::MatrixXd own = m(columns, columns);
         own.diagonal() *= 1 + 1e-9;
         const Eigen::VectorXd part = cross(columns);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
 
@@ -101,6 +102,13 @@ class Searcher {
     }
   }
 
+  // Values of a trial's effect at its columns' coefficients, by the names of its parameters.
+  void SetValues(const Trial& trial, const BoundedSolution& solution, std::map<std::string, double>* values) const {
+    const auto at = ValuesAt(bench_, trial, Collect(trial.columns, [&](Eigen::Index c) { return solution.values[c]; }));
+    const auto placed = PlacedParameters(trial.use, *bench_.rig, bench_.scales);
+    for (std::size_t i = 0; i < placed.size(); ++i) (*values)[placed[i].name] = at[i];
+  }
+
   Candidate* RefitTrials(const Candidate& parent, const ColumnTable& table, const TrialSet& set) {
     const BoundedSolution solution = SolveSet(table, set.trials);
     EffectSet effects = parent.effects;
@@ -108,11 +116,7 @@ class Searcher {
     for (const std::size_t t : set.trials) {
       const Trial& trial = table.trials[t];
       effects = With(effects, trial.use);
-      std::vector<double> coefficients;
-      for (const Eigen::Index c : trial.columns) coefficients.push_back(solution.values[c]);
-      const auto at = ValuesAt(bench_, trial, coefficients);
-      const auto placed = PlacedParameters(trial.use, *bench_.rig, bench_.scales);
-      for (std::size_t i = 0; i < placed.size(); ++i) values[placed[i].name] = at[i];
+      SetValues(trial, solution, &values);
     }
     say_("refitting " + NameOfSet(effects));
     return result_.ledger.Refit(effects, parent, values, solution.values.head(table.gram.parameters), Effort::kTaste);
@@ -214,7 +218,6 @@ class Searcher {
   Candidate* RefitRival(const Member& member, const EffectUse& use) {
     const ColumnTable& table = result_.columns;
     const EffectSet set = With(Without(result_.chosen->effects, member.use), use);
-    const auto placed = PlacedParameters(use, *bench_.rig, bench_.scales);
     // The trial that does best beside the other members, by arithmetic at the base.
     std::vector<std::size_t> others;
     for (const EffectUse& other : result_.chosen->effects) {
@@ -238,12 +241,8 @@ class Searcher {
     }
     if (best.trials.empty()) return nullptr;
     const Trial& trial = table.trials[best.trials.back()];
-    const BoundedSolution solution = SolveSet(table, best.trials);
-    std::vector<double> coefficients;
-    for (const Eigen::Index c : trial.columns) coefficients.push_back(solution.values[c]);
-    const auto at = ValuesAt(bench_, trial, coefficients);
     std::map<std::string, double> values;
-    for (std::size_t i = 0; i < placed.size(); ++i) values[placed[i].name] = at[i];
+    SetValues(trial, SolveSet(table, best.trials), &values);
     Candidate* other = result_.ledger.Refit(set, *result_.chosen, values, {}, Effort::kTaste);
     if (other && !other->converged && Gain(*result_.chosen, *other) > -kPolicy.hopeless)
       result_.ledger.Continue(other, Effort::kTry);

@@ -91,8 +91,10 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
     Evaluation there = column.child->Evaluate(CarryOver(parent, point, *column.child, column.values), Keep::kResiduals);
     column.child->SetProbe({});
     gram.work += there.work;
-    gram.failed.push_back(!std::isfinite(there.cost));
-    others.push_back(gram.failed.back() ? at.residuals : std::move(there.residuals));
+    const bool failed = !std::isfinite(there.cost);
+    if (failed) there.residuals = at.residuals;
+    gram.failed.push_back(static_cast<char>(failed));
+    others.push_back(std::move(there.residuals));
   }
   const std::size_t count = parent.windows().size();
   std::vector<std::vector<std::pair<RowBlock, Eigen::MatrixXd>>> parts(count);

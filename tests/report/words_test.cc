@@ -44,7 +44,8 @@ TEST(HeadlineTest, OneTitleForEachVerdict) {
       {Verdict::kNone, "Nothing is missing: the model explains these logs down to what the sensors can show."},
       {Verdict::kParameters, "No effect is missing: other parameter values close the gap."},
       {Verdict::kEffects, "The model lacks cable spring on arm and Coulomb friction on arm."},
-      {Verdict::kAmbiguous, "The model lacks cable spring or gravity offset: these logs cannot tell which."},
+      {Verdict::kAmbiguous,
+       "The model lacks cable spring or gravity offset and Coulomb friction on arm: these logs cannot tell which."},
       {Verdict::kUnknown,
        "The model lacks cable spring on arm and Coulomb friction on arm, and something that no known effect "
        "explains."}};

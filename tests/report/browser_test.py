@@ -185,7 +185,8 @@ def main():
             verdicts = {"replay": "hardly follows", "long": "hardly follows", "none": "Nothing is missing",
                         "parameters": "other parameter values close the gap",
                         "effects": "The model lacks cable spring on arm and Coulomb friction on arm.",
-                        "ambiguous": "lacks cable spring or gravity offset and Coulomb friction on arm: these logs cannot tell which",
+                        "ambiguous": "lacks cable spring or gravity offset and Coulomb friction on arm: "
+                                     "these logs cannot tell which",
                         "unknown": "and something that no known effect explains"}
             for name, verdict in verdicts.items():
                 for width in (390, 1440):

@@ -7,7 +7,8 @@
 
 namespace gapscope {
 
-// Which windows of each log a problem takes: with kTrain and kHeldOut every third one, from the second on, is held out.
+// Which windows of each log a problem takes: with kTrain and kHeldOut every third one is held out, from
+// another one on in each log.
 enum class Fold { kAll, kTrain, kHeldOut };
 
 // What makes signals of different size comparable: 1 / standard deviation over the log, or 1 / root mean square

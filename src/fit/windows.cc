@@ -45,7 +45,8 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
     const auto add = [&](ReplayMode mode) {
       const auto all = MakeWindows(recording, mode, options.window_s);
       for (std::size_t i = 0; i < all.size(); ++i) {
-        if (options.fold != Fold::kAll && (i % 3 == 1) != (options.fold == Fold::kHeldOut)) continue;
+        // Another third in each log: repeats of one command are not all held out at the same time.
+        if (options.fold != Fold::kAll && ((i + l) % 3 == 1) != (options.fold == Fold::kHeldOut)) continue;
         const double lead_in_s = mode == ReplayMode::kWindows ? options.lead_in_s : 0;
         windows.push_back({.log = l,
                            .rows = all[i],

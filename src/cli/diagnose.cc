@@ -17,7 +17,7 @@ namespace {
 struct DiagnoseFlags {
   CommonFlags common;
   ModelFlags model;
-  std::vector<std::string> hold_out;
+  std::vector<std::string> hold_out, prior;
   SearchEffort effort = SearchEffort::kNormal;
   double budget_s = 0, window_s = 0;
 };
@@ -57,6 +57,10 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
                           .effort = flags.effort,
                           .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s,
                           .seed = flags.common.seed};
+  for (const auto& text : flags.prior) {
+    GS_ASSIGN(const auto assignment, ParseAssignment(text, "--prior"));
+    options.priors.insert_or_assign(assignment.first, assignment.second);
+  }
   const bool live = !flags.common.quiet && isatty(2);
   if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
   auto diagnosed = Diagnose(experiment, data, options, pool);
@@ -79,6 +83,12 @@ Command DiagnoseCommand() {
        .help = "A log to judge by, not to fit; more than once",
        .more = "Without it whole logs are held out where there are several, blocks of time where there is one; the "
                "result says which"},
+      {.flag = "--prior",
+       .value = &flags->prior,
+       .help = "What is known of an effect: EFFECT=P or EFFECT@PLACE=P, P from 0 to 1, more than once",
+       .more =
+           "Multiplies the odds that the logs give: 0.9 says nine to one before the logs are seen, 0.5 (every other "
+           "effect's) nothing. The result has both, `prior` and `evidence`"},
       {.flag = "--budget",
        .value = &flags->budget_s,
        .unit = "s",

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -52,6 +53,7 @@ struct Workbench {
   Deadline deadline;
   std::shared_ptr<Work> work = std::make_shared<Work>();  // done so far
   std::size_t most_steps = 0;                             // of the simulator; 0: no limit
+  std::map<std::string, double> priors;                   // DiagnoseOptions::priors
   bool by_windows = false;  // train and held-out logs are the same: every third window is held out
 
   FitOptions Options(const Model& model, bool train) const;

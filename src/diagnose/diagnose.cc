@@ -7,6 +7,7 @@
 #include <set>
 
 #include "src/compare/noise.h"
+#include "src/core/names.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/coarsen.h"
 #include "src/diagnose/diagnosis.h"
@@ -326,6 +327,24 @@ double ShareOfWork(SearchEffort effort) {
   return effort == SearchEffort::kQuick ? 0.3 : effort == SearchEffort::kNormal ? 1 : 4;
 }
 
+// Priors must be of effects that the rig can have.
+Status CheckPriors(const std::map<std::string, double>& priors, const Rig& rig) {
+  std::set<std::string> known;
+  for (const auto& use : AllUses(rig)) known.insert({use.effect, use.Text()});
+  for (const auto& [name, prior] : priors) {
+    if (!known.contains(name))
+      return NoSuch("no such effect on this rig", name, {known.begin(), known.end()}, "--prior");
+    if (!(prior >= 0 && prior <= 1)) {
+      return Error{.what = "not a probability",
+                   .where = "--prior " + name,
+                   .actual = fmt::format("{:g}", prior),
+                   .allowed = "0 .. 1",
+                   .cure = "0.5 says nothing"};
+    }
+  }
+  return Ok();
+}
+
 // Steps of one replay of the training windows.
 std::size_t StepsOfReplay(const Workbench& bench) {
   auto made = MakeCandidate(bench, {});
@@ -346,6 +365,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   if (data.train.empty() || data.held_out.empty())
     return Error{.what = "diagnosis needs logs to fit and logs to judge by", .where = experiment.path};
   GS_ASSIGN(const auto model, Model::Load(experiment));
+  GS_RETURN_IF_ERROR(CheckPriors(options.priors, *model->rig()));
   const ScaleTable scales = EstimateScales(*model, fine.train);
   const std::vector<double> noise = SignalNoise(experiment, fine);
   const Say say = options.progress ? options.progress : [](const std::string&) {};
@@ -356,7 +376,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .pool = pool,
                     .weights = {},
                     .window_s = options.window_s,
-                    .max_windows = options.max_windows};
+                    .max_windows = options.max_windows,
+                    .priors = options.priors};
     bench.sample_s = kInfinity;
     for (const auto* logs : {&fine.train, &fine.held_out}) {
       for (const auto& recording : *logs) bench.sample_s = std::min(bench.sample_s, recording.timeline.median_step_s);

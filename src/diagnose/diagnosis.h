@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 #define GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -64,7 +65,9 @@ struct StatementNumbers {
 struct Statement {
   EffectUse use;
   Answer answer = Answer::kAbsent;
-  double probability = 0;  // that it is there
+  double probability = 0;  // that it is there: prior odds times evidence
+  double prior = 0.5;      // before the logs were seen: even odds, or as the user says
+  double evidence = 0;     // what the probability is at even odds
   std::vector<EffectEstimate> parameters;
   double share_of_gap = 0;
   int group = -1;  // statements of one group are told together
@@ -126,6 +129,8 @@ struct DiagnoseOptions {
   double sample_s = 0.004;  // logs are searched on stamps at least this far apart
   unsigned long seed = 0;
   std::size_t max_windows = 90;  // of the training logs
+  // What is known of effects beforehand: probabilities by "EFFECT" or "EFFECT@PLACE", which goes first. Others: 0.5.
+  std::map<std::string, double> priors;
   std::function<void(const std::string&)> progress;
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "src/core/statistics.h"
 #include "src/diagnose/discrepancy.h"
@@ -65,10 +66,9 @@ class Judging {
   Judgement Make() {
     Judgement result;
     for (const Member& member : found_.members) {
-      Statement statement{.use = member.use, .numbers = Numbers({member.use})};
+      Statement statement{.use = member.use, .numbers = Numbers({member.use}), .rule = "its own evidence"};
       statement.numbers.gain = std::min(statement.numbers.gain, member.gain);
-      statement.probability = ProbabilityOf(statement.numbers);
-      statement.rule = "its own evidence";
+      Weigh({member.use}, &statement);
       result.statements.push_back(std::move(statement));
     }
     Couple(&result);
@@ -83,27 +83,44 @@ class Judging {
   }
 
  private:
-  // Members that stand in for each other are judged by taking both out.
+  double PriorOf(const EffectUse& use) const {
+    for (const std::string& name : {use.Text(), use.effect}) {
+      if (const auto given = bench_.priors.find(name); given != bench_.priors.end()) return given->second;
+    }
+    return Statement{}.prior;
+  }
+
+  // Evidence and probability from the numbers. Of several uses the likeliest one's prior counts.
+  void Weigh(const std::vector<EffectUse>& uses, Statement* statement) const {
+    statement->prior = 0;
+    for (const EffectUse& use : uses) statement->prior = std::max(statement->prior, PriorOf(use));
+    statement->evidence = ProbabilityOf(statement->numbers);
+    statement->probability = AtPrior(statement->evidence, statement->prior);
+  }
+
+  // Members that stand in for each other are judged by taking both out, the nearest pairs first.
   void Couple(Judgement* result) {
     constexpr double kImitates = 0.5;
-    const std::size_t members = result->statements.size();
-    for (std::size_t a = 0; a < members; ++a) {
-      for (std::size_t b = a + 1; b < members; ++b) {
-        Statement &x = result->statements[a], &y = result->statements[b];
-        const double present = kDiagnosePolicy.probability.present;
-        if (std::min(x.probability, y.probability) >= present || x.group >= 0 || y.group >= 0 ||
-            ImitatedBy(x.use, y.use) < kImitates)
-          continue;
-        const StatementNumbers numbers = Numbers({x.use, y.use});
-        const double together = ProbabilityOf(numbers);
-        if (together < present || together < std::max(x.probability, y.probability)) continue;
-        result->groups.push_back({x.use, y.use});
-        for (Statement* s : {&x, &y}) {
-          s->group = static_cast<int>(result->groups.size()) - 1;
-          s->probability = together;
-          s->numbers = numbers;
-          s->rule = "taken out together";
-        }
+    std::vector<std::tuple<double, Statement*, Statement*>> pairs;
+    for (Statement& x : result->statements) {
+      for (Statement& y : result->statements) {
+        const double imitated = &x < &y ? ImitatedBy(x.use, y.use) : 0;
+        if (imitated >= kImitates) pairs.emplace_back(imitated, &x, &y);
+      }
+    }
+    std::stable_sort(pairs.begin(), pairs.end(),
+                     [](const auto& a, const auto& b) { return std::get<0>(a) > std::get<0>(b); });
+    const double present = kDiagnosePolicy.probability.present;
+    for (const auto& [imitated, x, y] : pairs) {
+      if (std::min(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
+      Statement together{.numbers = Numbers({x->use, y->use}), .rule = "taken out together"};
+      Weigh({x->use, y->use}, &together);
+      if (together.probability < std::max({present, x->probability, y->probability})) continue;
+      together.group = static_cast<int>(result->groups.size());
+      result->groups.push_back({x->use, y->use});
+      for (Statement* s : {x, y}) {
+        together.use = s->use;
+        *s = together;
       }
     }
   }
@@ -135,7 +152,9 @@ class Judging {
         }
         result->groups[static_cast<std::size_t>(own.group)].push_back(rival.use);
         Statement other{.use = rival.use,
-                        .probability = own.probability,
+                        .probability = AtPrior(own.evidence, PriorOf(rival.use)),
+                        .prior = PriorOf(rival.use),
+                        .evidence = own.evidence,
                         .group = own.group,
                         .numbers = own.numbers,
                         .rule = "costs as little in its place"};
@@ -159,7 +178,8 @@ class Judging {
           seen = std::max(seen, table.reduced(table.Reduced(c), table.Reduced(c)) / table.sum(c, c));
       }
       constexpr double kNothing = 1e-3;  // of a column is left beside the base model's parameters
-      Statement statement{.use = use, .answer = seen > kNothing ? Answer::kAbsent : Answer::kUnseen};
+      Statement statement{
+          .use = use, .answer = seen > kNothing ? Answer::kAbsent : Answer::kUnseen, .prior = PriorOf(use)};
       statement.rule = seen > kNothing ? "gains too little beside the effects of the final set"
                                        : "the base model's parameters imitate it fully";
       result->statements.push_back(std::move(statement));
@@ -214,6 +234,11 @@ double ProbabilityOf(const StatementNumbers& n) {
   const double x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
                    w.mimicry * std::log10(n.mimicry + 0.01) + w.discrepancy * evidence + (n.smooth ? w.smooth : 0);
   return 1 / (1 + std::exp(-x));
+}
+
+double AtPrior(double evidence, double prior) {
+  const double yes = evidence * prior, no = (1 - evidence) * (1 - prior);
+  return yes + no > 0 ? yes / (yes + no) : prior;
 }
 
 Verdict VerdictOf(const VerdictFacts& facts) {

@@ -9,6 +9,8 @@ namespace gapscope {
 
 // Probability that an effect with these numbers is there (ProbabilityPolicy).
 double ProbabilityOf(const StatementNumbers& numbers);
+// The same evidence at other prior odds than even ones: Bayes' rule. Both 0 .. 1.
+double AtPrior(double evidence, double prior);
 
 struct Judgement {
   std::vector<Statement> statements;           // the surest first; sizes are left to whoever describes them

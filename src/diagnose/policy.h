@@ -22,7 +22,7 @@ struct SearchPolicy {
   double exchange = 0.02;  // least gain of a rival that takes a member's place
   double tie = 0.1, tie_share = 0.05;  // what costs more by less than this, or this share of the member's gain, ties
   double simpler = 0.05;               // a richer effect that gains less over one that it contains gives way to it
-  std::size_t replays = 5000;          // of all training windows: what a diagnosis of normal effort may take
+  std::size_t replays = 7000;          // of all training windows: what a diagnosis of normal effort may take
 };
 
 struct EvidencePolicy {

@@ -160,30 +160,43 @@ class Searcher {
     result_.ledger.Continue(result_.chosen, Effort::kFinish);
   }
 
-  // Each member's gain: the rest refitted from the leader's optimum, or an earlier fit that is better. Members that
-  // gain too little go.
+  // The chosen set without a member, refitted from the leader's optimum, or an earlier fit that is better.
+  Candidate* TakenOut(const EffectUse& use, Effort effort) {
+    const EffectSet rest = Without(result_.chosen->effects, use);
+    Candidate* without = result_.ledger.Find(rest);
+    const bool known = without && without->converged;
+    if (effort == Effort::kTaste) {
+      say_("taking out " + use.Text());
+      if (!known || looked_.insert({result_.chosen->effects, use}).second)
+        without = result_.ledger.Refit(rest, *result_.chosen, {}, {}, effort);
+    } else if (without && !known) {
+      result_.ledger.Continue(without, effort);
+    }
+    return without ? without : result_.base;
+  }
+
+  // Each member's gain. Members that gain too little go: a fit that is not at its end has too high a cost, so what it
+  // says of a small gain holds, and the others need not be finished before.
   void TakeOut() {
     for (bool again = true; again;) {
       again = false;
-      result_.members.clear();
-      for (const EffectUse& use : result_.chosen->effects) {
-        say_("taking out " + use.Text());
-        const EffectSet rest = Without(result_.chosen->effects, use);
-        // Known well enough, a look from the leader's optimum is all that it needs.
-        const Candidate* without = result_.ledger.Find(rest);
-        const bool known = without && without->converged;
-        if (!known || looked_.insert({result_.chosen->effects, use}).second)
-          without = result_.ledger.Refit(rest, *result_.chosen, {}, {}, known ? Effort::kTaste : Effort::kTry);
-        if (!without) without = result_.base;
-        result_.members.push_back({.use = use, .without = without, .gain = GainAboveNoise(*without, *result_.chosen)});
+      for (const Effort effort : {Effort::kTaste, Effort::kTry}) {
+        result_.members.clear();
+        for (const EffectUse& use : result_.chosen->effects) {
+          const Candidate* without = TakenOut(use, effort);
+          result_.members.push_back(
+              {.use = use, .without = without, .gain = GainAboveNoise(*without, *result_.chosen)});
+        }
+        const auto least =
+            std::min_element(result_.members.begin(), result_.members.end(), [](const Member& a, const Member& b) {
+              return std::pair(a.gain, a.without->train_cost) < std::pair(b.gain, b.without->train_cost);
+            });
+        if (least == result_.members.end() || least->gain >= kPolicy.member) continue;
+        result_.chosen = result_.ledger.Find(Without(result_.chosen->effects, least->use));
+        result_.ledger.Continue(result_.chosen, Effort::kFinish);
+        again = true;
+        break;
       }
-      const auto least =
-          std::min_element(result_.members.begin(), result_.members.end(), [](const Member& a, const Member& b) {
-            return std::pair(a.gain, a.without->train_cost) < std::pair(b.gain, b.without->train_cost);
-          });
-      if (least == result_.members.end() || least->gain >= kPolicy.member) continue;
-      result_.chosen = result_.ledger.Find(Without(result_.chosen->effects, least->use));
-      again = true;
     }
   }
 

@@ -78,6 +78,8 @@ ordered_json Json(const Statement& s) {
                         {"on", s.use.on},
                         {"answer", AnswerName(s.answer)},
                         {"probability", s.probability},
+                        {"prior", s.prior},
+                        {"evidence", s.evidence},
                         {"parameters", parameters},
                         {"share_of_gap", JsonNumber(s.share_of_gap)},
                         {"group", s.group < 0 ? ordered_json() : ordered_json(s.group)},

@@ -99,6 +99,11 @@ TEST_F(CliTest, WrongArguments) {
   ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above nan", {"--fail-above"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --window inf", {"--window"});
   ExpectRefused("replay " + Joint() + " '" + log + "' --fail-above 0", {"--fail-above"});
+  const std::string diagnose = "diagnose " + Joint() + " '" + log + "' --prior ";
+  ExpectRefused(diagnose + "coulomb_friction", {"--prior", "not NAME=VALUE"});
+  ExpectRefused(diagnose + "coulomb_friction=1.2", {"--prior coulomb_friction", "1.2", "0 .. 1"});
+  ExpectRefused(diagnose + "coulomb_fricton=0.9", {"--prior", "coulomb_friction"});
+  ExpectRefused(diagnose + "coulomb_friction@nowhere=0.9", {"--prior", "coulomb_friction@joint"});
   // No number of 300 digits in a message, and nan is in no range.
   for (const auto& [command, flag, allowed] :
        {std::tuple{"diagnose", "--budget", "above 0 (s)"}, std::tuple{"diagnose", "--window", "above 0 (s)"},

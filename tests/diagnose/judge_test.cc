@@ -40,6 +40,14 @@ TEST(ProbabilityTest, WhatTellsNothingIsLeftOut) {
   EXPECT_EQ(ProbabilityOf(numbers), ProbabilityOf(kClear));
 }
 
+// Odds multiply: 1 to 3 at nine to one are 3 to 1.
+TEST(PriorTest, MultipliesTheOdds) {
+  EXPECT_DOUBLE_EQ(AtPrior(0.25, 0.9), 0.75);
+  EXPECT_DOUBLE_EQ(AtPrior(0.25, 0.5), 0.25);
+  EXPECT_EQ(AtPrior(0.99, 0), 0);
+  EXPECT_EQ(AtPrior(0.01, 1), 1);
+}
+
 TEST(VerdictTest, FollowsFromWhatIsThereAndWhatIsLeft) {
   EXPECT_EQ(VerdictOf({.present = true, .told = true, .floors_left = 30}), Verdict::kEffects);
   EXPECT_EQ(VerdictOf({.present = true, .told = false, .floors_left = 1}), Verdict::kAmbiguous);

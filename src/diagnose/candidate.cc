@@ -144,11 +144,11 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   return problem ? ReplayError(problem->Predict(point)) : kInfinity;
 }
 
-bool IsStretched(const PlacedParameter& p, double value) {
+OnBound BoundOf(double value, double low, double high) {
   constexpr double kEdge = 1e-3;  // of the range
-  const double at = p.low > 0 ? std::log(std::max(value, p.low) / p.low) / std::log(p.high / p.low)
-                              : (value - p.low) / (p.high - p.low);
-  return (at <= kEdge && p.neutral != p.low) || (at >= 1 - kEdge && p.neutral != p.high);
+  const double at =
+      low > 0 ? std::log(std::max(value, low) / low) / std::log(high / low) : (value - low) / (high - low);
+  return at <= kEdge ? OnBound::kLow : at >= 1 - kEdge ? OnBound::kHigh : OnBound::kNo;
 }
 
 }  // namespace gapscope

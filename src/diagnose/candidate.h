@@ -75,9 +75,9 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate);
 // fitted; infinity where that diverges.
 double FreeRunError(const Workbench& bench, const Candidate& candidate);
 
-// Whether a parameter ended on a bound that does not mean "no effect": on a positive range of decades, in its
-// logarithm, as it is searched.
-bool IsStretched(const PlacedParameter& parameter, double value);
+// Which bound a value lies on, 0.1 % of the range near, on a positive range in its logarithm, as it is searched.
+enum class OnBound { kNo, kLow, kHigh };
+OnBound BoundOf(double value, double low, double high);
 
 }  // namespace gapscope
 

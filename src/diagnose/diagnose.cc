@@ -84,6 +84,19 @@ std::vector<ConditionShare> Locate(const Candidate& candidate, const std::vector
   return MostTelling(where, {.limit = 12});
 }
 
+// Base parameters that ended on a bound.
+std::vector<AtBound> FindAtBounds(const Candidate& candidate, const Model& base) {
+  std::vector<AtBound> found;
+  for (const int i : base.FreeParameters()) {
+    const Parameter& p = base.parameters()[static_cast<std::size_t>(i)];
+    const double value = candidate.values[static_cast<std::size_t>(candidate.model->IndexOf(p.name))];
+    const OnBound bound = BoundOf(value, p.low, p.high);
+    if (bound == OnBound::kNo || bound == BoundOf(p.nominal, p.low, p.high)) continue;
+    found.push_back({.name = p.name, .unit = p.unit, .value = value});
+  }
+  return found;
+}
+
 // Sizes of a candidate's effects with their intervals.
 std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate) {
   std::map<EffectUse, std::vector<EffectEstimate>> sizes;
@@ -264,6 +277,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
     result.remainder.explained = std::clamp(1 - result.final * result.final / before, 0.0, 1.0);
     result.remainder.systematic = std::max(0.0, 1 - result.remainder.explained - result.remainder.sensors);
   }
+  result.at_bounds = FindAtBounds(chosen, *base.model);
   SuggestNext(found, judgement, bench.rig->experiment().path, &result);
   result.where = Locate(base, bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);

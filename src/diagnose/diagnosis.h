@@ -80,6 +80,12 @@ struct Remainder {
   double explained = 0, systematic = 0, sensors = 0;
 };
 
+// A base parameter of the final model that ended on a bound other than its nominal value: the truth may lie beyond.
+struct AtBound {
+  std::string name, unit;
+  double value = 0;
+};
+
 // What the verdict rests on as a whole.
 struct VerdictEvidence {
   // Residual over the sensors' noise, root mean square, held out: refitted base model, final model.
@@ -95,6 +101,7 @@ struct Diagnosis {
   std::vector<FoundEffect> effects;
   std::vector<Statement> statements;  // of every effect that was looked at, the surest first
   Remainder remainder;
+  std::vector<AtBound> at_bounds;
   std::vector<std::vector<EffectUse>> ambiguous;  // groups that these logs cannot tell apart
   // Held-out errors, normalised: see ReplayError; in windows.
   double nominal = 0, refit = 0, final = 0, floor = 0, closed = 0;

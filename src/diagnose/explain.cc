@@ -65,6 +65,13 @@ std::string Explain(const Diagnosis& d) {
     text += fmt::format(" Over whole logs in one run the error goes from {:.3g} to {:.3g}.", e.free_run_before,
                         e.free_run_left);
   }
+  if (!d.at_bounds.empty()) {
+    std::string names;
+    for (const auto& p : d.at_bounds)
+      names += fmt::format("{}{} ({:.3g} {})", names.empty() ? "" : ", ", p.name, p.value, p.unit);
+    text +=
+        " On a bound of the experiment file ended: " + names + "; where the rig allows more, widen it and ask again.";
+  }
   if (!d.cut.empty()) text += " The budget ended the search early.";
   return text;
 }

@@ -98,7 +98,8 @@ class Judging {
     statement->probability = AtPrior(statement->evidence, statement->prior);
   }
 
-  // Members that stand in for each other are judged by taking both out, the nearest pairs first.
+  // Members that stand in for each other, neither of them sure alone, are judged by taking both out, the nearest pairs
+  // first. Most of what they gain must show only then: else the stronger one would lend the weaker one its evidence.
   void Couple(Judgement* result) {
     constexpr double kImitates = 0.5;
     std::vector<std::tuple<double, Statement*, Statement*>> pairs;
@@ -112,10 +113,11 @@ class Judging {
                      [](const auto& a, const auto& b) { return std::get<0>(a) > std::get<0>(b); });
     const double present = kDiagnosePolicy.probability.present;
     for (const auto& [imitated, x, y] : pairs) {
-      if (std::min(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
+      if (std::max(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
       Statement together{.numbers = Numbers({x->use, y->use}), .rule = "taken out together"};
       Weigh({x->use, y->use}, &together);
-      if (together.probability < std::max({present, x->probability, y->probability})) continue;
+      const double alone = std::max(x->numbers.gain, 0.0) + std::max(y->numbers.gain, 0.0);
+      if (together.probability < present || alone > kDiagnosePolicy.evidence.alone * together.numbers.gain) continue;
       together.group = static_cast<int>(result->groups.size());
       result->groups.push_back({x->use, y->use});
       for (Statement* s : {x, y}) {

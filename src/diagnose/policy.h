@@ -32,6 +32,8 @@ struct EvidencePolicy {
   double per_block = 4;                         // what half a second of residuals counts for
   std::size_t sums = 300;                       // random torques in the residual's place
   double most_gain = 3;                         // above it a gain says nothing more
+  double alone =
+      0.5;  // most of a pair's gain that shows when one of the two is taken out, for the two to be told as one
 };
 
 // P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).

@@ -139,6 +139,9 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
                        {"systematic", JsonNumber(d.remainder.systematic)},
                        {"sensors", JsonNumber(d.remainder.sensors)},
                        {"where", JsonConditions(d.remains)}};
+  json["at_bounds"] = ordered_json::array();
+  for (const auto& p : d.at_bounds)
+    json["at_bounds"].push_back({{"name", p.name}, {"value", JsonNumber(p.value)}, {"unit", p.unit}});
   ordered_json separates = ordered_json::array();
   for (const auto& explanation : d.next_separates) separates.push_back(NameOf(explanation));
   json["next_experiment"] = {{"command", d.next_command}, {"separates", separates}};

@@ -64,17 +64,14 @@ TEST(RulesTest, GravityIsUnlikelyOnAnUprightAxis) {
 }
 
 // A soft spring, at a hundredth of the stiff end of its range of four decades, is no bound.
-TEST(RulesTest, OnlyTheEndOfARangeIsStretched) {
-  const PlacedParameter stiffness{
-      .name = {}, .key = {}, .unit = {}, .neutral = 3000, .low = 0.5, .high = 3000, .start = 100, .trials = {}};
-  EXPECT_FALSE(IsStretched(stiffness, 2));
-  EXPECT_TRUE(IsStretched(stiffness, 0.5));
-  EXPECT_FALSE(IsStretched(stiffness, 3000)) << "no effect";
-  const PlacedParameter angle{
-      .name = {}, .key = {}, .unit = {}, .neutral = 0, .low = -2, .high = 2, .start = 0.1, .trials = {}};
-  EXPECT_TRUE(IsStretched(angle, -2));
-  EXPECT_TRUE(IsStretched(angle, 1.999));
-  EXPECT_FALSE(IsStretched(angle, 1.9));
+// On a positive range in the logarithm, elsewhere in the value itself.
+TEST(BoundTest, LiesAtTheEndOfARange) {
+  EXPECT_EQ(BoundOf(0.5, 0.5, 3000), OnBound::kLow);
+  EXPECT_EQ(BoundOf(2, 0.5, 3000), OnBound::kNo);
+  EXPECT_EQ(BoundOf(3000, 0.5, 3000), OnBound::kHigh);
+  EXPECT_EQ(BoundOf(-2, -2, 2), OnBound::kLow);
+  EXPECT_EQ(BoundOf(1.9, -2, 2), OnBound::kNo);
+  EXPECT_EQ(BoundOf(1.999, -2, 2), OnBound::kHigh);
 }
 
 TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {

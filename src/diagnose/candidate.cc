@@ -31,6 +31,7 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
                      .prior_share = kFitPolicy.known_share / std::sqrt(kCorrelated),
                      .prior_offset_rad = kFitPolicy.known_offset_rad / std::sqrt(kCorrelated),
                      .linear_terms = true,
+                     .bounds = *bounds,
                      .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
@@ -53,17 +54,19 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
 }
 
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
-                  GiveUp give_up) {
+                  GiveUp give_up, std::shared_ptr<const Derivatives> inherited) {
   const SolveOptions options{.max_iterations = iterations,
                              .tolerance = tolerance,
-                             .coarse_step = 0.03,
+                             .coarse_step = kCoarseStep,
                              .fine_step = 0.01,
                              .give_up = std::move(give_up),
+                             .inherited = std::move(inherited),
                              .deadline = bench.deadline};
   const SolveResult solved = Solve(*candidate->problem, start, options);
   *bench.work += solved.work;
   candidate->scored = false;
   candidate->point = solved.point;
+  candidate->derivatives = solved.derivatives;
   candidate->train_cost = solved.cost;
   candidate->converged = solved.termination == Termination::kConverged;
   candidate->values = candidate->problem->Values(solved.point);
@@ -94,6 +97,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   if (!std::isfinite(solved.cost)) return;
   candidate->scored = false;
   candidate->problem = std::move(problem);
+  candidate->derivatives.reset();
   candidate->point = solved.point;
   candidate->train_cost = solved.cost;
   candidate->values = candidate->problem->Values(solved.point);

@@ -19,6 +19,7 @@ struct Candidate {
   std::shared_ptr<const Model> model;
   std::unique_ptr<FitProblem> problem;  // on the training logs
   FitPoint point;
+  std::shared_ptr<const Derivatives> derivatives;  // there, as far as they were kept up; null: not at hand
   double train_cost = 0;
   bool converged = false;
   bool scored = false;
@@ -37,6 +38,9 @@ struct Candidate {
   }
 };
 
+// Finite differences of a fit's first Jacobians, in search coordinates.
+inline constexpr double kCoarseStep = 0.03;
+
 using Say = std::function<void(const std::string&)>;
 
 // What all candidates share.
@@ -54,6 +58,9 @@ struct Workbench {
   std::shared_ptr<Work> work = std::make_shared<Work>();  // done so far
   std::size_t most_steps = 0;                             // of the simulator; 0: no limit
   std::map<std::string, double> priors;                   // DiagnoseOptions::priors
+  // Of base parameters, where they were widened.
+  std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
+      std::make_shared<std::map<std::string, std::pair<double, double>>>();
   bool by_windows = false;  // train and held-out logs are the same: every third window is held out
 
   FitOptions Options(const Model& model, bool train) const;
@@ -65,7 +72,7 @@ struct Workbench {
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
 // Fits from `start` on the training logs, until `give_up` says to.
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
-                  GiveUp give_up = {});
+                  GiveUp give_up = {}, std::shared_ptr<const Derivatives> inherited = {});
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
 void PolishCandidate(const Workbench& bench, Candidate* candidate);
 // Fills the held-out fields, once.

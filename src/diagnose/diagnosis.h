@@ -58,7 +58,9 @@ struct StatementNumbers {
   double gain_free = 0;      // likewise, each log one free run; NaN: it tells nothing
   double discrepancy = 0;    // gain in log marginal likelihood beside random torques
   double mimicry = 1;        // share of random torques that the effect would hold as much of
+  double clear = 0;          // held-out gain over its standard error, by half seconds
   bool smooth = false;       // a function of a joint's own motion: what roughness looks like
+  bool dry = false;          // dry friction: of these the one with a jump
 };
 
 // What is said of one effect.

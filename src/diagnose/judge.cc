@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <tuple>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/discrepancy.h"
 #include "src/diagnose/policy.h"
+#include "src/fit/policy.h"
 
 namespace gapscope {
 namespace {
@@ -23,6 +26,26 @@ double Log(double before, double after) {
 double FreeGain(double before, double after) {
   constexpr double kLost = 1;
   return std::min(before, after) > kLost ? kNaN : 2 * Log(before, after);
+}
+
+// What the held-out logs gain, over its standard error: half seconds are independent.
+double ClearBy(const Workbench& bench, const Candidate& without, const Candidate& with) {
+  std::map<std::pair<std::size_t, long>, double> gains;
+  for (std::size_t l = 0; l < std::min(without.held_out.size(), with.held_out.size()); ++l) {
+    const LogReplay &a = without.held_out[l], &b = with.held_out[l];
+    for (std::size_t s = 0; s < std::min(a.signals.size(), b.signals.size()); ++s) {
+      const double weight = bench.weights[bench.data.held_out[l].measured[s].index];
+      for (std::size_t r = 0; r < a.time_s.size(); ++r) {
+        const double before = weight * (a.signals[s].predicted[r] - a.signals[s].measured[r]),
+                     after = weight * (b.signals[s].predicted[r] - b.signals[s].measured[r]);
+        if (std::isfinite(before) && std::isfinite(after))
+          gains[{l, std::lround(std::floor(a.time_s[r] / kFitPolicy.block_s))}] += before * before - after * after;
+      }
+    }
+  }
+  const auto values = Collect(gains, [](const auto& entry) { return entry.second; });
+  const Moments moments = MomentsOf(values);
+  return moments.deviation > 0 ? std::sqrt(static_cast<double>(values.size())) * moments.mean / moments.deviation : 0;
 }
 
 class Judging {
@@ -49,6 +72,10 @@ class Judging {
     numbers.gain = Log(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
     numbers.gain_held_out = Log(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
     numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
+    numbers.clear = ClearBy(bench_, *without, *found_.chosen);
+    numbers.dry = std::all_of(uses.begin(), uses.end(), [&](const EffectUse& use) {
+      return EffectOf(use, *bench_.rig).character == EffectCharacter::kDryFriction;
+    });
     numbers.smooth = std::all_of(uses.begin(), uses.end(),
                                  [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).of_motion; });
     if (torques_.empty()) return numbers;
@@ -65,14 +92,11 @@ class Judging {
 
   Judgement Make() {
     Judgement result;
-    for (const Member& member : found_.members) {
-      Statement statement{.use = member.use, .numbers = Numbers({member.use}), .rule = "its own evidence"};
-      statement.numbers.gain = std::min(statement.numbers.gain, member.gain);
-      Weigh({member.use}, &statement);
-      result.statements.push_back(std::move(statement));
-    }
+    for (const Member& member : found_.members) result.statements.push_back(Of(member.use));
+    const std::vector<Statement> dropped = DropSpare(&result);
     Couple(&result);
     AddRivals(&result);
+    result.statements.insert(result.statements.end(), dropped.begin(), dropped.end());
     for (Statement& s : result.statements)
       s.answer = s.probability >= kDiagnosePolicy.probability.present ? Answer::kPresent : Answer::kAbsent;
     AddOthers(&result);
@@ -83,6 +107,42 @@ class Judging {
   }
 
  private:
+  Statement Of(const EffectUse& use) {
+    Statement statement{.use = use, .numbers = Numbers({use}), .rule = "its own evidence"};
+    Weigh({use}, &statement);
+    return statement;
+  }
+
+  // A member that is not sure and hardly gains takes evidence from those that it stands in for: it goes, the weakest
+  // first, and they are judged without it.
+  std::vector<Statement> DropSpare(Judgement* result) {
+    std::vector<Statement> dropped;
+    for (;;) {
+      auto& all = result->statements;
+      const auto least = std::min_element(all.begin(), all.end(), [](const Statement& a, const Statement& b) {
+        return a.numbers.gain < b.numbers.gain;
+      });
+      if (all.size() < 2 || least->probability >= kDiagnosePolicy.probability.present ||
+          least->numbers.gain >= kDiagnosePolicy.search.tie)
+        return dropped;
+      const EffectSet rest = Without(found_.chosen->effects, least->use);
+      Candidate* without = found_.ledger.Find(rest);
+      if (!without) return dropped;
+      found_.ledger.Continue(without, Effort::kTry);
+      ScoreCandidate(bench_, without);
+      found_.chosen = without;
+      free_left_ = FreeRunError(bench_, *without);
+      dropped.push_back(*least);
+      dropped.back().rule = "hardly gains beside the others";
+      const EffectUse gone = least->use;
+      all.erase(least);
+      std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
+      for (Statement& s : all) {
+        if (ImitatedBy(s.use, gone) >= kDiagnosePolicy.search.imitates) s = Of(s.use);
+      }
+    }
+  }
+
   double PriorOf(const EffectUse& use) const {
     for (const std::string& name : {use.Text(), use.effect}) {
       if (const auto given = bench_.priors.find(name); given != bench_.priors.end()) return given->second;

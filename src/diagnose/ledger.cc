@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
+#include "src/fit/inherit.h"
 
 namespace gapscope {
 namespace {
@@ -16,7 +18,7 @@ struct FitLimits {
 FitLimits LimitsOf(Effort effort) {
   switch (effort) {
     case Effort::kTaste:
-      return {.iterations = 3, .tolerance = 1e-2};
+      return {.iterations = 2, .tolerance = 1e-2};
     case Effort::kTry:
       return {.iterations = 10, .tolerance = 3e-3};
     case Effort::kFinish:
@@ -68,7 +70,7 @@ std::vector<Candidate*> Ledger::All() const {
 }
 
 // Keeps the fit if it ends below the candidate's.
-bool Ledger::Try(Candidate* candidate, const FitPoint& start, Effort effort) {
+bool Ledger::Try(Candidate* candidate, const FitPoint& start, const Candidate* from, Effort effort) {
   const double known = candidate->train_cost;
   const Evaluation there = candidate->problem->Evaluate(start, Keep::kCost);
   *bench_.work += there.work;
@@ -77,9 +79,18 @@ bool Ledger::Try(Candidate* candidate, const FitPoint& start, Effort effort) {
   const std::vector<double> values = candidate->values;
   const bool converged = candidate->converged, scored = candidate->scored;
   const double shift_s = candidate->shift_s;
+  const auto derivatives = candidate->derivatives;
+  std::shared_ptr<const Derivatives> inherited;
+  if (from && from->derivatives) {
+    auto made = Inherit(*from->problem, *from->derivatives, *candidate->problem, start, kCoarseStep);
+    *bench_.work += made.work;
+    if (made.valid) inherited = std::make_shared<const Derivatives>(std::move(made));
+  }
   const auto [iterations, tolerance] = LimitsOf(effort);
   FitCandidate(bench_, candidate, start, iterations, tolerance,
-               std::isfinite(known) && there.cost > known ? TooSlow(known, iterations) : GiveUp{});
+               std::isfinite(known) && there.cost > known ? TooSlow(known, iterations) : GiveUp{},
+               std::move(inherited));
+  Remember(candidate);
   if (candidate->train_cost < known) return true;
   candidate->point = before;
   candidate->values = values;
@@ -87,7 +98,16 @@ bool Ledger::Try(Candidate* candidate, const FitPoint& start, Effort effort) {
   candidate->converged = converged;
   candidate->scored = scored;
   candidate->shift_s = shift_s;
+  candidate->derivatives = derivatives;
   return false;
+}
+
+void Ledger::Remember(Candidate* candidate) {
+  std::erase(remembered_, candidate);
+  remembered_.push_back(candidate);
+  if (remembered_.size() <= kDiagnosePolicy.search.jacobians) return;
+  remembered_.front()->derivatives.reset();
+  remembered_.pop_front();
 }
 
 Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std::map<std::string, double>& values,
@@ -123,13 +143,20 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
     least = there.cost;
     best = std::move(start);
   }
-  Try(&candidate, best, effort);
+  Try(&candidate, best, &from, effort);
   if (!std::isfinite(candidate.train_cost)) return nullptr;
   StartFromSubsets(&candidate, effort);
   return &candidate;
 }
 
-void Ledger::Continue(Candidate* candidate, Effort effort) { Try(candidate, candidate->point, effort); }
+void Ledger::Clear() {
+  remembered_.clear();
+  fitted_.clear();
+}
+
+void Ledger::Continue(Candidate* candidate, Effort effort) {
+  Try(candidate, candidate->point, nullptr, effort);
+}
 
 void Ledger::StartFromSubsets(Candidate* candidate, Effort effort) {
   const Candidate* best = nullptr;
@@ -150,7 +177,7 @@ void Ledger::StartFromSubsets(Candidate* candidate, Effort effort) {
                                                                   : p.neutral + kSmall * (p.trials.front() - p.neutral);
     }
   }
-  Try(candidate, CarryOver(*best->problem, best->point, *candidate->problem, values), effort);
+  Try(candidate, CarryOver(*best->problem, best->point, *candidate->problem, values), best, effort);
 }
 
 }  // namespace gapscope

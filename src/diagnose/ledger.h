@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_LEDGER_H_
 #define GAPSCOPE_DIAGNOSE_LEDGER_H_
 
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -31,15 +32,21 @@ class Ledger {
   // that ends above one of its own subsets is fitted again from there. Null: it cannot be built or simulated.
   Candidate* Refit(const EffectSet& set, const Candidate& from, const std::map<std::string, double>& values,
                    const Eigen::VectorXd& dy, Effort effort);
+  // Forgets all sets, before the first of them is pointed to.
+  void Clear();
   // Fits on from where the set is.
   void Continue(Candidate* candidate, Effort effort);
 
  private:
   void StartFromSubsets(Candidate* candidate, Effort effort);
-  bool Try(Candidate* candidate, const FitPoint& start, Effort effort);
+  // `from`: whose Jacobian, if it has one, the first steps are made with; null: none.
+  bool Try(Candidate* candidate, const FitPoint& start, const Candidate* from, Effort effort);
+  // Jacobians are large: only those of the last few fits are kept.
+  void Remember(Candidate* candidate);
 
   const Workbench& bench_;
   std::map<EffectSet, std::unique_ptr<Candidate>> fitted_;
+  std::deque<Candidate*> remembered_;
 };
 
 }  // namespace gapscope

@@ -8,6 +8,7 @@ namespace gapscope {
 
 // Gains are ln(cost without / cost with), costs those of refitted sets.
 struct SearchPolicy {
+  std::size_t widenings = 2;                        // of base parameters' bounds, before effects are judged
   std::size_t beam = 8;                             // sets kept per size while arithmetic orders them
   std::size_t singles = 5, pairs = 3, triples = 1;  // of the base model, that are refitted
   std::size_t go_on = 2;                            // of the sets that were begun, how many are fitted on
@@ -22,6 +23,7 @@ struct SearchPolicy {
   double exchange = 0.02;  // least gain of a rival that takes a member's place
   double tie = 0.1, tie_share = 0.05;  // what costs more by less than this, or this share of the member's gain, ties
   double simpler = 0.05;               // a richer effect that gains less over one that it contains gives way to it
+  std::size_t jacobians = 24;          // kept, of the last fits: what the next ones begin with
   std::size_t replays = 7000;          // of all training windows: what a diagnosis of normal effort may take
 };
 

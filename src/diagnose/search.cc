@@ -44,6 +44,13 @@ class Searcher {
     ScoreCandidate(bench_, &nominal);
     result_.nominal = std::make_unique<Candidate>(std::move(nominal));
     result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kFinish);
+    for (std::size_t round = 0; round < kPolicy.widenings && WidenBounds(*result_.base); ++round) {
+      GS_ASSIGN(Candidate wider, MakeCandidate(bench_, {}));
+      wider.values = result_.base->values;
+      wider.point = CarryOver(*result_.base->problem, result_.base->point, *wider.problem, wider.values);
+      result_.ledger.Clear();
+      result_.base = result_.ledger.Refit({}, wider, {}, {}, Effort::kFinish);
+    }
     ScoreCandidate(bench_, result_.base);
     result_.chosen = result_.base;
     for (const auto& use : AllUses(*bench_.rig)) {
@@ -70,6 +77,22 @@ class Searcher {
     if (!bench_.Late()) return false;
     if (result_.cut.empty() || result_.cut.back() != what) result_.cut.emplace_back(what);
     return true;
+  }
+
+  // Base parameters that ended on a bound get as much room again beyond it: an effect must not stand in for a value
+  // that the experiment file happens to exclude. Zero is a bound of physics. False: there are none.
+  bool WidenBounds(const Candidate& base) {
+    bool widened = false;
+    for (const Coordinate& c : base.problem->space().coordinates()) {
+      const Parameter& p = base.problem->space().parameter(c);
+      const OnBound bound = BoundOf(base.values[static_cast<std::size_t>(c.parameter)], p.low, p.high);
+      if (bound == OnBound::kNo || (bound == OnBound::kLow && p.low == 0)) continue;
+      const double factor = p.low > 0 ? p.high / p.low : 0, width = p.high - p.low;
+      const double low = p.low > 0 ? p.low / factor : p.low - width, high = p.low > 0 ? p.high * factor : p.high + width;
+      (*bench_.bounds)[p.name] = {bound == OnBound::kLow ? low : p.low, bound == OnBound::kHigh ? high : p.high};
+      widened = true;
+    }
+    return widened;
   }
 
   // Refits the best sets of each size on top of the parent, where arithmetic promises enough.

@@ -37,7 +37,7 @@ class FitProblem::Differences {
     jacobian_.setZero(residual_.size(), n + state_.size());
     const bool all = options_.columns != Columns::kStates;
     if (all) Parameters();
-    if (all && layout_.shift() >= 0) {
+    if (all && layout_.shift() >= 0 && !Known(layout_.shift())) {
       const double h = kFitPolicy.shift_step;
       if (Replay(point_, values_, state_, shift_ + h * layout_.shift_scale_s)) Difference(layout_.shift(), h);
     }
@@ -53,6 +53,9 @@ class FitProblem::Differences {
     problem_.ResidualsOf(window_, point_, worker_.perturbed, worker_.other);
     return true;
   }
+  bool Known(Eigen::Index column) const {
+    return !options_.known.empty() && options_.known[static_cast<std::size_t>(column)];
+  }
   void Difference(Eigen::Index column, double h) { jacobian_.col(column) = (worker_.other - residual_) / h; }
 
   void Parameters() {
@@ -62,6 +65,7 @@ class FitProblem::Differences {
       return Replay(point_, worker_.values, state_, shift_);
     };
     for (Eigen::Index i = 0; i < layout_.parameters; ++i) {
+      if (Known(i)) continue;
       const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
       // Towards the inside, so that the step does not leave the bounds; the other way when that cannot be simulated.
       double h = point_.y[i] + options_.step <= c.high ? options_.step : -options_.step;
@@ -79,7 +83,7 @@ class FitProblem::Differences {
 
   void States(Eigen::Index first) {
     Eigen::VectorXd moved = state_;
-    for (Eigen::Index j = 0; j < state_.size(); ++j) {
+    for (Eigen::Index j = options_.known_states; j < state_.size(); ++j) {
       const double h = kFitPolicy.state_step / window_.prior[j];
       moved[j] += h;
       if (Replay(point_, values_, moved, shift_)) Difference(first + j, h);
@@ -93,7 +97,7 @@ class FitProblem::Differences {
     const Eigen::Index scored = window_.scored();
     for (std::size_t s = 0; s < signals.size(); ++s) {
       const SignalLayout& signal = signals[s];
-      if (signal.offset < 0) continue;
+      if (signal.offset < 0 || Known(signal.offset)) continue;
       auto column = jacobian_.col(signal.offset);
       if (problem_.options_.start == WindowStart::kRest) {
         column.setZero();
@@ -131,10 +135,16 @@ Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const
   Work work;
   if (!base_known) work = {.evaluations = 1, .replays = 1};
   if (options.columns != Columns::kStates) {
-    work.replays += space_.coordinates().size() * (options.columns == Columns::kCentral ? 2 : 1);
-    if (layout_.shift() >= 0) ++work.replays;
+    const auto wanted = [&](Eigen::Index i) {
+      return options.known.empty() || !options.known[static_cast<std::size_t>(i)] ? std::size_t{1} : std::size_t{0};
+    };
+    for (Eigen::Index i = 0; i < layout_.parameters; ++i)
+      work.replays += wanted(i) * (options.columns == Columns::kCentral ? 2 : 1);
+    if (layout_.shift() >= 0) work.replays += wanted(layout_.shift());
   }
-  if (!windows_.empty()) work.replays += static_cast<std::size_t>(windows_.front().prior.size());
+  if (!windows_.empty())
+    work.replays += static_cast<std::size_t>(std::max<Eigen::Index>(
+        0, windows_.front().prior.size() - options.known_states));
   return work;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
@@ -21,6 +22,14 @@ std::size_t CountResiduals(const FitLayout& layout, const std::vector<FitWindow>
   return count;
 }
 
+std::vector<Parameter> Bounded(std::vector<Parameter> parameters, const FitOptions& options) {
+  for (Parameter& p : parameters) {
+    if (const auto given = options.bounds.find(p.name); given != options.bounds.end())
+      std::tie(p.low, p.high) = given->second;
+  }
+  return parameters;
+}
+
 Eigen::VectorXd StartY(const SearchSpace& space, const FitLayout& layout) {
   Eigen::VectorXd y = Eigen::VectorXd::Zero(layout.low.size());
   y.head(space.size()) = space.ToSearch(space.start());
@@ -37,7 +46,8 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       recordings_(recordings),
       options_(std::move(options)),
       pool_(pool),
-      space_(model.parameters(), options_.free, std::move(values), options_.logarithmic_effects, options_.linear_terms),
+      parameters_(Bounded(model.parameters(), options_)),
+      space_(parameters_, options_.free, std::move(values), options_.logarithmic_effects, options_.linear_terms),
       layout_(MakeLayout(model, recordings, options_, space_)),
       windows_(MakeFitWindows(model, recordings, options_, layout_, space_.start())),
       prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), CountResiduals(layout_, windows_))),

@@ -41,6 +41,9 @@ struct DifferenceOptions {
   // differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns that are
   // parallel to rounding, which one-sided ones are not.
   enum class Columns { kAll, kStates, kCentral } columns = Columns::kAll;
+  // Columns that are left zero: of y (empty: none), and the first ones of a window's state.
+  std::vector<char> known = {};
+  Eigen::Index known_states = 0;
 };
 
 // Residuals and Jacobian of a point.
@@ -119,6 +122,7 @@ class FitProblem {
   const std::vector<Recording>& recordings_;
   FitOptions options_;
   ThreadPool& pool_;
+  std::vector<Parameter> parameters_;  // the model's, with the bounds that the options ask for
   SearchSpace space_;
   FitLayout layout_;
   std::vector<FitWindow> windows_;

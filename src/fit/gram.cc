@@ -80,10 +80,14 @@ Eigen::MatrixXd Products(const Eigen::MatrixXd& rows, const RowBlock& block, Eig
 }  // namespace
 
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options) {
+                    const DifferenceOptions& options, const Derivatives* known) {
   GramSystem gram{.columns = ColumnNames(parent, extra), .parameters = parent.layout().low.size()};
-  const Derivatives at = parent.Differentiate(point, options);
-  gram.work = at.work;
+  Derivatives made;
+  if (!known) {
+    made = parent.Differentiate(point, options);
+    gram.work = made.work;
+  }
+  const Derivatives& at = known ? *known : made;
   if (!at.valid) return gram;
   std::vector<Residuals> others;
   for (const ExtraColumn& column : extra) {

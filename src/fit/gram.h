@@ -43,8 +43,9 @@ struct ExtraColumn {
   ProbeTorque probe = {};
 };
 
+// `known`: the parent's derivatives at the point where they are at hand; else they are made.
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options);
+                    const DifferenceOptions& options, const Derivatives* known = nullptr);
 
 // Weighted sum over blocks; a fold that is left out weighs 0. `block_weights`: one per block, or empty for all ones.
 // The states' priors of a log weigh as much as its blocks do on average.

@@ -14,6 +14,7 @@ using Columns = DifferenceOptions::Columns;
 // Where a run is between two Jacobians. The residuals at the point are not journaled.
 struct LmState : Checkpoint {
   Residuals residuals;
+  std::shared_ptr<Derivatives> derivatives;  // at the point; nor are these
 };
 
 // One run: the problem, how it is asked to be solved, and where it is.
@@ -24,6 +25,12 @@ class LmRun {
 
   // One Jacobian, and the steps made with it.
   void Iterate();
+  // Steps with a Jacobian of elsewhere.
+  void IterateInherited() {
+    s_.derivatives = std::make_shared<Derivatives>(*options_.inherited);
+    SecantSteps(*s_.derivatives);
+    ++s_.iterations;
+  }
 
  private:
   double Cost(const FitPoint& point, Residuals* residuals) {
@@ -120,7 +127,9 @@ double LmRun::TryStep(const Derivatives& derivatives, const Linearization& at, c
 void LmRun::Iterate() {
   const DifferenceOptions differences{.step = s_.difference,
                                       .columns = options_.central ? Columns::kCentral : Columns::kAll};
-  Derivatives derivatives = problem_.Differentiate(s_.point, differences, std::move(s_.residuals));
+  s_.derivatives =
+      std::make_shared<Derivatives>(problem_.Differentiate(s_.point, differences, std::move(s_.residuals)));
+  Derivatives& derivatives = *s_.derivatives;
   s_.work += derivatives.work;
   s_.residuals = derivatives.residuals;
   const Linearization at = Reduce(problem_, s_.point, derivatives, Blocks::kNone);
@@ -142,7 +151,7 @@ void LmRun::Iterate() {
       accepted = true;
       if (options_.secant) UpdateSecant(problem_, derivatives, s_.point, trial, residuals);
       Take(std::move(trial), cost, std::move(residuals), kLmPolicy.shrink);
-      if (options_.secant) SecantSteps(derivatives);
+      options_.secant ? SecantSteps(derivatives) : s_.derivatives.reset();
       break;
     }
     const double first = kLmPolicy.first_rejection;
@@ -184,7 +193,7 @@ void Run(const SolveTask& task, const SolveOptions& options, LmState* s) {
     const FitPoint before = s->point;
     // Resumed: what the journal did not keep is no new work.
     if (s->residuals.empty()) s->residuals = task.problem.Evaluate(s->point, Keep::kResiduals).residuals;
-    run.Iterate();
+    options.inherited && s->iterations == 0 ? run.IterateInherited() : run.Iterate();
     if (options.progress)
       options.progress({.best = s->cost, .evaluations = s->work.evaluations, .iteration = s->iterations});
     // An iteration that the deadline cut short is made anew.
@@ -210,7 +219,7 @@ SolveResult SolveLm(const SolveTask& task, const FitPoint& start, const SolveOpt
   } else {
     Run(task, options, &s);
   }
-  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations, .work = s.work};
+  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations, .work = s.work, .derivatives = s.derivatives};
 }
 
 }  // namespace gapscope

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,8 @@ struct SolveOptions {
   bool central = false;
   bool secant = true;  // lm: between two Jacobians, steps with secant updates of the last one
   GiveUp give_up;      // lm: asked before each Jacobian
+  // lm: derivatives at the start, near enough for steps that are tried: the first iteration is made with them.
+  std::shared_ptr<const Derivatives> inherited;
   Deadline deadline;
   unsigned long seed = 0;  // of what is random in a global method
   std::function<void(const Progress&)> progress;
@@ -50,6 +53,8 @@ struct SolveResult {
   Termination termination = Termination::kConverged;
   int iterations = 0;
   Work work;
+  // lm: at the point, the last Jacobian kept up by secant updates; null where the fit began at its end.
+  std::shared_ptr<const Derivatives> derivatives;
 };
 
 // What a method is given: the problem, the same as an objective (journaled where there is a journal), and the journal

@@ -3,6 +3,9 @@
 #define GAPSCOPE_FIT_OPTIONS_H_
 
 #include <cstddef>
+#include <map>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace gapscope {
@@ -50,6 +53,8 @@ struct FitOptions {
   // An effect's size and angle (or rest) as the two terms that act linearly (Parameter::with): as size and angle they
   // make curved valleys.
   bool linear_terms = false;
+  // Bounds of base parameters that differ from the model's, by name.
+  std::map<std::string, std::pair<double, double>> bounds;
   double huber = 0;  // residuals beyond this many robust standard deviations are weighted down; 0: plain squares
 };
 

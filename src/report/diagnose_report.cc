@@ -91,7 +91,9 @@ ordered_json Json(const Statement& s) {
                         {"gain_free", JsonNumber(n.gain_free)},
                         {"discrepancy", JsonNumber(n.discrepancy)},
                         {"mimicry", n.mimicry},
-                        {"smooth", n.smooth ? 1 : 0}};
+                        {"clear", JsonNumber(n.clear)},
+                        {"smooth", n.smooth ? 1 : 0},
+                        {"dry", n.dry ? 1 : 0}};
   return entry;
 }
 

@@ -229,8 +229,9 @@ void Simulator::ApplyProbe() {
   const mjModel* m = mujoco_.get();
   const int dof = m->jnt_dofadr[probe_.joint];
   const double q = data_->qpos[m->jnt_qposadr[probe_.joint]], w = data_->qvel[dof];
+  const double u = probe_.actuator >= 0 ? probe_.per_command * data_->ctrl[probe_.actuator] : 0;
   data_->qfrc_applied[dof] =
-      probe_.amplitude_n_m * std::sin(probe_.per_rad * q + probe_.s_per_rad * w + probe_.phase_rad);
+      probe_.amplitude_n_m * std::sin(probe_.per_rad * q + probe_.s_per_rad * w + u + probe_.phase_rad);
 }
 
 RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,

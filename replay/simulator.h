@@ -35,11 +35,13 @@ struct InitialState {
 // The model's initial pose, at rest.
 InitialState AtRest(const Model& model);
 
-// A smooth torque that no catalogue holds: amplitude sin(per_rad q + per_speed w + phase) on one joint, held over each
-// step. What a model may miss is judged beside such torques.
+// A smooth torque that no catalogue holds: amplitude sin(per_rad q + per_speed w + per_command u + phase) on one joint,
+// held over each step. What a model may miss is judged beside such torques.
 struct ProbeTorque {
   int joint = -1;  // hinge or slide; -1: none
   double amplitude_n_m = 0, per_rad = 0, s_per_rad = 0, phase_rad = 0;
+  int actuator = -1;  // whose command u is; -1: none
+  double per_command = 0;
 };
 
 // Half width of the fit that gives the initial state from a log (see FitLocally).

@@ -210,10 +210,35 @@ JointMotion MotionOf(const std::vector<Recording>& recordings, const std::string
 
 }  // namespace
 
-std::vector<RandomTorque> MakeTorques(const Workbench& bench) {
+namespace {
+
+// Deviation of the commands of the drive at a joint; no drive: none of it.
+struct DriveMotion {
+  int actuator = -1;
+  double deviation = 0;
+};
+
+DriveMotion DriveOf(const Workbench& bench, int joint) {
+  const mjModel& m = bench.rig->compiled();
+  const auto& commands = bench.rig->experiment().commands;
+  for (std::size_t c = 0; c < commands.size(); ++c) {
+    const int actuator = mj_name2id(&m, mjOBJ_ACTUATOR, commands[c].actuator.c_str());
+    if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint)
+      continue;
+    double most = 0;
+    for (const auto& recording : bench.data.train)
+      most = std::max(most, MomentsOf(recording.commands[c].values).deviation);
+    if (most > 0) return {actuator, most};
+  }
+  return {};
+}
+
+// `count` a joint, in thirds of angle, of speed and of both. `free_form`: of both alone, and of the command in two of
+// three.
+std::vector<RandomTorque> DrawTorques(const Workbench& bench, std::size_t count, bool free_form) {
   const EvidencePolicy& policy = kDiagnosePolicy.evidence;
   std::vector<RandomTorque> torques;
-  std::mt19937_64 random(7);
+  std::mt19937_64 random(free_form ? 8 : 7);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> phase(0, 2 * std::numbers::pi);
   const mjModel& m = bench.rig->compiled();
@@ -222,8 +247,9 @@ std::vector<RandomTorque> MakeTorques(const Workbench& bench) {
     if (!name || !bench.scales.contains(name)) continue;
     const JointMotion motion = MotionOf(bench.data.train, name);
     if (!(motion.angle_deviation > 0) || !(motion.speed_deviation > 0)) continue;
-    for (std::size_t i = 0; i < policy.torques; ++i) {
-      const auto of = static_cast<RandomTorque::Of>(3 * i / policy.torques);
+    const DriveMotion drive = free_form ? DriveOf(bench, joint) : DriveMotion{};
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto of = free_form ? RandomTorque::Of::kBoth : static_cast<RandomTorque::Of>(3 * i / count);
       const double a = of == RandomTorque::Of::kSpeed ? 0 : policy.angle_waves * normal(random),
                    b = of == RandomTorque::Of::kAngle ? 0 : policy.speed_waves * normal(random);
       ProbeTorque probe{.joint = joint,
@@ -232,10 +258,24 @@ std::vector<RandomTorque> MakeTorques(const Workbench& bench) {
                         .s_per_rad = b / motion.speed_deviation,
                         .phase_rad = phase(random)};
       probe.phase_rad -= probe.per_rad * motion.angle + probe.s_per_rad * motion.speed;
+      if (drive.actuator >= 0 && i % 3 > 0) {
+        probe.actuator = drive.actuator;
+        probe.per_command = policy.speed_waves * normal(random) / drive.deviation;
+      }
       torques.push_back({.of = of, .probe = probe});
     }
   }
   return torques;
+}
+
+}  // namespace
+
+std::vector<RandomTorque> MakeTorques(const Workbench& bench) {
+  return DrawTorques(bench, kDiagnosePolicy.evidence.torques, false);
+}
+
+std::vector<RandomTorque> MakeFreeForm(const Workbench& bench) {
+  return DrawTorques(bench, kDiagnosePolicy.evidence.free_form, true);
 }
 
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,

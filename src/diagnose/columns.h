@@ -34,6 +34,8 @@ struct RandomTorque {
 };
 // The same ones in every call. Joints: those of measured signals.
 std::vector<RandomTorque> MakeTorques(const Workbench& bench);
+// More of them, of the drive's command as well: together nearly any smooth torque.
+std::vector<RandomTorque> MakeFreeForm(const Workbench& bench);
 
 struct ColumnTable {
   std::vector<Trial> trials;

@@ -9,7 +9,9 @@
 #include "src/compare/noise.h"
 #include "src/core/names.h"
 #include "src/core/statistics.h"
+#include "src/diagnose/beside.h"
 #include "src/diagnose/coarsen.h"
+#include "src/diagnose/remainder.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/explain.h"
 #include "src/diagnose/judge.h"
@@ -98,12 +100,14 @@ std::vector<AtBound> FindAtBounds(const Candidate& candidate, const Model& base)
 }
 
 // Sizes of a candidate's effects with their intervals.
-std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate) {
+// `beside`: what random torques add to the covariance.
+std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate,
+                                                               const Eigen::MatrixXd& beside) {
   std::map<EffectUse, std::vector<EffectEstimate>> sizes;
   if (candidate.effects.empty()) return sizes;
   const Linearization at =
       Linearize(*candidate.problem, candidate.point, {.columns = DifferenceOptions::Columns::kCentral});
-  const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at);
+  const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at, beside);
   for (const EffectUse& use : candidate.effects) {
     for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {
       for (const auto& tuned : uncertainty.tuned) {
@@ -134,10 +138,12 @@ double ShareOf(const Workbench& bench, const SearchResult& found, const Candidat
 
 // The effects that are there, the largest share first.
 std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& found, const Candidate& final,
-                                         std::vector<Statement>* statements) {
+                                         const BesideTorques& beside, std::vector<Statement>* statements) {
   std::vector<FoundEffect> effects;
-  const auto sizes = EstimateSizes(bench, final);
+  const auto sizes = EstimateSizes(bench, final, beside.widening);
   for (Statement& s : *statements) {
+    if (const auto bounds = beside.bounds.find(s.use); s.answer == Answer::kAbsent && bounds != beside.bounds.end())
+      s.bounds = bounds->second;
     const auto place = sizes.find(s.use);
     if (place == sizes.end()) continue;
     s.parameters = place->second;
@@ -251,7 +257,9 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   Diagnosis result;
   Judgement judgement = Judge(bench, found, say);
   const Candidate& base = *found.base;
-  const Candidate& chosen = *FinalSet(bench, found, judgement);
+  Candidate& chosen = *FinalSet(bench, found, judgement);
+  say("looking beside the final set");
+  const BesideTorques beside = LookBeside(bench, chosen, found.uses);
   judgement.evidence.floors_left = chosen.held_out_floors;
   result.verdict = judgement.verdict;
   result.probability = judgement.probability;
@@ -263,7 +271,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   result.closed = result.refit > result.floor
                       ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0)
                       : 0;
-  result.effects = DescribeEffects(bench, found, chosen, &judgement.statements);
+  result.effects = DescribeEffects(bench, found, chosen, beside, &judgement.statements);
   for (const Statement& s : judgement.statements) {
     if (s.group < 0 || s.answer != Answer::kPresent) continue;
     const auto& group = judgement.groups[static_cast<std::size_t>(s.group)];
@@ -271,12 +279,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   }
   result.candidates = DescribeCandidates(bench, found, judgement);
   result.statements = judgement.statements;
-  const double before = result.refit * result.refit;
-  if (before > 0) {
-    result.remainder.sensors = std::min(1.0, result.floor * result.floor / before);
-    result.remainder.explained = std::clamp(1 - result.final * result.final / before, 0.0, 1.0);
-    result.remainder.systematic = std::max(0.0, 1 - result.remainder.explained - result.remainder.sensors);
-  }
+  result.remainder = Divide(bench, base, chosen, result.floor, beside);
   result.at_bounds = FindAtBounds(chosen, *base.model);
   SuggestNext(found, judgement, bench.rig->experiment().path, &result);
   result.where = Locate(base, bench.data.held_out, seed);

@@ -71,15 +71,18 @@ struct Statement {
   double prior = 0.5;      // before the logs were seen: even odds, or as the user says
   double evidence = 0;     // what the probability is at even odds
   std::vector<EffectEstimate> parameters;
+  std::vector<EffectEstimate> bounds;  // absent: the value is the size below (of a limit: above) which it stays
   double share_of_gap = 0;
   int group = -1;  // statements of one group are told together
   StatementNumbers numbers;
   std::string rule;
 };
 
-// Shares of the refitted base model's squared misfit, held out.
+// Shares of the refitted base model's squared misfit, held out. NaN: these logs do not say.
 struct Remainder {
   double explained = 0, systematic = 0, sensors = 0;
+  double not_repeatable = 0;  // between logs of the same commands, above the sensors' noise
+  double reachable = 0;       // what the named effects and a free-form torque of angle, speed and command would explain
 };
 
 // A base parameter of the final model that ended on a bound other than its nominal value: the truth may lie beyond.

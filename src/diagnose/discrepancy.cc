@@ -28,13 +28,14 @@ Eigen::MatrixXd TakeOut(const ColumnTable& table, std::span<const Eigen::Index> 
   return kept;
 }
 
-// The largest log marginal likelihood over the torques' variance.
-double Likelihood(const Eigen::MatrixXd& m, double numbers, double share) {
+}  // namespace
+
+TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double share) {
   const Eigen::Index k = m.cols() - 1;
   const SymmetricEigen eigen(share * m.topLeftCorner(k, k));
   const Eigen::VectorXd y = eigen.vectors.transpose() * (share * m.col(k).head(k));
-  const double square = share * m(k, k), most = std::max(eigen.values.maxCoeff(), 1e-300);
-  double best = 0;
+  const double square = share * m(k, k), most = k > 0 ? std::max(eigen.values.maxCoeff(), 1e-300) : 1;
+  TorquePrior best{.share = share};
   for (int step = -1; step <= 60; ++step) {
     // In units of the strongest direction: from nothing to all of it.
     const double q = step < 0 ? 0 : std::pow(10.0, -3 + 0.15 * step) / most;
@@ -44,20 +45,22 @@ double Likelihood(const Eigen::MatrixXd& m, double numbers, double share) {
       left -= y[i] * y[i] * q / (1 + q * w);
       log_sum += std::log1p(q * w);
     }
-    const double value = -0.5 * numbers * std::log(std::max(left, 1e-12 * square) / numbers) - 0.5 * log_sum;
-    if (step < 0 || value > best) best = value;
+    const double variance = std::max(left, 1e-12 * square) / numbers,
+                 value = -0.5 * numbers * std::log(variance) - 0.5 * log_sum;
+    if (step < 0 || value > best.likelihood)
+      best = {.ratio = q, .variance = variance, .share = share, .likelihood = value};
   }
   return best;
 }
 
-}  // namespace
-
-double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t blocks,
-                           std::size_t residuals) {
-  const double numbers = kDiagnosePolicy.evidence.per_block * static_cast<double>(blocks),
+TorquePrior TorquesBeside(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals) {
+  const double numbers = kDiagnosePolicy.evidence.per_block * static_cast<double>(table.gram.blocks.size()),
                share = numbers / static_cast<double>(std::max<std::size_t>(1, residuals));
-  return Likelihood(TakeOut(table, table.torques, columns), numbers, share) -
-         Likelihood(TakeOut(table, table.torques, {}), numbers, share);
+  return LikeliestTorques(TakeOut(table, table.torques, columns), numbers, share);
+}
+
+double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals) {
+  return TorquesBeside(table, columns, residuals).likelihood - TorquesBeside(table, {}, residuals).likelihood;
 }
 
 double Mimicry(const ColumnTable& table, const std::vector<RandomTorque>& torques, double held) {

@@ -7,11 +7,22 @@
 
 namespace gapscope {
 
+// The likeliest size of random torques beside a fit, and what their columns then leave as noise. `numbers` of the
+// residuals count, a share of all.
+struct TorquePrior {
+  double ratio = 0;     // variance of a torque's coefficient over that of the noise
+  double variance = 1;  // of a number that counts
+  double share = 1;
+  double likelihood = 0;  // log, at these
+};
+// `m`: products of [torques | residual], all else taken out.
+TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double share);
+// The same of a table, with `columns` taken out too. `residuals`: numbers of the logs.
+TorquePrior TorquesBeside(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals);
+
 // Gain in log marginal likelihood when the effect's columns join a prior of the table's random torques, whose amplitude
-// is the likeliest each time. `columns`: of the effect, in the table; `blocks`: half seconds, `residuals`: numbers of
-// the logs.
-double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t blocks,
-                           std::size_t residuals);
+// is the likeliest each time. `columns`: of the effect, in the table; `residuals`: numbers of the logs.
+double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals);
 
 // Of random sums of torques in the residual's place: the share of which one of the trials holds at least `held` (of the
 // sum's square), with its own sign.

@@ -82,7 +82,7 @@ class Judging {
     const ColumnTable table = MakeColumnsOfFit(bench_, *without, *found_.chosen, uses, torques_);
     if (!table.valid || table.trials.empty()) return numbers;
     const std::size_t residuals = without->problem->residuals();
-    numbers.discrepancy = DiscrepancyEvidence(table, table.trials.front().columns, table.gram.blocks.size(), residuals);
+    numbers.discrepancy = DiscrepancyEvidence(table, table.trials.front().columns, residuals);
     const double floor = 0.5 * static_cast<double>(residuals);
     const double held =
         (without->train_cost - found_.chosen->train_cost) / std::max(without->train_cost - floor, 1e-9 * floor);

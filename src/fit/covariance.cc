@@ -142,11 +142,16 @@ std::vector<FlatDirection> FlatDirections(const FitProblem& problem, const Covar
 
 }  // namespace
 
-Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at) {
+Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at,
+                                const Eigen::MatrixXd& beside) {
   Uncertainty result;
   const SearchSpace& space = problem.space();
   const auto& coordinates = space.coordinates();
-  const Covariance covariance = CovarianceOf(problem, at);
+  Covariance covariance = CovarianceOf(problem, at);
+  if (beside.size() > 0) {
+    const Eigen::VectorXd in_range = (problem.layout().high - problem.layout().low).cwiseInverse();
+    covariance.robust += in_range.asDiagonal() * beside * in_range.asDiagonal();
+  }
   for (Eigen::Index i = 0; i < space.size(); ++i) {
     const auto couple = std::find_if(space.couples().begin(), space.couples().end(),
                                      [&](const auto& c) { return c.size == i || c.other == i; });

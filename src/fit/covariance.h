@@ -34,8 +34,10 @@ struct Uncertainty {
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above CovariancePolicy::correlated
 };
 
-// At a solved point. `at`: linearized there by central differences, with blocks.
-Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at);
+// At a solved point. `at`: linearized there by central differences, with blocks. `beside`: a covariance of y that is
+// added, for what the residuals do not say (a model's own error); empty: none.
+Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at,
+                                const Eigen::MatrixXd& beside = {});
 
 }  // namespace gapscope
 

@@ -84,6 +84,7 @@ ordered_json Json(const Statement& s) {
                         {"share_of_gap", JsonNumber(s.share_of_gap)},
                         {"group", s.group < 0 ? ordered_json() : ordered_json(s.group)},
                         {"rule", s.rule}};
+  for (const auto& bound : s.bounds) entry["bound"][bound.key] = JsonNumber(bound.value);
   const StatementNumbers& n = s.numbers;
   if (n.gain != 0)
     entry["numbers"] = {{"gain", JsonNumber(n.gain)},
@@ -110,7 +111,14 @@ std::string StatementTable(const Diagnosis& d) {
     text += fmt::format("{:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", s.use.Text(),
                         AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
   }
-  return text + fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
+  text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
+  for (const auto& s : d.statements) {
+    if (s.answer != Answer::kAbsent || s.bounds.empty()) continue;
+    text += fmt::format("  no {:<32}", s.use.Text());
+    for (const auto& bound : s.bounds) text += fmt::format(" {} beyond {:.3g} {}", bound.key, bound.value, bound.unit);
+    text += "\n";
+  }
+  return text;
 }
 
 }  // namespace
@@ -139,7 +147,9 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   for (const auto& statement : d.statements) json["statements"].push_back(Json(statement));
   json["remainder"] = {{"explained", JsonNumber(d.remainder.explained)},
                        {"systematic", JsonNumber(d.remainder.systematic)},
+                       {"not_repeatable", JsonNumber(d.remainder.not_repeatable)},
                        {"sensors", JsonNumber(d.remainder.sensors)},
+                       {"reachable", JsonNumber(d.remainder.reachable)},
                        {"where", JsonConditions(d.remains)}};
   json["at_bounds"] = ordered_json::array();
   for (const auto& p : d.at_bounds)

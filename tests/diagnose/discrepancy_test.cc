@@ -26,8 +26,11 @@ struct Bank {
     }
     table.trials.push_back({.use = {"effect", "joint"}, .columns = {0}});
   }
-  void Finish() { table.reduced = rows.transpose() * rows; }
-  double Evidence() const { return DiscrepancyEvidence(table, table.trials[0].columns, 50, kRows); }
+  void Finish() {
+    table.reduced = rows.transpose() * rows;
+    table.gram.blocks.resize(50);
+  }
+  double Evidence() const { return DiscrepancyEvidence(table, table.trials[0].columns, kRows); }
 };
 
 TEST(DiscrepancyTest, AnEffectThatNoTorqueHoldsCounts) {

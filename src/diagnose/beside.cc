@@ -1,0 +1,167 @@
+#include "src/diagnose/beside.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "src/core/collect.h"
+#include "src/core/dense.h"
+#include "src/core/statistics.h"
+#include "src/diagnose/discrepancy.h"
+#include "src/diagnose/policy.h"
+
+namespace gapscope {
+namespace {
+
+Eigen::MatrixXd Inverse(const Eigen::MatrixXd& m) {
+  return Ldlt(m).Solve(Eigen::MatrixXd::Identity(m.rows(), m.cols()));
+}
+
+// Coordinates of y that are not held by a bound.
+std::vector<Eigen::Index> FreeOf(const ColumnTable& table) {
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < table.gram.parameters; ++i) {
+    const double room = std::min(-table.bounds.low[i], table.bounds.high[i]);
+    if (room > 1e-6 * (table.bounds.high[i] - table.bounds.low[i])) free.push_back(i);
+  }
+  return free;
+}
+
+Eigen::MatrixXd Widening(const ColumnTable& table, const TorquePrior& torques) {
+  const Eigen::Index n = table.gram.parameters, residual = table.sum.cols() - 1;
+  Eigen::MatrixXd widening = Eigen::MatrixXd::Zero(n, n);
+  const std::vector<Eigen::Index> free = FreeOf(table);
+  if (!(torques.ratio > 0) || free.empty()) return widening;
+  const double h = torques.share;
+  Eigen::MatrixXd own = h * table.sum(free, free);
+  Eigen::VectorXd slope = h * table.sum(free, residual);
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const double weight = h * table.bounds.prior_weight[free[i]];
+    own(k, k) += weight;
+    slope[k] += weight * table.bounds.prior_gone[free[i]];
+  }
+  Eigen::MatrixXd of_torques = h * table.sum(table.torques, table.torques);
+  of_torques.diagonal().array() += 1 / torques.ratio;
+  const Eigen::MatrixXd cross = h * table.sum(free, table.torques);
+  const Ldlt solver(of_torques);
+  const Eigen::MatrixXd beside = own - cross * solver.Solve(cross.transpose());
+  const Eigen::MatrixXd inverse = Inverse(beside);
+  const Eigen::VectorXd moved =
+      -inverse * (slope - cross * solver.Solve(h * table.sum(table.torques, residual)));
+  const Eigen::MatrixXd added = torques.variance * (inverse - Inverse(own)) + moved * moved.transpose();
+  for (std::size_t a = 0; a < free.size(); ++a) {
+    for (std::size_t b = 0; b < free.size(); ++b)
+      widening(free[a], free[b]) = added(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b));
+  }
+  return widening;
+}
+
+// Coefficient of a trial's effect beside the torques that is exceeded with the policy's probability; NaN: nothing is
+// known.
+double UpperCoefficient(const ColumnTable& table, const Trial& trial, const TorquePrior& torques) {
+  const Eigen::MatrixXd& m = table.reduced;
+  const auto columns = Collect(trial.columns, [&](Eigen::Index c) { return table.Reduced(c); }),
+             torque = Collect(table.torques, [&](Eigen::Index c) { return table.Reduced(c); });
+  const double h = torques.share;
+  Eigen::MatrixXd own = h * m(columns, columns);
+  Eigen::VectorXd slope = h * m(columns, m.cols() - 1);
+  if (torques.ratio > 0) {
+    Eigen::MatrixXd of_torques = h * m(torque, torque);
+    of_torques.diagonal().array() += 1 / torques.ratio;
+    const Eigen::MatrixXd cross = h * m(columns, torque);
+    const Ldlt solver(of_torques);
+    own -= cross * solver.Solve(cross.transpose());
+    slope -= cross * solver.Solve(h * m(torque, m.cols() - 1));
+  }
+  if (!(own.diagonal().minCoeff() > 0)) return kNaN;
+  const Eigen::VectorXd best = -Ldlt(own).Solve(slope);
+  const double quantile = kDiagnosePolicy.evidence.bound_deviations;
+  const Eigen::MatrixXd spread = torques.variance * Inverse(own);
+  if (trial.form == Trial::Form::kAngle)
+    return best.norm() + quantile * std::sqrt(std::max(spread.diagonal().maxCoeff(), 0.0));
+  return std::max(best[0], 0.0) + quantile * std::sqrt(std::max(spread(0, 0), 0.0));
+}
+
+// Sizes that an effect stays below: by the trial nearest to its bound, where the columns say most.
+std::vector<EffectEstimate> BoundsOfEffect(const Workbench& bench, const ColumnTable& table, const EffectUse& use,
+                                           const TorquePrior& torques) {
+  const Trial* nearest = nullptr;
+  double coefficient = 0, distance = kInfinity;
+  for (const Trial& trial : table.trials) {
+    if (trial.use != use) continue;
+    const double upper = UpperCoefficient(table, trial, torques);
+    if (!(upper > 0) || std::abs(std::log(upper)) >= distance) continue;
+    nearest = &trial, coefficient = upper, distance = std::abs(std::log(upper));
+  }
+  std::vector<EffectEstimate> bounds;
+  // Far beyond its trial values an effect is not what its columns say.
+  constexpr double kFar = 3;
+  if (!nearest || coefficient > kFar) return bounds;
+  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const PlacedParameter& p = placed[i];
+    if (p.trials.empty() || (p.role != ParameterRole::kSize && p.role != ParameterRole::kTime)) continue;
+    const double trial = nearest->values[i];
+    // A limit is nothing at its largest value: where a tighter one is excluded, the true one lies above.
+    if (p.neutral == p.high && coefficient > 1) continue;
+    const double value = p.neutral == p.high ? trial : p.neutral + coefficient * (trial - p.neutral);
+    bounds.push_back({.key = p.key, .unit = p.unit, .value = value, .low = value, .high = value});
+  }
+  return bounds;
+}
+
+// A free-form torque fitted to one half of the blocks, judged on the other one, and the other way round.
+double FreeFormShare(const ColumnTable& table, const TorquePrior& torques) {
+  if (!(torques.ratio > 0)) return 0;
+  const long kBlocks = 4;  // half seconds in a row are one fold's
+  const Eigen::Index residual = table.sum.cols() - 1;
+  std::vector<Eigen::Index> columns = FreeOf(table);
+  const std::size_t own = columns.size();
+  columns.insert(columns.end(), table.torques.begin(), table.torques.end());
+  double before = 0, after = 0;
+  for (const long fold : {0L, 1L}) {
+    std::vector<double> fitted, judged;
+    for (const GramBlock& block : table.gram.blocks) {
+      const bool in = (block.half_second / kBlocks + static_cast<long>(block.log)) % 2 == fold;
+      fitted.push_back(in ? 1 : 0), judged.push_back(in ? 0 : 1);
+    }
+    const Eigen::MatrixXd a = Sum(table.gram, fitted), b = Sum(table.gram, judged);
+    Eigen::MatrixXd hessian = a(columns, columns);
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      hessian(k, k) += i < own ? table.bounds.prior_weight[columns[i]] : 1 / (torques.ratio * torques.share);
+      hessian(k, k) *= 1 + 1e-9;
+    }
+    const Eigen::VectorXd c = -Ldlt(hessian).Solve(a(columns, residual));
+    before += b(residual, residual);
+    after += b(residual, residual) + 2 * c.dot(b(columns, residual)) + c.dot(b(columns, columns) * c);
+  }
+  return before > 0 ? std::clamp(1 - after / before, 0.0, 1.0) : 0;
+}
+
+}  // namespace
+
+BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::vector<EffectUse>& uses) {
+  BesideTorques result;
+  Derivatives derivatives = final.problem->Differentiate(final.point, {.step = 0.01});
+  *bench.work += derivatives.work;
+  if (!derivatives.valid) return result;
+  final.derivatives = std::make_shared<const Derivatives>(std::move(derivatives));
+  const std::size_t residuals = final.problem->residuals();
+  const ColumnTable table = MakeColumns(bench, final, uses, MakeTorques(bench));
+  if (table.valid && !table.torques.empty()) {
+    const TorquePrior torques = TorquesBeside(table, {}, residuals);
+    result.widening = Widening(table, torques);
+    for (const EffectUse& use : uses) {
+      if (auto bounds = BoundsOfEffect(bench, table, use, torques); !bounds.empty()) result.bounds[use] = bounds;
+    }
+  }
+  const ColumnTable free_form = MakeColumns(bench, final, {}, MakeFreeForm(bench));
+  if (free_form.valid && !free_form.torques.empty())
+    result.free_form = FreeFormShare(free_form, TorquesBeside(free_form, {}, residuals));
+  final.derivatives.reset();
+  return result;
+}
+
+}  // namespace gapscope

@@ -15,7 +15,9 @@ Coordinate MakeCoordinate(const Parameter& p, int index, double value, bool loga
       c.logarithmic ? 1 : std::max({std::abs(p.nominal), 0.05 * (p.high - p.low), std::numeric_limits<double>::min()});
   c.low = c.ToSearch(p.low);
   c.high = c.ToSearch(p.high);
-  if (logarithmic_effects && !c.logarithmic && value != 0 && p.of_torque) {
+  // A cubic is often next to nothing, where a logarithm is flat and its interval reaches to the upper bound.
+  const bool of_size = p.of_torque && p.with != Parameter::With::kCubic;
+  if (logarithmic_effects && !c.logarithmic && value != 0 && of_size) {
     c.logarithmic = true;
     c.scale = value > 0 ? 1 : -1;
     c.low = c.ToSearch(kFitPolicy.least_size_share * value);

@@ -311,6 +311,18 @@ TEST(LinearTermsTest, ACubicCableIsFoundFromALinearOne) {
   }
 }
 
+TEST(SearchSpaceTest, ACubicIsNoLogarithmWhereSizesAre) {
+  const Rig rig = LoadCubicCable();
+  const std::string name = "cable_spring@arm.";
+  const int size = rig.Index(name + "stiffness_n_m_per_rad"), cubic = rig.Index(name + "stiffness_cubic_n_m_per_rad3");
+  const auto values =
+      rig.Values({{name + "stiffness_n_m_per_rad", 2e-3}, {name + "stiffness_cubic_n_m_per_rad3", 1e-6}});
+  const SearchSpace space(rig.model->parameters(), {size, cubic}, values, true, false);
+  EXPECT_TRUE(space.coordinates()[0].logarithmic);
+  EXPECT_FALSE(space.coordinates()[1].logarithmic);
+  EXPECT_EQ(space.low()[1], 0);
+}
+
 // A step of a linear problem does not bend; a product of two parameters does, as its second derivative says.
 TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
   const Rig rig = LoadCart();

@@ -85,8 +85,8 @@ struct Parameter {
   double nominal = 0, low = 0, high = 0;
   bool frozen = false;  // not tuned unless freed by name
   // Another parameter, a size, with which this one acts linearly though not alone: kAngle: size * (cos, sin) of this;
-  // kRest: size * this. Empty: none.
-  enum class With { kNone, kAngle, kRest } with = With::kNone;
+  // kRest: size * this; kCubic: the third power's coefficient about that rest. Empty: none.
+  enum class With { kNone, kAngle, kRest, kCubic } with = With::kNone;
   std::string size;
   // Whose it is: the experiment's, an added effect's, or the rig's own size, which effects are scaled by: neither tuned
   // nor shown.

@@ -77,7 +77,7 @@ TunedParameter OfCoordinate(const FitProblem& problem, const FitPoint& point, co
   return tuned;
 }
 
-// A parameter that two coordinates give together (SearchSpace::Couple): its deviation to first order in both.
+// A parameter that coordinates give together (SearchSpace::Couple): its deviation to first order in them.
 TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
                         const SearchSpace::Couple& couple, int index) {
   const SearchSpace& space = problem.space();
@@ -85,25 +85,17 @@ TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const 
   const auto k = static_cast<std::size_t>(index);
   const Parameter& p = problem.model().parameters()[k];
   TunedParameter tuned{.index = index, .value = values[k]};
-  const Eigen::Index at[2] = {couple.size, couple.other};
-  Eigen::Vector2d slope, range;
-  for (int side = 0; side < 2; ++side) {
-    range[side] = problem.layout().high[at[side]] - problem.layout().low[at[side]];
-    const double h = 1e-6 * range[side];
-    double out[2];
-    for (int sign = 0; sign < 2; ++sign) {
-      const double moved = (sign == 0 ? -h : h);
-      space.SetCouple(couple, point.y[couple.size] + (side == 0 ? moved : 0),
-                      point.y[couple.other] + (side == 1 ? moved : 0), &values);
-      out[sign] = values[k];
-    }
-    slope[side] = (out[1] - out[0]) / (2 * h) * range[side];
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(covariance.robust.rows());
+  for (const Eigen::Index i : {couple.size, couple.other, couple.cubic_place}) {
+    if (i < 0) continue;
+    const double range = problem.layout().high[i] - problem.layout().low[i], h = 1e-6 * range;
+    space.SetCoordinate(point.y, i, point.y[i] - h, &values);
+    const double below = values[k];
+    space.SetCoordinate(point.y, i, point.y[i] + h, &values);
+    slope[i] = (values[k] - below) / (2 * h) * range;
+    space.SetCoordinate(point.y, i, point.y[i], &values);
   }
-  Eigen::Matrix2d own;
-  for (int a = 0; a < 2; ++a) {
-    for (int b = 0; b < 2; ++b) own(a, b) = covariance.robust(at[a], at[b]);
-  }
-  const double deviation = std::sqrt(std::max(0.0, slope.dot(own * slope)));
+  const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
   const double half = StudentQuantile(covariance.freedom) * deviation;
   tuned.low = std::max(p.low, tuned.value - half);
   tuned.high = std::min(p.high, tuned.value + half);

@@ -47,8 +47,8 @@ struct FitOptions {
   double prior_shift_s = 0;          // likewise of the shift
   std::vector<double> prior_centre;  // values that base parameters are known to lie around; empty: the start
   double prior_scale = 1;            // multiplies what is known, as the variance of the residuals does that of the data
-  // Torques and stiffnesses of effects as logarithms, those of zero excepted: a factor common to all torques is then a
-  // straight line.
+  // Torques and stiffnesses of effects as logarithms, those of zero and cubics excepted: a factor common to all torques
+  // is then a straight line.
   bool logarithmic_effects = false;
   // An effect's size and angle (or rest) as the two terms that act linearly (Parameter::with): as size and angle they
   // make curved valleys.

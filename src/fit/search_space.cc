@@ -15,7 +15,9 @@ Coordinate MakeCoordinate(const Parameter& p, int index, double value, bool loga
       c.logarithmic ? 1 : std::max({std::abs(p.nominal), 0.05 * (p.high - p.low), std::numeric_limits<double>::min()});
   c.low = c.ToSearch(p.low);
   c.high = c.ToSearch(p.high);
-  if (logarithmic_effects && !c.logarithmic && value != 0 && p.of_torque) {
+  // A cubic is often next to nothing, where a logarithm is flat and its interval reaches to the upper bound.
+  const bool of_size = p.of_torque && p.with != Parameter::With::kCubic;
+  if (logarithmic_effects && !c.logarithmic && value != 0 && of_size) {
     c.logarithmic = true;
     c.scale = value > 0 ? 1 : -1;
     c.low = c.ToSearch(kFitPolicy.least_size_share * value);
@@ -53,17 +55,18 @@ void SearchSpace::CoupleTerms() {
     const Parameter& p = parameter(coordinates_[i]);
     const auto size = std::find_if(coordinates_.begin(), coordinates_.end(),
                                    [&](const Coordinate& c) { return parameter(c).name == p.size; });
-    if (p.with == Parameter::With::kNone || size == coordinates_.end() || size->logarithmic ||
-        coordinates_[i].logarithmic)
-      continue;
-    const Couple couple{.size = size - coordinates_.begin(), .other = static_cast<Eigen::Index>(i), .with = p.with};
+    const bool couples = p.with == Parameter::With::kAngle || p.with == Parameter::With::kRest;
+    if (!couples || size == coordinates_.end() || size->logarithmic || coordinates_[i].logarithmic) continue;
+    Couple couple{.size = size - coordinates_.begin(), .other = static_cast<Eigen::Index>(i), .with = p.with};
     Coordinate& other = coordinates_[i];
     if (p.with == Parameter::With::kAngle) {
       other.scale = size->scale;
       size->low = -size->high;
       other.low = size->low, other.high = size->high;
     } else {
-      const double most = size->high * std::max(-other.low, other.high);
+      FindCubic(&couple);
+      const double sizes = couple.cubic_place >= 0 ? 2 : 1;  // the cubic's stiffness at its bound is the size's at its
+      const double most = sizes * size->high * std::max(-other.low, other.high);
       other.scale *= size->scale;
       other.low = -most, other.high = most;
     }
@@ -73,6 +76,25 @@ void SearchSpace::CoupleTerms() {
     }
     couples_.push_back(couple);
   }
+}
+
+void SearchSpace::FindCubic(Couple* couple) const {
+  const std::string& size = parameter(coordinates_[static_cast<std::size_t>(couple->size)]).name;
+  const auto found = std::find_if(parameters_.begin(), parameters_.end(), [&](const Parameter& p) {
+    return p.with == Parameter::With::kCubic && p.size == size;
+  });
+  if (found == parameters_.end()) return;
+  couple->cubic = static_cast<int>(found - parameters_.begin());
+  const auto place = std::find_if(coordinates_.begin(), coordinates_.end(),
+                                  [&](const Coordinate& c) { return c.parameter == couple->cubic; });
+  if (place != coordinates_.end()) couple->cubic_place = place - coordinates_.begin();
+}
+
+double SearchSpace::Stiffness(const Couple& couple, const std::vector<double>& values) const {
+  const Coordinate& size = coordinates_[static_cast<std::size_t>(couple.size)];
+  const double linear = values[size.parameter];
+  if (couple.cubic < 0) return linear;
+  return linear + values[couple.cubic] * parameter(size).high / parameters_[couple.cubic].high;
 }
 
 void SearchSpace::SetCouple(const Couple& couple, double size, double other, std::vector<double>* values) const {
@@ -85,7 +107,7 @@ void SearchSpace::SetCouple(const Couple& couple, double size, double other, std
     (*values)[b.parameter] = std::atan2(other, size);
   } else {
     (*values)[a.parameter] = size;
-    (*values)[b.parameter] = other == 0 ? 0 : std::clamp(other / size, p.low, p.high);
+    (*values)[b.parameter] = other == 0 ? 0 : std::clamp(other / Stiffness(couple, *values), p.low, p.high);
   }
 }
 
@@ -102,7 +124,7 @@ void SearchSpace::SetCoordinate(const Eigen::VectorXd& y, Eigen::Index i, double
   const Coordinate& c = coordinates_[static_cast<std::size_t>(i)];
   (*values)[c.parameter] = c.ToValue(moved);
   for (const Couple& couple : couples_) {
-    if (couple.size == i || couple.other == i)
+    if (couple.size == i || couple.other == i || couple.cubic_place == i)
       SetCouple(couple, couple.size == i ? moved : y[couple.size], couple.other == i ? moved : y[couple.other], values);
   }
 }
@@ -119,7 +141,7 @@ Eigen::VectorXd SearchSpace::ToSearch(const std::vector<double>& values) const {
     const double size = values[a.parameter], other = values[b.parameter];
     const bool angle = couple.with == Parameter::With::kAngle;
     y[couple.size] = (angle ? size * std::cos(other) : size) / a.scale;
-    y[couple.other] = (angle ? size * std::sin(other) : size * other) / b.scale;
+    y[couple.other] = (angle ? size * std::sin(other) : Stiffness(couple, values) * other) / b.scale;
   }
   return y.cwiseMax(low_).cwiseMin(high_);
 }

@@ -38,18 +38,24 @@ class SearchSpace {
   std::vector<double> Values(const Eigen::VectorXd& y) const;
   // size() numbers, inside the bounds.
   Eigen::VectorXd ToSearch(const std::vector<double>& values) const;
-  // Writes the values of coordinate i, and of the one that it is coupled with, at y with `moved` in the place of y[i].
+  // Writes the values of coordinate i, and of those that it is coupled with, at y with `moved` in the place of y[i].
   void SetCoordinate(const Eigen::VectorXd& y, Eigen::Index i, double moved, std::vector<double>* values) const;
-  // Two coordinates that give two parameters together (Parameter::with): the values of both at (size, other).
+  // Two coordinates that give two parameters together (Parameter::with). A rest that a cubic shares is searched times
+  // the stiffness of both at the rig's own angle: times the size alone it would be lost where that is zero.
   struct Couple {
     Eigen::Index size, other;
     Parameter::With with;
+    int cubic = -1;                 // parameter; -1: none
+    Eigen::Index cubic_place = -1;  // its coordinate; -1: it is held
   };
   const std::vector<Couple>& couples() const { return couples_; }
-  void SetCouple(const Couple& couple, double size, double other, std::vector<double>* values) const;
 
  private:
   void CoupleTerms();
+  void FindCubic(Couple* couple) const;
+  // Of a size and its cubic together, in the size's unit.
+  double Stiffness(const Couple& couple, const std::vector<double>& values) const;
+  void SetCouple(const Couple& couple, double size, double other, std::vector<double>* values) const;
 
   const std::vector<Parameter>& parameters_;
   std::vector<double> values_;

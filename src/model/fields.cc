@@ -17,7 +17,10 @@ struct ArrayField {
 
 #define GS_ARRAY(member) [](const mjModel& m) -> mjtNum* { return m.member; }
 const std::map<std::string, ArrayField>& JointFields() {
-  static const std::map<std::string, ArrayField> fields = {{"stiffness", {GS_ARRAY(jnt_stiffness), 1, 1, false}}};
+  static const std::map<std::string, ArrayField> fields = {
+      {"stiffness", {GS_ARRAY(jnt_stiffness), 1, 1, false}},
+      {"stiffness_cubic", {GS_ARRAY(jnt_stiffnesspoly + 1), mjNPOLY, 1, false}},
+  };
   return fields;
 }
 const std::map<std::string, ArrayField>& DofFields() {
@@ -169,7 +172,7 @@ Result<Field> JointField(const mjModel& m, const std::string& name, const std::s
   if (const auto found = DofFields().find(field); found != DofFields().end())
     return ArrayAt(m, found->second, m.jnt_dofadr[id]);
   std::vector<std::string> names = Keys(DofFields());
-  names.insert(names.end(), {"stiffness", "springref"});
+  names.insert(names.end(), {"springref", "stiffness", "stiffness_cubic"});
   return NoSuch("unknown field of a joint", field, names, where);
 }
 

@@ -290,9 +290,11 @@ void Structure::FinishSpring(const std::string& joint, const Terms& terms) {
   const auto native = [](const std::string& key) -> std::string {
     return plugins::FindSpec(plugins::Spring::kSpecs, key)->native;
   };
-  const bool linear =
+  const bool own =
       std::all_of(terms.begin(), terms.end(), [&](const auto& term) { return !native(term.first).empty(); });
-  if (linear && element->stiffness[0] == 0) {
+  const bool free = std::all_of(std::begin(element->stiffness), std::end(element->stiffness),
+                                [](double coefficient) { return coefficient == 0; });
+  if (own && free) {
     // MuJoCo's own spring does it.
     element->stiffness[0] = kTinyFriction;
     for (const auto& [key, expression] : terms) Set("joint/" + joint + "/" + native(key), {expression});

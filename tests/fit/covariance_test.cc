@@ -15,29 +15,37 @@ namespace {
 TEST(CovarianceTest, CoupledTermsHaveTheIntervalsOfTheirParameters) {
   ThreadPool pool(2);
   const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
-  for (const auto& [effect, size, other] : {std::tuple{"cable_spring@arm", "stiffness_n_m_per_rad", "rest_rad"},
-                                            std::tuple{"gravity_offset@arm", "torque_n_m", "rest_rad"}}) {
-    const Rig rig = LoadRig("qube", {effect});
-    const int a = rig.Index(std::string(effect) + "." + size), b = rig.Index(std::string(effect) + "." + other);
-    const auto truth =
-        rig.Values({{std::string(effect) + "." + size, 2e-3}, {std::string(effect) + "." + other, -0.7}});
-    const std::vector<Recording> logs = {MakeLog(rig, truth, command, 4, 0.004, 2e-3, 1)};
+  const std::string cable = "cable_spring@arm.", gravity = "gravity_offset@arm.", size = "stiffness_n_m_per_rad";
+  struct Case {
+    Rig rig;
+    std::map<std::string, double> values;
+  };
+  for (const Case& c :
+       {Case{LoadRig("qube", {"cable_spring@arm"}), {{cable + size, 2e-3}, {cable + "rest_rad", -0.7}}},
+        Case{LoadRig("qube", {"gravity_offset@arm"}), {{gravity + "torque_n_m", 2e-3}, {gravity + "rest_rad", -0.7}}},
+        Case{LoadCubicCable(),
+             {{cable + size, 2e-3}, {cable + "rest_rad", -0.3}, {cable + "stiffness_cubic_n_m_per_rad3", 4e-3}}}}) {
+    const auto truth = c.rig.Values(c.values);
+    const std::vector<Recording> logs = {MakeLog(c.rig, truth, command, 4, 0.004, 2e-3, 1)};
+    FitOptions options{.time_step_s = 0.004, .fit_offsets = false};
+    for (const auto& [name, value] : c.values) options.free.push_back(c.rig.Index(name));
     std::vector<TunedParameter> tuned[2];
     for (const bool linear : {false, true}) {
-      const FitOptions options{.free = {a, b}, .time_step_s = 0.004, .fit_offsets = false, .linear_terms = linear};
-      FitProblem problem(*rig.model, logs, options, truth, pool);
+      options.linear_terms = linear;
+      FitProblem problem(*c.rig.model, logs, options, truth, pool);
       const FitPoint point = Solve(problem, problem.Start(), {.tolerance = 1e-7}).point;
       tuned[linear] = EstimateUncertainty(problem, point,
                                           Linearize(problem, point, {.columns = DifferenceOptions::Columns::kCentral}))
                           .tuned;
-      ASSERT_EQ(tuned[linear].size(), 2u);
+      ASSERT_EQ(tuned[linear].size(), c.values.size());
       for (const TunedParameter& t : tuned[linear])
-        EXPECT_NEAR(t.value, problem.Values(point)[static_cast<std::size_t>(t.index)], 1e-12) << effect;
+        EXPECT_NEAR(t.value, problem.Values(point)[static_cast<std::size_t>(t.index)], 1e-12);
     }
-    for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t i = 0; i < c.values.size(); ++i) {
       const double width = tuned[0][i].high - tuned[0][i].low;
-      EXPECT_NEAR(tuned[1][i].value, tuned[0][i].value, 0.05 * width) << effect << i;
-      EXPECT_NEAR(tuned[1][i].high - tuned[1][i].low, width, 0.05 * width) << effect << i;
+      const std::string& name = c.rig.model->parameters()[static_cast<std::size_t>(tuned[0][i].index)].name;
+      EXPECT_NEAR(tuned[1][i].value, tuned[0][i].value, 0.05 * width) << name;
+      EXPECT_NEAR(tuned[1][i].high - tuned[1][i].low, width, 0.05 * width) << name;
       EXPECT_GT(width, 0);
     }
   }

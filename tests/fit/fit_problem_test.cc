@@ -283,6 +283,46 @@ TEST(LinearTermsTest, GravityIsFoundFromTheWrongSideOfItsRest) {
   EXPECT_NEAR(problem.Values(solved.point)[rest], 0.2, 0.01);
 }
 
+// The cubic starts on its bound, where it does nothing; without a linear part the rest is the cubic's alone.
+TEST(LinearTermsTest, ACubicCableIsFoundFromALinearOne) {
+  const Rig rig = LoadCubicCable();
+  const std::string name = "cable_spring@arm.";
+  const int size = rig.Index(name + "stiffness_n_m_per_rad"), rest = rig.Index(name + "rest_rad"),
+            cubic = rig.Index(name + "stiffness_cubic_n_m_per_rad3");
+  const auto command = [](double t) { return 2.5 * std::sin(6 * t + 2 * t * t); };
+  ThreadPool pool(2);
+  for (const auto& [k, c] : {std::pair{2e-3, 0.0}, {2e-3, 4e-3}, {0.0, 8e-3}}) {
+    const auto truth = rig.Values(
+        {{name + "stiffness_n_m_per_rad", k}, {name + "rest_rad", -0.3}, {name + "stiffness_cubic_n_m_per_rad3", c}});
+    const std::vector<Recording> logs = {MakeLog(rig, truth, command, 6, 0.004, 1e-4, 1)};
+    for (const bool linear : {false, true}) {
+      SCOPED_TRACE(std::to_string(k) + " " + std::to_string(c) + (linear ? " linear" : ""));
+      const FitOptions options{
+          .free = {size, rest, cubic}, .time_step_s = 0.004, .fit_offsets = false, .linear_terms = linear};
+      FitProblem there(*rig.model, logs, options, truth, pool);
+      EXPECT_NEAR(there.Values(there.Start())[rest], -0.3, 1e-12);
+      FitProblem problem(*rig.model, logs, options, rig.Values({{name + "stiffness_n_m_per_rad", 1e-3}}), pool);
+      const SolveResult solved = Solve(problem, problem.Start(), {.max_iterations = 30, .tolerance = 1e-6});
+      const std::vector<double> found = problem.Values(solved.point);
+      EXPECT_NEAR(found[size], k, 1e-5);
+      EXPECT_NEAR(found[rest], -0.3, 5e-4);
+      EXPECT_NEAR(found[cubic], c, 1e-5);
+    }
+  }
+}
+
+TEST(SearchSpaceTest, ACubicIsNoLogarithmWhereSizesAre) {
+  const Rig rig = LoadCubicCable();
+  const std::string name = "cable_spring@arm.";
+  const int size = rig.Index(name + "stiffness_n_m_per_rad"), cubic = rig.Index(name + "stiffness_cubic_n_m_per_rad3");
+  const auto values =
+      rig.Values({{name + "stiffness_n_m_per_rad", 2e-3}, {name + "stiffness_cubic_n_m_per_rad3", 1e-6}});
+  const SearchSpace space(rig.model->parameters(), {size, cubic}, values, true, false);
+  EXPECT_TRUE(space.coordinates()[0].logarithmic);
+  EXPECT_FALSE(space.coordinates()[1].logarithmic);
+  EXPECT_EQ(space.low()[1], 0);
+}
+
 // A step of a linear problem does not bend; a product of two parameters does, as its second derivative says.
 TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
   const Rig rig = LoadCart();

@@ -121,6 +121,27 @@ TEST_F(DirectionTest, ACableSpringPullsToItsRestAngle) {
   for (std::size_t k = 0; k < t_.size(); k += 25) EXPECT_NEAR(q_[k], 0.3 * (1 - std::cos(omega * t_[k])), 1e-6);
 }
 
+// Duffing's equation about the rest: MuJoCo's own spring, and the plugin beside a cubic that the joint has already.
+TEST_F(DirectionTest, ACubicCableStiffensAwayFromItsRest) {
+  constexpr double kRest = 0.3, kAway = 0.6, kCubic = 2;
+  for (const bool beside : {false, true}) {
+    Build("cable_spring", kMotor, beside ? "stiffness=\"0 0 1.5\" springref=\"0.3\"" : "");
+    for (const double stiffness : {0.5, 0.0}) {
+      Run(Zero, kRest - kAway, 0,
+          {{"stiffness_n_m_per_rad", stiffness}, {"rest_rad", kRest}, {"stiffness_cubic_n_m_per_rad3", kCubic}});
+      const double cubic = kCubic + (beside ? 1.5 : 0.0), steepest = stiffness + cubic * kAway * kAway,
+                   quarter_s = std::comp_ellint_1(std::sqrt(0.5 * cubic * kAway * kAway / steepest)) /
+                               std::sqrt(steepest / kInertia);
+      const auto after = static_cast<std::size_t>(
+          std::find_if(q_.begin(), q_.end(), [](double q) { return q >= kRest; }) - q_.begin());
+      ASSERT_LT(after, q_.size());
+      const double crossing_s =
+          t_[after - 1] + (kRest - q_[after - 1]) / (q_[after] - q_[after - 1]) * (t_[after] - t_[after - 1]);
+      EXPECT_NEAR(crossing_s, quarter_s, 2e-5) << beside << stiffness;
+    }
+  }
+}
+
 TEST_F(DirectionTest, ATorqueBiasPushesAndAGravityOffsetPullsDown) {
   Build("torque_bias");
   Run(Zero, 0, 0, {{"torque_n_m", 0.04}});

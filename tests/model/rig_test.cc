@@ -143,8 +143,10 @@ TEST_F(RigTest, ASpringIsTheJointsOwnWhereItHasNone) {
   Structure structure(*rig_);
   ASSERT_TRUE(structure.AddSpringTerm("rough", "stiffness_n_m_per_rad", "4").ok());
   ASSERT_TRUE(structure.AddSpringTerm("rough", "rest_rad", "0.1").ok());
+  ASSERT_TRUE(structure.AddSpringTerm("rough", "cubic_n_m_per_rad3", "5").ok());
   ASSERT_TRUE(structure.AddSpringTerm("sprung", "stiffness_n_m_per_rad", "4").ok());
   ASSERT_TRUE(structure.Finish().ok());
+  EXPECT_EQ(SetTo(structure, "joint/rough/stiffness_cubic"), "5");
   EXPECT_EQ(SetTo(structure, "joint/rough/stiffness"), "4");
   EXPECT_EQ(SetTo(structure, "joint/rough/springref"), "0.1");
   EXPECT_EQ(SetTo(structure, "joint/sprung/stiffness"), "");

@@ -56,17 +56,21 @@ TEST(SpringTest, EveryTermHasItsClosedForm) {
 TEST(SpringTest, EqualsNativeStiffness) {
   constexpr double kRounding_rad = 1e-12;
   for (const char* integrator : {"Euler", "implicitfast", "RK4"}) {
-    const ModelPtr ours = Compile(
-        SpringModel{.config = Config("stiffness_n_m_per_rad", 2) + Config("rest_rad", 0.3), .integrator = integrator}
-            .Xml());
-    const ModelPtr native = Compile(
-        SpringModel{.joint = "stiffness=\"2\" springref=\"0.3\"", .integrator = integrator, .with_plugin = false}
-            .Xml());
-    const DataPtr a(mj_makeData(ours.get())), b(mj_makeData(native.get()));
-    for (int i = 0; i < 2000; ++i) {
-      mj_step(ours.get(), a.get());
-      mj_step(native.get(), b.get());
-      ASSERT_NEAR(a->qpos[0], b->qpos[0], kRounding_rad) << integrator << i;
+    // MuJoCo's polynomial: its third coefficient is that of the displacement's third power.
+    for (const auto& [stiffness, cubic] : {std::pair{"2", 0.0}, {"2 0 1.5", 1.5}, {"0 0 40", 40.0}}) {
+      const ModelPtr ours = Compile(SpringModel{.config = Config("stiffness_n_m_per_rad", std::atof(stiffness)) +
+                                                          Config("rest_rad", 0.3) + Config("cubic_n_m_per_rad3", cubic),
+                                                .integrator = integrator}
+                                        .Xml());
+      const std::string joint = std::string("springref=\"0.3\" stiffness=\"") + stiffness + "\"";
+      const ModelPtr native =
+          Compile(SpringModel{.joint = joint, .integrator = integrator, .with_plugin = false}.Xml());
+      const DataPtr a(mj_makeData(ours.get())), b(mj_makeData(native.get()));
+      for (int i = 0; i < 2000; ++i) {
+        mj_step(ours.get(), a.get());
+        mj_step(native.get(), b.get());
+        ASSERT_NEAR(a->qpos[0], b->qpos[0], kRounding_rad) << integrator << stiffness << i;
+      }
     }
   }
 }

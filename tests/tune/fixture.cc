@@ -45,6 +45,12 @@ Rig LoadRig(const std::string& rig, const std::vector<std::string>& effects) {
   return Build(std::string(GAPSCOPE_SOURCE_DIR) + "/models/" + rig + "/experiment.yaml", effects);
 }
 
+Rig LoadCubicCable() {
+  Rig rig = LoadRig("qube");
+  rig.model = Model::Build(rig.model->rig(), {{"cable_spring", "arm"}}, {{"arm", {.torque_n_m = 5e-3}}}).value();
+  return rig;
+}
+
 // The model is read again by whoever builds a variant, so the files stay until the end.
 struct Folder {
   std::filesystem::path path = std::filesystem::temp_directory_path() / ("gapscope_cart_" + std::to_string(getpid()));

@@ -24,6 +24,9 @@ struct Rig {
 // models/RIG with effects ("coulomb_friction@arm").
 Rig LoadRig(const std::string& rig, const std::vector<std::string>& effects = {});
 
+// models/qube with a cable on its arm, in whose scales a few mN m/rad and mN m/rad^3 are much.
+Rig LoadCubicCable();
+
 // A cart of 2 kg on a spring of 8 N/m, driven by gain * u: q'' = (gain u - 8 q - damping q') / 2, Euler at the sample
 // time. Parameters: cart.gain (1.5, within [low, high]; in units, not logarithmic), cart.damping (0, [0, 4], frozen).
 Rig LoadCart(double low = -10, double high = 10);

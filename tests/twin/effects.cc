@@ -97,6 +97,7 @@ const std::vector<Parameter>& Parameters() {
     }
     add("cable_spring", "stiffness_n_m_per_rad", [](Plant* a, Place, double v) { a->load.cable_stiffness = v; });
     add("cable_spring", "rest_rad", [](Plant* a, Place, double v) { a->load.cable_rest_rad = v; });
+    add("cable_spring", "stiffness_cubic_n_m_per_rad3", [](Plant* a, Place, double v) { a->load.cable_cubic = v; });
     add("cable_spring", "hysteresis_rad", [](Plant* a, Place, double v) { a->load.cable_hysteresis = v; });
     add("gravity_offset", "torque_n_m", [](Plant* a, Place, double v) { a->load.gravity_n_m = v; });
     add("gravity_offset", "rest_rad", [](Plant* a, Place, double v) { a->load.gravity_rest_rad = v; });

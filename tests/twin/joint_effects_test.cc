@@ -174,6 +174,26 @@ TEST(JointEffectsTest, CableSwingsAboutItsRest) {
   EXPECT_NEAR(Period(10, Constant(0), &simulator, [](const Simulator& s) { return s.q1(); }, 0.3), kTurn / w, 1e-5);
 }
 
+// Let go at a from the rest, J q'' = -k x - c x^3: quarter period K(m) / W, W^2 = (k + c a^2) / J,
+// m = c a^2 / 2 (k + c a^2).
+TEST(JointEffectsTest, CubicCableSwingsFasterTheFartherFromItsRest) {
+  for (const double stiffness : {2.0, 0.0}) {
+    for (const double away : {0.4, 0.8}) {
+      Plant plant = Free(Rig::kJoint);
+      plant.load.cable_stiffness = stiffness;
+      ASSERT_TRUE(SetParameter("cable_spring.rest_rad", 0.3, &plant));
+      ASSERT_TRUE(SetParameter("cable_spring@joint.stiffness_cubic_n_m_per_rad3", 4, &plant));
+      Simulator simulator(plant, kStep_s);
+      simulator.Place(0.3 + away, 0, 0, 0);
+      const double steepest = stiffness + 4 * away * away, m = 2 * away * away / steepest;
+      const double period_s = 4 * std::comp_ellint_1(std::sqrt(m)) / std::sqrt(steepest / kInertia);
+      EXPECT_NEAR(Period(
+                      10, Constant(0), &simulator, [](const Simulator& s) { return s.q1(); }, 0.3),
+                  period_s, 1e-4 * period_s);
+    }
+  }
+}
+
 TEST(JointEffectsTest, CableHysteresisLosesEnergy) {
   Plant plant = Free(Rig::kJoint);
   plant.load.cable_stiffness = 2;

@@ -86,6 +86,7 @@ struct Load {
   double contact_hz = 300;    // backlash without compliance: how stiff the flanks are
   double transmission_damping_ratio = 0.1;
   double cable_stiffness = 0, cable_rest_rad = 0, cable_hysteresis = 0;
+  double cable_cubic = 0;  // by the third power of the stretch
   double gravity_n_m = 0, gravity_rest_rad = 0;
   double bias_n_m = 0;
   double cogging_n_m = 0, cogging_periods = 12, cogging_phase_rad = 0, cogging_second = 0, cogging_second_phase_rad = 0;

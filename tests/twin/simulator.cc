@@ -194,6 +194,7 @@ double Simulator::LoadTorque(const State& x, double time_s) const {
   if (load.cable_stiffness > 0) {
     torque -= load.cable_stiffness * (q - load.cable_rest_rad) + cable_.Torque(load, q - start_[kQ1]);
   }
+  if (load.cable_cubic != 0) torque -= load.cable_cubic * std::pow(q - load.cable_rest_rad, 3);
   if (load.gravity_n_m != 0) torque -= load.gravity_n_m * std::sin(q - load.gravity_rest_rad);
   if (load.cogging_n_m != 0) {
     const double phase = load.cogging_periods * q;

@@ -26,6 +26,17 @@ Effect Effect_cable_spring() {
                .trials = {-1, 0, 1},
                .start = 0,
                .with = Parameter::With::kRest},
+              // No trials: screened as the linear cable, and free in every fit.
+              {.key = "stiffness_cubic_n_m_per_rad3",
+               .unit = "N m/rad^3",
+               .role = ParameterRole::kShape,
+               .scale = ScaleKind::kCubic,
+               .neutral = 0,
+               .low = 0,
+               .high = 3,
+               .trials = {},
+               .start = 0,
+               .with = Parameter::With::kCubic},
           },
       .meaning = "a cable pulls to a rest angle",
       .signature = "linear in angle about a rest angle",
@@ -37,6 +48,7 @@ Effect Effect_cable_spring() {
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "stiffness_n_m_per_rad", names[0]));
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "rest_rad", names[1]));
+        GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "cubic_n_m_per_rad3", names[2]));
         return Ok();
       },
   };

@@ -4,7 +4,7 @@
 //
 // with s in -1 .. 1 the bend of a Dahl bristle (../common/bristle.h), which makes a loop of half-height H that turns
 // over within a few `hysteresis_rad`. Stands for a cable, a spring that hardens, an unbalanced mass, a bias, cogging.
-// MuJoCo's own `stiffness` and `springref` do for a plain linear spring. Attributes: README.md in this folder.
+// MuJoCo's own `stiffness` and `springref` do for k and k3 alone. Attributes: README.md in this folder.
 #ifndef GAPSCOPE_PLUGINS_SPRING_SPRING_H_
 #define GAPSCOPE_PLUGINS_SPRING_SPRING_H_
 
@@ -42,7 +42,8 @@ class Spring {
       {"rest_rad", "rad", 0, -kUnlimited, kUnlimited, Combine::kSum, Needs::kNothing, "springref"},
       {"hysteresis_n_m", "N m", 0, 0, kUnlimited},
       {"hysteresis_rad", "rad", 0.05, 0, kUnlimited},
-      {"cubic_n_m_per_rad3", "N m/rad^3", 0, -kUnlimited, kUnlimited},
+      {"cubic_n_m_per_rad3", "N m/rad^3", 0, -kUnlimited, kUnlimited, Combine::kSum, Needs::kNothing,
+       "stiffness_cubic"},
       {"gravity_n_m", "N m", 0, -kUnlimited, kUnlimited},
       {"gravity_rest_rad", "rad", 0, -kUnlimited, kUnlimited},
       {"bias_n_m", "N m", 0, -kUnlimited, kUnlimited},

@@ -41,6 +41,7 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   model->rig_ = std::move(rig);
   model->effects_ = effects;
   Structure structure(*model->rig_);
+  GS_RETURN_IF_ERROR(CheckTogether(effects, *model->rig_));
   for (const auto& use : effects) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
   structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step

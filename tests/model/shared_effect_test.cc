@@ -1,5 +1,5 @@
-// One size for all drives, or all signals: what it is equal to, where it is offered, and that a drive's own delay is its
-// own.
+// One size for all drives, or all signals: what it is equal to, where it is offered, and that a drive's own delay is
+// its own.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -205,8 +205,8 @@ TEST(SharedEffectPlacesTest, OneDriveIsThatDrive) {
   for (const EffectUse& use : AllUses(*model->rig())) EXPECT_NE(use.on, "all") << use.Text();
   const auto uses = ParseEffects({"command_delay@all", "coulomb_friction@all", "sensor_delay@all"}, *model->rig());
   ASSERT_TRUE(uses.ok()) << uses.error().Text();
-  EXPECT_EQ(uses.value(), (std::vector<EffectUse>{
-                              {"command_delay", "motor"}, {"coulomb_friction", "arm"}, {"sensor_delay", "all"}}));
+  EXPECT_EQ(uses.value(),
+            (std::vector<EffectUse>{{"command_delay", "motor"}, {"coulomb_friction", "arm"}, {"sensor_delay", "all"}}));
   const auto twice = ParseEffects({"command_delay@all", "command_delay@motor"}, *model->rig());
   ASSERT_FALSE(twice.ok());
   EXPECT_NE(twice.error().Text().find("stands twice"), std::string::npos);
@@ -216,7 +216,8 @@ TEST(SharedEffectPlacesTest, OneDriveIsThatDrive) {
 
 TEST(SharedEffectPlacesTest, CommandsOfTwoUnitsHaveNoCommonSize) {
   const Scratch scratch;
-  const auto model = MakeModel(MakeExperiment(scratch, kArm, Replaced(kYaml, "column: v, unit: N m", "column: v, unit: V")));
+  const auto model =
+      MakeModel(MakeExperiment(scratch, kArm, Replaced(kYaml, "column: v, unit: N m", "column: v, unit: V")));
   const auto refused = ParseEffects({"dead_zone@all"}, *model->rig());
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().Text().find("allowed: first, second"), std::string::npos) << refused.error().Text();

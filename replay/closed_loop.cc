@@ -19,6 +19,12 @@ struct LoopTraces {
   std::size_t* steps;
 };
 
+// The row whose command acts `at`, none after `row`.
+std::size_t RowHeld(const Recording& recording, std::size_t row, double at) {
+  while (row > 0 && recording.time_s[row] > at + 1e-12) --row;
+  return row;
+}
+
 // One log. False after a divergence; what was sent and predictions are NaN from there on.
 bool RunLoop(const Model& model, const Recording& recording, Controller& controller, const ReplayOptions& options,
              LoopTraces out) {
@@ -30,14 +36,12 @@ bool RunLoop(const Model& model, const Recording& recording, Controller& control
   mjModel* m = const_cast<mjModel*>(&simulator.mujoco_model());
   mjData* d = &simulator.data();
   const double max_step = options.time_step_s > 0 ? options.time_step_s : model.compiled().opt.timestep;
-  const double delay = model.command_delay() >= 0 ? values[model.command_delay()] : 0;
   const InitialState start = InitialStateAt(model, recording, 0, values);
   mj_resetData(m, d);
   std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
   std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
   controller.Reset(model.experiment().replay.start_s > 0 ? Controller::Start::kSettled : Controller::Start::kZero);
   std::vector<double> readings(recording.measured.size());
-  std::size_t held = 0;
   for (std::size_t row = 0; row < recording.rows(); ++row) {
     for (std::size_t s = 0; s < readings.size(); ++s) {
       const auto& measured = recording.measured[s];
@@ -57,13 +61,12 @@ bool RunLoop(const Model& model, const Recording& recording, Controller& control
     m->opt.timestep = interval / count;
     for (int step = 0; step < count; ++step) {
       // A late command is the one that was sent last, the delay ago; before the first one, the log's own.
-      const double at = now + step * m->opt.timestep - delay;
-      while (held + 1 <= row && recording.time_s[held + 1] <= at + 1e-12) ++held;
       for (std::size_t c = 0; c < recording.commands.size(); ++c) {
-        const bool closed = c == controller.command();
-        d->ctrl[model.command_actuators()[c]] = !closed                    ? recording.commands[c].values[row]
-                                                : at < recording.time_s[0] ? recording.commands[c].values[0]
-                                                                           : (*sent)[held];
+        const int delay = model.command_delays()[c];
+        const double at = now + step * m->opt.timestep - (delay >= 0 ? values[delay] : 0);
+        const std::vector<double>& column = c == controller.command() ? *sent : recording.commands[c].values;
+        d->ctrl[model.command_actuators()[c]] =
+            at < recording.time_s[0] ? recording.commands[c].values[0] : column[RowHeld(recording, row, at)];
       }
       mj_step(m, d);
     }

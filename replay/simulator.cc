@@ -129,6 +129,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
       data_(mj_makeData(mujoco_.get())),
       writer_(model, mujoco_.get(), data_.get()),
       max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep),
+      delays_s_(model.command_actuators().size(), 0),
       values_(model.Nominal()),
       earlier_(model.command_actuators().size(), 0),
       held_(model.command_actuators().size(), 0) {
@@ -152,7 +153,12 @@ Simulator::Simulator(const Model& model, double max_step_s)
 
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
   std::copy(values.begin(), values.end(), values_.begin());
-  command_delay_s_ = shift_s_ + (model_.command_delay() >= 0 ? values_[model_.command_delay()] : 0);
+  for (std::size_t c = 0; c < delays_s_.size(); ++c) {
+    const int delay = model_.command_delays()[c];
+    delays_s_[c] = shift_s_ + (delay >= 0 ? values_[delay] : 0);
+  }
+  late_ = std::any_of(delays_s_.begin(), delays_s_.end(), [](double delay_s) { return delay_s != 0; });
+  latest_s_ = delays_s_.empty() ? shift_s_ : *std::max_element(delays_s_.begin(), delays_s_.end());
   return writer_.Write(values, recording.values);
 }
 
@@ -160,10 +166,10 @@ void Simulator::SetCommands(const Recording& recording, std::size_t row, double 
   const auto& actuators = model_.command_actuators();
   for (std::size_t c = 0; c < actuators.size(); ++c) {
     const auto& values = recording.commands[c].values;
-    data_->ctrl[actuators[c]] = command_delay_s_ == 0
-                                    ? values[row]
-                                    : MeanHeld(recording.time_s, values, earlier_[c], from_s - command_delay_s_,
-                                               to_s - command_delay_s_, held_[c]);
+    const double delay_s = delays_s_[c];
+    data_->ctrl[actuators[c]] =
+        delay_s == 0 ? values[row]
+                     : MeanHeld(recording.time_s, values, earlier_[c], from_s - delay_s, to_s - delay_s, held_[c]);
   }
 }
 
@@ -187,7 +193,7 @@ void Simulator::Begin(const Recording& recording, Window window, const InitialSt
   mj_resetData(m, d);
   std::fill(held_.begin(), held_.end(), window.begin);
   from_nothing_ = false;
-  if ((remembers_ || command_delay_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
+  if ((remembers_ || latest_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
     FindEarlierCommands(recording);
   PreRoll(recording, window);
   // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
@@ -215,10 +221,9 @@ int Simulator::StepToNext(const Recording& recording, std::size_t row) {
   const double now = recording.time_s[row], interval = recording.time_s[row + 1] - now;
   const int steps = StepsOver(interval, max_step_s_);
   m->opt.timestep = interval / steps;
-  if (command_delay_s_ == 0) SetCommands(recording, row, now, now);
+  if (!late_) SetCommands(recording, row, now, now);
   for (int step = 0; step < steps; ++step) {
-    if (command_delay_s_ != 0)
-      SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
+    if (late_) SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
     if (probe_.joint >= 0) ApplyProbe();
     mj_step(m, data_.get());
   }
@@ -312,7 +317,7 @@ double Simulator::Past() const {
   if (!apart_.empty()) past_s = std::max(past_s, kPast.transmission_s);
   for (const int i : model_.memories())
     past_s = std::max(past_s, std::min(kPast.time_constants * values_[i], kPast.longest_s));
-  return std::max(past_s, command_delay_s_);
+  return std::max(past_s, latest_s_);
 }
 
 void Simulator::Follow(const Recording& recording, std::size_t row) {

@@ -99,7 +99,10 @@ class Simulator {
   DataPtr data_;
   ParameterWriter writer_;
   double max_step_s_;
-  double shift_s_ = 0, command_delay_s_ = 0;
+  double shift_s_ = 0;
+  std::vector<double> delays_s_;  // per command: how late it acts
+  bool late_ = false;             // one of them does not act at its stamp
+  double latest_s_ = 0;
   ProbeTorque probe_;
   bool reads_forces_ = false;
   bool remembers_ = false;  // has states beside position and speed

@@ -81,13 +81,13 @@ std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std:
 }
 
 std::vector<Option> EffectOptions(ModelFlags& flags) {
-  return Join(
-      {{{.flag = "--with",
-         .value = &flags.with,
-         .help = "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL], more than once, of " + gapscope::Join(EffectNames()),
-         .more = "docs/effects.md lists the effects. Without a place it goes where it can act, if there is one "
-                 "such place; its parameters are then known to --set as EFFECT@PLACE.NAME"}},
-       ValueOptions(flags.set, flags.params)});
+  return Join({{{.flag = "--with",
+                 .value = &flags.with,
+                 .help = "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL|all], more than once, of " +
+                         gapscope::Join(EffectNames()),
+                 .more = "docs/effects.md lists the effects. Without a place it goes where it can act, if there is one "
+                         "such place; its parameters are then known to --set as EFFECT@PLACE.NAME"}},
+               ValueOptions(flags.set, flags.params)});
 }
 
 Option WindowOption(double& window_s) {

@@ -30,19 +30,36 @@ bool IsServoJoint(const std::string& joint, const Model& base) {
   return false;
 }
 
+// Of a use on all: each of its places holds a position.
+bool AreServoJoints(const EffectUse& use, const Model& base) {
+  const std::vector<std::string> places = PlacesOf(use, *base.rig());
+  return std::all_of(places.begin(), places.end(),
+                     [&](const std::string& on) { return IsServoJoint(JointOf(on, base), base); });
+}
+
 const Effect& Of(const EffectUse& use, const Model& model) { return EffectOf(use, *model.rig()); }
+
+// Whether nothing is left out: on all, or on the only place that there is.
+bool IsOnEach(const EffectUse& use, const Rig& rig) {
+  const std::vector<std::string> all = PlacesOf({use.effect, kOnAll}, rig);
+  return !all.empty() && PlacesOf(use, rig).size() == all.size();
+}
 
 }  // namespace
 
 bool IsFinding(const EffectUse& use, const Model& base) {
-  if (Of(use, base).character == EffectCharacter::kConstantTorque && IsServoJoint(JointOf(use.on, base), base))
-    return false;
+  if (Of(use, base).character == EffectCharacter::kConstantTorque && AreServoJoints(use, base)) return false;
   // A column that is the only one measured of a system is late with everything else: tried all the same, the verdict
   // then says ambiguous.
   return true;
 }
 
 bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig, bool exactly) {
+  if (richer.effect == simpler.effect && richer.on != simpler.on) {
+    // One size for all drives is nearly that of one of them, as far as the logs do not show the others.
+    const std::vector<std::string> places = PlacesOf(richer, rig);
+    return !exactly && places.size() > 1 && std::find(places.begin(), places.end(), simpler.on) != places.end();
+  }
   // On the same place: a motor's direction asymmetry is no joint's friction.
   if (richer.on != simpler.on) return false;
   const std::vector<Contained>& contains = EffectOf(richer, rig).contains;
@@ -70,9 +87,13 @@ LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
 
 bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, const LoggedSignals& logged) {
   const Effect &x = Of(a, model), &y = Of(b, model);
-  if (logged.one && (x.same_on_one_signal == b.effect || y.same_on_one_signal == a.effect)) return true;
+  const Rig& rig = *model.rig();
+  const bool of_all = IsOnEach(a, rig) && IsOnEach(b, rig) && (a.on == kOnAll || b.on == kOnAll);
+  if ((logged.one || of_all) && (x.same_on_one_signal == b.effect || y.same_on_one_signal == a.effect)) return true;
   if (a.on != b.on || (x.same_but_constant != b.effect && y.same_but_constant != a.effect)) return false;
-  return model.rig()->HasSpring(a.on) || (!logged.torque && IsServoJoint(a.on, model));
+  const std::vector<std::string> places = PlacesOf(a, rig);
+  const bool sprung = std::all_of(places.begin(), places.end(), [&](const auto& on) { return rig.HasSpring(on); });
+  return sprung || (!logged.torque && AreServoJoints(a, model));
 }
 
 bool IsLessLikely(const EffectUse& a, const EffectUse& b, const Model& model) {

@@ -11,7 +11,7 @@ namespace gapscope {
 // bias on a servo equals a zero offset.
 bool IsFinding(const EffectUse& use, const Model& base);
 // Whether `richer` can do all that `simpler` does, at the same place; `exactly`: not only nearly, as far as its bounds
-// go.
+// go. Nearly, too, one size for all places and the same effect on one of them: they are rivals.
 bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig, bool exactly = false);
 
 // What the logs hold, as far as it makes effects one.
@@ -21,8 +21,8 @@ struct LoggedSignals {
 };
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings);
 // Whether the two are the same motion on such logs, whatever their fits cost: a late command and a late sensor where
-// that sensor is all that is measured; Coulomb friction and friction by direction on a joint that a servo or a spring
-// holds, apart by a zero offset.
+// that sensor is all that is measured, or where all commands, and all sensors, are late alike; Coulomb friction and
+// friction by direction on a joint that a servo or a spring holds, apart by a zero offset.
 bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, const LoggedSignals& logged);
 // Whether `a` is the less likely of two that explain the logs equally well: gravity on a joint whose axis stands
 // upright, where only a tilted rig would feel it, beside a cable.

@@ -74,7 +74,7 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
     step = std::min(step, recording.timeline.median_step_s);
     AddLog(model, recording, options, &layout, &low, &high);
   }
-  if (options.fit_shift && model.command_delay() < 0) {
+  if (options.fit_shift && !model.DelaysEveryCommand()) {
     // In samples. No descent gets past the jump of a torque at an early command: where one is scored commands are late
     // or on time.
     low.push_back(ScoresForces(recordings, layout) ? 0 : -1);

@@ -114,6 +114,55 @@ std::vector<std::string> Places(const Effect& effect, const Rig& rig) {
   return places;
 }
 
+bool IsOneOf(const std::string& text, const std::vector<std::string>& list) {
+  return std::find(list.begin(), list.end(), text) != list.end();
+}
+
+// Where an effect acts that all drives, or all signals, share. None: the size's key would be another on each drive.
+std::vector<std::string> SharedPlaces(const Effect& effect, const Rig& rig) {
+  std::vector<std::string> places = Places(effect, rig);
+  if (IsOneOf(kOnAll, places)) return {};
+  const bool on_joints = effect.place != EffectPlace::kMotor && effect.place != EffectPlace::kServo &&
+                         effect.place != EffectPlace::kSignal;
+  if (on_joints) std::erase_if(places, [&](const std::string& joint) { return rig.ActuatorOf(joint).empty(); });
+  const bool of_command = std::any_of(effect.parameters.begin(), effect.parameters.end(),
+                                      [](const auto& p) { return p.scale == ScaleKind::kCommand; });
+  for (const std::string& place : places) {
+    if (of_command && rig.KindOfCommand(place) != rig.KindOfCommand(places.front())) return {};
+  }
+  return places;
+}
+
+// Times and shares are no larger on a larger drive.
+bool HasNoScale(const Effect& effect) {
+  return std::all_of(effect.parameters.begin(), effect.parameters.end(),
+                     [](const auto& p) { return p.scale == ScaleKind::kOne; });
+}
+
+// The entry of a use in the catalogue and where that acts; null: no such place. On all, of a name that stands twice,
+// the first.
+std::pair<const Effect*, std::vector<std::string>> Placed(const EffectUse& use, const Rig& rig) {
+  for (const Effect& effect : Catalogue()) {
+    if (effect.name == use.effect && IsOneOf(use.on, Places(effect, rig))) return {&effect, {use.on}};
+  }
+  for (const Effect& effect : Catalogue()) {
+    if (effect.name != use.effect || use.on != kOnAll) continue;
+    if (auto places = SharedPlaces(effect, rig); !places.empty()) return {&effect, std::move(places)};
+  }
+  return {};
+}
+
+// All uses, of one size for all places too whatever that says.
+std::vector<EffectUse> EveryUse(const Rig& rig) {
+  std::vector<EffectUse> uses;
+  for (const Effect& effect : Catalogue()) {
+    for (const auto& place : Places(effect, rig)) uses.push_back({effect.name, place});
+    const auto [shared, all] = Placed({effect.name, kOnAll}, rig);
+    if (shared == &effect && all.size() > 1) uses.push_back({effect.name, kOnAll});
+  }
+  return uses;
+}
+
 // The scales at a place; a motor's and its joint's are one.
 Scales ScalesAt(const std::string& on, const Rig& rig, const ScaleTable& table) {
   for (const std::string& name : {on, rig.JointOf(on), rig.JointOfSignal(on)}) {
@@ -138,7 +187,10 @@ Result<EffectUse> ParseEffectUse(const std::string& text, const Rig& rig) {
     return Error{.what = "the effect '" + name + "' makes no sense in this model", .where = "--with " + text};
   }
   if (at == std::string::npos) return EffectUse{name, places.front()};
-  if (std::find(places.begin(), places.end(), on) == places.end()) {
+  const auto where = Placed({name, on}, rig).second;
+  if (where.size() == 1) return EffectUse{name, where.front()};
+  if (where.empty()) {
+    if (Placed({name, kOnAll}, rig).second.size() > 1) places.emplace_back(kOnAll);
     return Error{.what = "the effect '" + name + "' cannot act there",
                  .where = "--with " + text,
                  .actual = "'" + on + "'",
@@ -157,16 +209,40 @@ Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& text
       return Error{.what = "the effect stands twice", .where = "--with " + text};
     uses.push_back(std::move(use));
   }
+  GS_RETURN_IF_ERROR(CheckTogether(uses, rig));
   return uses;
 }
 
-std::vector<EffectUse> AllUses(const Rig& rig) {
-  std::vector<EffectUse> uses;
-  for (const Effect& effect : Catalogue()) {
-    for (const auto& place : Places(effect, rig)) uses.push_back({effect.name, place});
+Status CheckTogether(const std::vector<EffectUse>& uses, const Rig& rig) {
+  for (const EffectUse& shared : uses) {
+    const std::vector<std::string> places = PlacesOf(shared, rig);
+    if (places.size() < 2) continue;
+    for (const EffectUse& single : uses) {
+      if (single.effect != shared.effect || !IsOneOf(single.on, places)) continue;
+      const auto each = Collect(places, [&](const std::string& on) { return EffectUse{shared.effect, on}.Text(); });
+      return Error{.what = "the effect stands on all places at one size and on one of them by itself",
+                   .where = "--with " + shared.Text() + " --with " + single.Text(),
+                   .allowed = "one of the two",
+                   .cure = "give each place its own size: " + Join(each)};
+    }
   }
+  return Ok();
+}
+
+std::vector<EffectUse> AllUses(const Rig& rig) {
+  // With one drive, what all signals share is what that drive does.
+  const auto drives = rig.Actuators();
+  const bool several =
+      std::count_if(drives.begin(), drives.end(), [&](const auto& name) { return !rig.JointOf(name).empty(); }) > 1;
+  std::vector<EffectUse> uses = EveryUse(rig);
+  std::erase_if(uses, [&](const EffectUse& use) {
+    const auto [effect, places] = Placed(use, rig);
+    return places.size() > 1 && !(several && HasNoScale(*effect));
+  });
   return uses;
 }
+
+std::vector<std::string> PlacesOf(const EffectUse& use, const Rig& rig) { return Placed(use, rig).second; }
 
 std::vector<EffectUse> ActuatorModel(const Rig& rig) {
   std::map<int, EffectUse> stages;
@@ -177,30 +253,30 @@ std::vector<EffectUse> ActuatorModel(const Rig& rig) {
 }
 
 const Effect& EffectOf(const EffectUse& use, const Rig& rig) {
-  for (const Effect& effect : Catalogue()) {
-    if (effect.name != use.effect) continue;
-    const auto places = Places(effect, rig);
-    if (std::find(places.begin(), places.end(), use.on) != places.end()) return effect;
-  }
-  GS_CHECK(!"a valid effect use");
-  return Catalogue().front();
+  const Effect* effect = Placed(use, rig).first;
+  GS_CHECK(effect && "a valid effect use");
+  return *effect;
 }
 
 std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& rig, const ScaleTable& table) {
-  const Effect& effect = EffectOf(use, rig);
-  const Scales scales = ScalesAt(use.on, rig, table);
+  const auto [effect_of, places] = Placed(use, rig);
+  GS_CHECK(effect_of && "a valid effect use");
+  const Effect& effect = *effect_of;
+  const bool volts = std::all_of(places.begin(), places.end(), [&](const std::string& place) {
+    return rig.KindOfCommand(place) == CommandKind::kVoltage;
+  });
   std::vector<PlacedParameter> placed;
   for (const EffectParameter& p : effect.parameters) {
     ScaleKind kind = p.scale;
     std::string key = p.key, unit = p.unit;
     if (kind == ScaleKind::kCommand) {
-      const CommandKind command = rig.KindOfCommand(use.on);
-      const bool volts = command == CommandKind::kVoltage;
+      const CommandKind command = rig.KindOfCommand(places.front());
       key += volts ? "_v" : IsElectric(command) ? "_a" : "_n_m";
       unit = volts ? "V" : IsElectric(command) ? "A" : "N m";
       if (!IsElectric(command)) kind = ScaleKind::kTorque;
     }
-    const double scale = ScaleOf(kind, scales);
+    double scale = 0;
+    for (const std::string& place : places) scale = std::max(scale, ScaleOf(kind, ScalesAt(place, rig, table)));
     PlacedParameter out{.name = use.Text() + "." + key,
                         .key = key,
                         .unit = unit,
@@ -210,8 +286,7 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
                         .low = p.low * scale,
                         .high = p.high * scale,
                         .start = p.start * scale};
-    if (p.voltage_only && rig.KindOfCommand(use.on) != CommandKind::kVoltage)
-      out.low = out.high = out.start = out.neutral;
+    if (p.voltage_only && !volts) out.low = out.high = out.start = out.neutral;
     for (const double trial : p.trials) out.trials.push_back(trial * scale);
     placed.push_back(std::move(out));
   }
@@ -219,7 +294,7 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
 }
 
 std::optional<EffectUse> UseWithParameter(const std::string& name, const Rig& rig) {
-  for (const EffectUse& use : AllUses(rig)) {
+  for (const EffectUse& use : EveryUse(rig)) {
     for (const auto& p : PlacedParameters(use, rig, {})) {
       if (p.name == name) return use;
     }
@@ -227,9 +302,32 @@ std::optional<EffectUse> UseWithParameter(const std::string& name, const Rig& ri
   return std::nullopt;
 }
 
+namespace {
+
+// The rig's own size at a place, once.
+void AddScales(Structure& structure, const std::string& on, const ScaleTable& table) {
+  const Scales scales = ScalesAt(on, structure.rig(), table);
+  for (const auto& [size, value, unit] : {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"},
+                                          std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {
+    const std::string name = ScaleName(on, size);
+    const auto known = std::find_if(structure.parameters.begin(), structure.parameters.end(),
+                                    [&](const Parameter& q) { return q.name == name; });
+    if (known == structure.parameters.end())
+      structure.AddParameter({.name = name,
+                              .unit = unit,
+                              .doc = "the rig's own size",
+                              .nominal = value,
+                              .low = value,
+                              .high = value,
+                              .frozen = true,
+                              .owner = Parameter::Owner::kScale});
+  }
+}
+
+}  // namespace
+
 Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable& table) {
   const Effect& effect = EffectOf(use, structure.rig());
-  const Scales scales = ScalesAt(use.on, structure.rig(), table);
   std::vector<std::string> names;
   for (const auto& p : PlacedParameters(use, structure.rig(), table)) {
     names.push_back(p.name);
@@ -246,22 +344,11 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                             .owner = Parameter::Owner::kEffect,
                             .of_torque = IsOfTorque(p.scale)});
   }
-  for (const auto& [size, value, unit] : {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"},
-                                          std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {
-    const std::string name = ScaleName(use.on, size);
-    const auto known = std::find_if(structure.parameters.begin(), structure.parameters.end(),
-                                    [&](const Parameter& q) { return q.name == name; });
-    if (known == structure.parameters.end())
-      structure.AddParameter({.name = name,
-                              .unit = unit,
-                              .doc = "the rig's own size",
-                              .nominal = value,
-                              .low = value,
-                              .high = value,
-                              .frozen = true,
-                              .owner = Parameter::Owner::kScale});
+  for (const std::string& place : PlacesOf(use, structure.rig())) {
+    AddScales(structure, place, table);
+    GS_RETURN_IF_ERROR(effect.apply(structure, place, names));
   }
-  return effect.apply(structure, use.on, names);
+  return Ok();
 }
 
 }  // namespace gapscope

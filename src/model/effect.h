@@ -123,7 +123,11 @@ std::string EffectTitle(const std::string& name);
 enum class RigSize { kTorque, kInertia };  // Scales::torque_n_m, Scales::inertia_kg_m2
 std::string ScaleName(const std::string& on, RigSize size);
 
-// One effect on one place.
+// `on` of an effect that all its places share with one size: every drive, or every measured signal. A place of the rig
+// that has this name goes first.
+inline constexpr const char* kOnAll = "all";
+
+// One effect on one place, or on all.
 struct EffectUse {
   std::string effect, on;
   std::string Text() const { return effect + "@" + on; }
@@ -137,13 +141,20 @@ using ScaleTable = std::map<std::string, Scales>;
 void AddToCatalogue(Effect effect);
 
 // "cable_spring@arm" or "cable_spring" (then on the first place where it makes sense). Errors: unknown effect, unknown
-// place, with what is allowed; one that stands twice.
+// place, with what is allowed; one that stands twice; as CheckTogether. On a rig with one drive EFFECT@all is that
+// drive.
 Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& texts, const Rig& rig);
-// Every effect on every place where it makes sense.
+// Error: an effect on all places and on one of them beside it, whose size would be a sum of two.
+Status CheckTogether(const std::vector<EffectUse>& uses, const Rig& rig);
+// Every effect on every place where it makes sense; on a rig with several drives also on all of them, where one size
+// can be meant for all: the effect's numbers are times and shares, which no drive's own size scales.
 std::vector<EffectUse> AllUses(const Rig& rig);
+// Where a use acts: its place; of EFFECT@all each drive (of effects on joints, each driven joint), or each signal.
+std::vector<std::string> PlacesOf(const EffectUse& use, const Rig& rig);
 // The stages that a drive's own model is made of, each on the first place where it makes sense.
 std::vector<EffectUse> ActuatorModel(const Rig& rig);
-// Enters an effect: its parameters are named EFFECT@ON.KEY, bounds and nominal (neutral) in SI by the scales.
+// Enters an effect: its parameters are named EFFECT@ON.KEY, bounds and nominal (neutral) in SI by the scales. On all
+// places the same parameters act on each, their bounds by the largest scale of any.
 Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable& scales);
 // The catalogue's entry of a use (which must be valid): one name may act differently on motors and joints; and its
 // parameters with names and values in SI.

@@ -41,18 +41,14 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   model->rig_ = std::move(rig);
   model->effects_ = effects;
   Structure structure(*model->rig_);
+  GS_RETURN_IF_ERROR(CheckTogether(effects, *model->rig_));
   for (const auto& use : effects) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
   structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step
   GS_RETURN_IF_ERROR(model->Compile(&structure));
   for (const auto& split : model->splits_) model->mirrored_.emplace_back(split.motor_joint, split.load_joint);
-  if (!structure.command_delay.empty()) model->command_delay_ = model->IndexOf(structure.command_delay);
   GS_RETURN_IF_ERROR(model->ResolveNames());
-  const auto& measured = model->experiment().measured;
-  for (std::size_t i = 0; i < measured.size(); ++i) {
-    if (const auto found = structure.signal_delay.find(measured[i].signal); found != structure.signal_delay.end())
-      model->sources_[i].delay = model->IndexOf(found->second);
-  }
+  model->FindDelays(structure);
   model->FindMemories();
   return std::shared_ptr<const Model>(std::move(model));
 }
@@ -144,6 +140,23 @@ Status Model::ResolveNames() {
     sources_.push_back(source);
   }
   return Ok();
+}
+
+void Model::FindDelays(const Structure& structure) {
+  for (const auto& command : experiment().commands) {
+    const auto found = structure.command_delay.find(rig_->ActuatorOf(rig_->JointOf(command.actuator)));
+    command_delays_.push_back(found == structure.command_delay.end() ? -1 : IndexOf(found->second));
+  }
+  const auto& measured = experiment().measured;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    if (const auto found = structure.signal_delay.find(measured[i].signal); found != structure.signal_delay.end())
+      sources_[i].delay = IndexOf(found->second);
+  }
+}
+
+bool Model::DelaysEveryCommand() const {
+  return !command_delays_.empty() &&
+         std::none_of(command_delays_.begin(), command_delays_.end(), [](int parameter) { return parameter < 0; });
 }
 
 // A time that a remembering number of a drive is made of.

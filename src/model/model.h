@@ -56,7 +56,10 @@ class Model {
     return sources_[measured];
   }  // by index in experiment.measured
   const std::vector<SignalSource>& sources() const { return sources_; }
-  int command_delay() const { return command_delay_; }  // parameter, or -1
+  // Per experiment command: parameter that says how late it acts (of its drive, all of whose inputs are late alike);
+  // -1: on time.
+  const std::vector<int>& command_delays() const { return command_delays_; }
+  bool DelaysEveryCommand() const;
   // Parameters that are times, s, over which the past acts on: of lags and of a supply that sags.
   const std::vector<int>& memories() const { return memories_; }
   // {joint, joint that it starts with}: unmeasured joints that an effect added.
@@ -88,6 +91,7 @@ class Model {
   // Compiles a finished structure and resolves its settings in the result; they leave the structure.
   Status Compile(Structure* structure);
   Status ResolveNames();
+  void FindDelays(const Structure& structure);
   void FindMemories();
 
   std::shared_ptr<const Rig> rig_;
@@ -99,7 +103,7 @@ class Model {
   std::vector<int> command_ctrl_;
   std::vector<SignalSource> sources_;
   std::vector<std::pair<int, int>> mirrored_;
-  int command_delay_ = -1;
+  std::vector<int> command_delays_;
   std::vector<int> memories_;
 };
 

@@ -46,9 +46,9 @@ class Structure {
   bool for_export = false;  // what the host does itself must enter the model too
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
-  std::string command_delay;                        // parameter; empty: none
-  std::map<std::string, std::string> signal_delay;  // signal -> parameter
-  std::map<std::string, std::string> motor_joint;   // split joint -> its motor-side joint
+  std::map<std::string, std::string> command_delay;  // drive -> parameter
+  std::map<std::string, std::string> signal_delay;   // signal -> parameter
+  std::map<std::string, std::string> motor_joint;    // split joint -> its motor-side joint
   std::vector<Split> splits;
 
  private:

@@ -109,7 +109,15 @@ std::string ShortNumber(double value, int digits) {
   return {buffer, std::to_chars(buffer, buffer + sizeof buffer, number, format).ptr};
 }
 
-std::string Words(const EffectUse& use) { return EffectTitle(use.effect) + " on " + use.on; }
+std::string Words(const EffectUse& use) {
+  const auto& catalogue = Catalogue();
+  const auto effect = std::ranges::find(catalogue, use.effect, &Effect::name);
+  const bool of_signals = effect != catalogue.end() && effect->place == EffectPlace::kSignal;
+  return EffectTitle(use.effect) + " on " +
+         (use.on != kOnAll ? use.on
+          : of_signals     ? "all measured signals"
+                           : "all drives");
+}
 std::string Words(const Explanation& explanation) { return explanation ? Words(*explanation) : "none"; }
 
 std::string Listed(const std::vector<std::string>& parts, const std::string& joiner) {

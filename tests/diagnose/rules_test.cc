@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "src/diagnose/candidate.h"
+#include "tests/experiment/scratch.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -44,6 +45,55 @@ TEST(RulesTest, ALateSensorIsALateCommandOnOneSignal) {
   const EffectUse sensor{"sensor_delay", "arm_rad"}, command{"command_delay", "motor"};
   EXPECT_TRUE(AreOneMotion(sensor, command, *rig.model, {.one = true}));
   EXPECT_FALSE(AreOneMotion(sensor, command, *rig.model, {.one = false}));
+}
+
+// A rig of two drives on separate joints, servos or motors.
+std::shared_ptr<const Model> TwoDrives(const std::string& kind) {
+  const Scratch scratch;
+  scratch.Write("robot.xml", R"(<mujoco><worldbody>
+    <body><joint name="shoulder"/><geom size="0.1"/></body><body><joint name="elbow"/><geom size="0.1"/></body>
+    <body><joint name="free"/><geom size="0.1"/></body></worldbody>
+    <actuator><)" + kind + R"( name="first" joint="shoulder"/><)" +
+                                 kind + R"( name="second" joint="elbow"/></actuator></mujoco>)");
+  const auto experiment = LoadExperiment(scratch.Write("experiment.yaml", R"(model: robot.xml
+commands: [{actuator: first, column: u}, {actuator: second, column: v}]
+measured:
+  - {signal: q, column: q, joint: shoulder, unit: rad}
+  - {signal: p, column: p, joint: elbow, unit: rad}
+)"));
+  EXPECT_TRUE(experiment.ok()) << experiment.error().Text();
+  return Model::Load(experiment.value()).value();
+}
+
+TEST(RulesTest, OneSizeForAllIsARivalOfTheSameEffectOnOnePlace) {
+  const auto model = TwoDrives("motor");
+  const auto& known = *model->rig();
+  const EffectUse all{"coulomb_friction", "all"}, one{"coulomb_friction", "elbow"}, passive{"coulomb_friction", "free"};
+  EXPECT_TRUE(Contains(all, one, known));
+  EXPECT_FALSE(Contains(all, one, known, true)) << "the other drive feels it too";
+  EXPECT_FALSE(Contains(one, all, known));
+  EXPECT_FALSE(Contains(all, passive, known));
+  EXPECT_TRUE(Contains({"stribeck_friction", "all"}, all, known));
+  EXPECT_FALSE(Contains({"stribeck_friction", "all"}, one, known));
+}
+
+TEST(RulesTest, ABiasOfAllServosIsNoFinding) {
+  const EffectUse bias{"torque_bias", "all"};
+  const auto servos = TwoDrives("position"), motors = TwoDrives("motor");
+  EXPECT_FALSE(IsFinding(bias, *servos));
+  EXPECT_TRUE(IsFinding(bias, *motors));
+  EXPECT_FALSE(IsLessLikely({"gravity_offset", "all"}, {"cable_spring", "all"}, *motors));
+}
+
+// However many signals there are.
+TEST(RulesTest, AllSensorsLateAreAllCommandsLate) {
+  const auto model = TwoDrives("motor");
+  const EffectUse sensors{"sensor_delay", "all"}, commands{"command_delay", "all"};
+  EXPECT_TRUE(AreOneMotion(sensors, commands, *model, {}));
+  EXPECT_FALSE(AreOneMotion(sensors, {"command_delay", "first"}, *model, {}));
+  EXPECT_FALSE(AreOneMotion({"sensor_delay", "q"}, commands, *model, {}));
+  const Rig one_drive = LoadRig("qube");
+  EXPECT_TRUE(AreOneMotion(sensors, {"command_delay", "motor"}, *one_drive.model, {}));
 }
 
 // On a servo a constant load is a zero offset, unless its torque is measured.

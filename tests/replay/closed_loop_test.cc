@@ -323,6 +323,40 @@ TEST_F(ClosedLoopTest, ALateCommandLosesThePendulum) {
   EXPECT_GT(farthest(0.012), 1);
 }
 
+// Two discs: the law holds the first one, the log drives the second, whose drive alone is late.
+TEST_F(ClosedLoopTest, TheLogsOtherCommandsAreLateByTheirOwnDelay) {
+  scratch_.Write("robot.xml", R"(<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+    <body><joint name="a" damping="0.05"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 0.02"/></body>
+    <body><joint name="b" damping="0.05"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 0.02"/></body></worldbody>
+    <actuator><motor name="first" joint="a"/><motor name="second" joint="b"/></actuator></mujoco>)");
+  experiment_ = LoadExperiment(scratch_.Write("experiment.yaml", R"(model: robot.xml
+log: {time: {column: time_s, unit: s}}
+commands: [{actuator: first, column: u, unit: N m}, {actuator: second, column: v, unit: N m}]
+measured: [{signal: a, column: a, joint: a, unit: rad}, {signal: b, column: b, joint: b, unit: rad}]
+controller:
+  {actuator: first, inputs: [{name: a, signal: a}], references: {a: 0.2}, terms: [{input: a, proportional: 0.5}]}
+)"))
+                    .value();
+  const auto rig = Rig::Load(experiment_).value();
+  const auto angles = [&](const std::vector<EffectUse>& effects, int late_rows) {
+    std::string log = "time_s,u,v,a,b\n";
+    for (int k = 0; k < 300; ++k)
+      log += fmt::format("{},0,{},0,0\n", 0.002 * k, std::sin(0.1 * std::max(0, k - late_rows)));
+    recordings_ = {LoadRecording(experiment_, scratch_.Write("log.csv", log)).value()};
+    model_ = Model::Build(rig, effects).value();
+    ReplayOptions options{.values = model_->Nominal()};
+    if (!effects.empty()) options.values[model_->Find("command_delay@second.delay_s", "").value()] = 0.014;
+    const auto closed = Run(options);
+    EXPECT_TRUE(closed.ok()) << closed.error().Text();
+    const auto& signals = closed.value().result.logs[0].signals;
+    return std::pair(signals[0].predicted, signals[1].predicted);
+  };
+  const auto late = angles({{"command_delay", "second"}}, 0), shifted = angles({}, 7), on_time = angles({}, 0);
+  EXPECT_EQ(late.first, on_time.first);
+  EXPECT_EQ(late.second, shifted.second);
+  EXPECT_NE(late.second, on_time.second);
+}
+
 TEST_F(ClosedLoopTest, BrokenSectionsAreRefused) {
   const std::pair<std::string, std::string> broken[] = {
       {"", "no controller is described"},

@@ -31,6 +31,8 @@ TEST(WordsTest, NumbersAsPeopleWriteThem) {
 TEST(WordsTest, EffectsByTheirNames) {
   EXPECT_EQ(Words(EffectUse{"coulomb_friction", "arm"}), "Coulomb friction on arm");
   EXPECT_EQ(Words(EffectUse{"sensor_delay", "arm_rad"}), "sensor delay on arm_rad");
+  EXPECT_EQ(Words(EffectUse{"command_delay", "all"}), "command delay on all drives");
+  EXPECT_EQ(Words(EffectUse{"sensor_delay", "all"}), "sensor delay on all measured signals");
   EXPECT_EQ(Words(EffectUse{"stribeck_friction", "arm"}), "Stribeck friction on arm");
   EXPECT_EQ(Words(EffectUse{"of_another_version", "arm"}), "of another version on arm");
   EXPECT_EQ(Words(Explanation{}), "none");

@@ -145,6 +145,7 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
   }
   Try(&candidate, best, &from, effort);
   if (!std::isfinite(candidate.train_cost)) return nullptr;
+  StartFromOtherShapes(&candidate, from, effort);
   StartFromSubsets(&candidate, effort);
   return &candidate;
 }
@@ -156,6 +157,26 @@ void Ledger::Clear() {
 
 void Ledger::Continue(Candidate* candidate, Effort effort) {
   Try(candidate, candidate->point, nullptr, effort);
+}
+
+void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort) {
+  constexpr double kLeft = 0.05;  // of the size that another shape took over
+  for (const EffectUse& use : candidate->effects) {
+    if (std::find(from.effects.begin(), from.effects.end(), use) != from.effects.end()) continue;
+    const auto& parameters = EffectOf(use, *bench_.rig).parameters;
+    const auto shape = std::find_if(parameters.begin(), parameters.end(), [](const auto& p) { return p.takes_over; });
+    const auto scales = bench_.scales.find(use.on);
+    if (shape == parameters.end() || scales == bench_.scales.end()) continue;
+    const auto placed = PlacedParameters(use, *bench_.rig, bench_.scales);
+    const auto index = [&](std::size_t i) { return static_cast<std::size_t>(candidate->model->IndexOf(placed[i].name)); };
+    const auto s = static_cast<std::size_t>(shape - parameters.begin());
+    std::vector<double> values = candidate->values;
+    const double size = values[index(0)], of_size = ScaleOf(parameters[0].scale, scales->second),
+                 of_shape = ScaleOf(shape->scale, scales->second);
+    values[index(0)] = kLeft * size;
+    values[index(s)] = std::clamp(values[index(s)] + size / of_size * of_shape, placed[s].low, placed[s].high);
+    Try(candidate, candidate->problem->At(values, candidate->point), nullptr, std::max(effort, Effort::kTry));
+  }
 }
 
 void Ledger::StartFromSubsets(Candidate* candidate, Effort effort) {

@@ -39,6 +39,8 @@ class Ledger {
 
  private:
   void StartFromSubsets(Candidate* candidate, Effort effort);
+  // From where another shape of the effects that `from` lacks makes their torque (EffectParameter::takes_over).
+  void StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort);
   // `from`: whose Jacobian, if it has one, the first steps are made with; null: none.
   bool Try(Candidate* candidate, const FitPoint& start, const Candidate* from, Effort effort);
   // Jacobians are large: only those of the last few fits are kept.

@@ -12,7 +12,7 @@ struct SearchPolicy {
   std::size_t beam = 8;                             // sets kept per size while arithmetic orders them
   std::size_t singles = 5, pairs = 3, triples = 1;  // of the base model, that are refitted
   std::size_t go_on = 2;                            // of the sets that were begun, how many are fitted on
-  double hopeless = 0.7;                            // a rival behind by more after a few steps is given up
+  double hopeless = 0.4;                            // a rival behind by more after a few steps is given up
   std::size_t scan = 12, scanned = 6;               // an effect of more trials is tried on a leader at its best few
   std::size_t leaders = 2, additions = 3;           // sets that are added to, and effects tried on each
   std::size_t most_effects = 6;

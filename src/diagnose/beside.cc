@@ -47,8 +47,7 @@ Eigen::MatrixXd Widening(const ColumnTable& table, const TorquePrior& torques) {
   const Ldlt solver(of_torques);
   const Eigen::MatrixXd beside = own - cross * solver.Solve(cross.transpose());
   const Eigen::MatrixXd inverse = Inverse(beside);
-  const Eigen::VectorXd moved =
-      -inverse * (slope - cross * solver.Solve(h * table.sum(table.torques, residual)));
+  const Eigen::VectorXd moved = -inverse * (slope - cross * solver.Solve(h * table.sum(table.torques, residual)));
   const Eigen::MatrixXd added = torques.variance * (inverse - Inverse(own)) + moved * moved.transpose();
   for (std::size_t a = 0; a < free.size(); ++a) {
     for (std::size_t b = 0; b < free.size(); ++b)

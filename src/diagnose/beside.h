@@ -16,7 +16,8 @@ struct BesideTorques {
   Eigen::MatrixXd widening;
   // Of effects that the set lacks: sizes that they stay below.
   std::map<EffectUse, std::vector<EffectEstimate>> bounds;
-  // Share of the final misfit that torques of angle, speed and command take away in blocks that they were not fitted to.
+  // Share of the final misfit that torques of angle, speed and command take away in blocks that they were not fitted
+  // to.
   double free_form = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -24,7 +25,7 @@ std::string Candidate::Name() const {
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s,
-                     .max_windows = train ? max_windows : 0,
+                     .max_windows = train ? max_windows : max_windows / 2,
                      .time_step_s = time_step_s,
                      .shift_range_s = sample_s,
                      .weights = weights,
@@ -140,8 +141,19 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
 
 double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   FitOptions options = bench.Options(*candidate.model, false);
-  options.objective = ObjectiveKind::kFreeRun;
   options.fold = Fold::kAll;
+  options.max_windows = 0;
+  // Of long logs some parts: all of them would say the same again.
+  const EvidencePolicy& policy = kDiagnosePolicy.evidence;
+  const bool is_long = std::any_of(bench.data.held_out.begin(), bench.data.held_out.end(), [&](const Recording& r) {
+    return r.time_s.back() - r.time_s.front() > 2 * policy.free_run_s;
+  });
+  if (is_long) {
+    options.window_s = policy.free_run_s;
+    options.max_windows = policy.free_runs;
+  } else {
+    options.objective = ObjectiveKind::kFreeRun;
+  }
   options.weights.clear();
   FitPoint point;
   const auto problem = OnHeldOut(bench, candidate, options, &point);

@@ -11,11 +11,11 @@
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
 #include "src/diagnose/coarsen.h"
-#include "src/diagnose/remainder.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/explain.h"
 #include "src/diagnose/judge.h"
 #include "src/diagnose/policy.h"
+#include "src/diagnose/remainder.h"
 
 namespace gapscope {
 namespace {
@@ -119,35 +119,69 @@ std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& 
   return sizes;
 }
 
-// What each effect takes of the gap: averaged over taking it out of the whole and adding it to nothing (of two effects
-// Shapley's value, 1953). Errors of sets by held-out logs.
-double ShareOf(const Workbench& bench, const SearchResult& found, const Candidate& final, const EffectUse& use) {
-  const double gap = found.base->held_out_error - final.held_out_error;
-  if (!(gap > 0)) return 0;
-  const auto error = [&](const EffectSet& set, double otherwise) {
-    Candidate* candidate = found.ledger.Find(set);
-    if (!candidate) return otherwise;
-    ScoreCandidate(bench, candidate);
+// What each effect takes of the gap: Shapley's value (1953) over all sets of up to `most` of them, each refitted; of
+// more the mean of adding it to nothing and taking it out of the whole. Errors of sets by held-out logs.
+class GapShares {
+ public:
+  GapShares(const Workbench& bench, SearchResult& found, const Candidate& final)
+      : bench_(bench), found_(found), final_(final) {}
+
+  double Of(const EffectUse& use) {
+    const double gap = found_.base->held_out_error - final_.held_out_error;
+    if (!(gap > 0)) return 0;
+    const EffectSet others = Without(final_.effects, use);
+    constexpr std::size_t kMost = 3;
+    double sum = 0, weight = 0;
+    for (std::size_t bits = 0; bits < (std::size_t{1} << others.size()); ++bits) {
+      EffectSet part;
+      for (std::size_t i = 0; i < others.size(); ++i) {
+        if (bits >> i & 1) part.push_back(others[i]);
+      }
+      const bool end = part.empty() || part.size() == others.size();
+      if (final_.effects.size() > kMost && !end) continue;
+      const double with = Error(With(part, use)), without = Error(part);
+      if (!std::isfinite(with) || !std::isfinite(without)) continue;
+      // Of n effects: |S|! (n - |S| - 1)! / n!, up to a factor that all have in common.
+      const double w = end ? 1 : 1 / Binomial(others.size(), part.size());
+      sum += w * (without - with), weight += w;
+    }
+    return weight > 0 ? std::clamp(sum / weight / gap, 0.0, 1.0) : 1;
+  }
+
+ private:
+  static double Binomial(std::size_t n, std::size_t k) {
+    double result = 1;
+    for (std::size_t i = 1; i <= k; ++i) result *= static_cast<double>(n - k + i) / static_cast<double>(i);
+    return result;
+  }
+
+  double Error(const EffectSet& set) {
+    if (set == final_.effects) return final_.held_out_error;
+    Candidate* candidate = found_.ledger.Find(set);
+    if (!candidate) candidate = found_.ledger.Refit(set, final_, {}, {}, Effort::kTry);
+    if (!candidate) return kNaN;
+    ScoreCandidate(bench_, candidate);
     return candidate->held_out_error;
-  };
-  const double alone = error({use}, kNaN), without = error(Without(final.effects, use), kNaN);
-  const double first = found.base->held_out_error - alone, last = without - final.held_out_error;
-  if (std::isfinite(first) && std::isfinite(last)) return std::clamp(0.5 * (first + last) / gap, 0.0, 1.0);
-  return std::clamp((std::isfinite(last) ? last : gap) / gap, 0.0, 1.0);
-}
+  }
+
+  const Workbench& bench_;
+  SearchResult& found_;
+  const Candidate& final_;
+};
 
 // The effects that are there, the largest share first.
 std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& found, const Candidate& final,
                                          const BesideTorques& beside, std::vector<Statement>* statements) {
   std::vector<FoundEffect> effects;
   const auto sizes = EstimateSizes(bench, final, beside.widening);
+  GapShares shares(bench, found, final);
   for (Statement& s : *statements) {
     if (const auto bounds = beside.bounds.find(s.use); s.answer == Answer::kAbsent && bounds != beside.bounds.end())
       s.bounds = bounds->second;
     const auto place = sizes.find(s.use);
     if (place == sizes.end()) continue;
     s.parameters = place->second;
-    s.share_of_gap = ShareOf(bench, found, final, s.use);
+    s.share_of_gap = shares.Of(s.use);
     const Effect& entry = EffectOf(s.use, *bench.rig);
     effects.push_back({.use = s.use,
                        .meaning = entry.meaning,

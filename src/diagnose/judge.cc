@@ -202,7 +202,14 @@ class Judging {
     const SearchPolicy& policy = kDiagnosePolicy.search;
     for (std::size_t m = 0; m < found_.members.size(); ++m) {
       const Member& member = found_.members[m];
-      for (const Rival& rival : member.rivals) {
+      std::vector<Rival> rivals = member.rivals;
+      for (const EffectUse& use : found_.uses) {  // one motion on these logs, whether it was tried or not
+        const bool tried = std::any_of(rivals.begin(), rivals.end(), [&](const Rival& r) { return r.use == use; });
+        const bool chosen = std::count(found_.chosen->effects.begin(), found_.chosen->effects.end(), use) > 0;
+        if (!tried && !chosen && AreOneMotion(use, member.use, *found_.base->model, found_.logged))
+          rivals.push_back({.use = use});
+      }
+      for (const Rival& rival : rivals) {
         const Model& base = *found_.base->model;
         const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
         if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;

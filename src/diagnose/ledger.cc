@@ -155,9 +155,7 @@ void Ledger::Clear() {
   fitted_.clear();
 }
 
-void Ledger::Continue(Candidate* candidate, Effort effort) {
-  Try(candidate, candidate->point, nullptr, effort);
-}
+void Ledger::Continue(Candidate* candidate, Effort effort) { Try(candidate, candidate->point, nullptr, effort); }
 
 void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort) {
   constexpr double kLeft = 0.05;  // of the size that another shape took over
@@ -168,7 +166,9 @@ void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, E
     const auto scales = bench_.scales.find(use.on);
     if (shape == parameters.end() || scales == bench_.scales.end()) continue;
     const auto placed = PlacedParameters(use, *bench_.rig, bench_.scales);
-    const auto index = [&](std::size_t i) { return static_cast<std::size_t>(candidate->model->IndexOf(placed[i].name)); };
+    const auto index = [&](std::size_t i) {
+      return static_cast<std::size_t>(candidate->model->IndexOf(placed[i].name));
+    };
     const auto s = static_cast<std::size_t>(shape - parameters.begin());
     std::vector<double> values = candidate->values;
     const double size = values[index(0)], of_size = ScaleOf(parameters[0].scale, scales->second),

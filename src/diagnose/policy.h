@@ -34,6 +34,8 @@ struct EvidencePolicy {
   double angle_waves = 1.6, speed_waves = 1.1;  // deviations of their phase's slopes, a deviation of the motion
   double torque_share = 0.05;                   // of the joint's torque: their amplitude
   double per_block = 4;                         // what half a second of residuals counts for
+  double free_run_s = 20;                       // free runs: of logs twice as long as this only parts this long
+  std::size_t free_runs = 8;                    // so many of them
   std::size_t sums = 300;                       // random torques in the residual's place
   double most_gain = 3;                         // above it a gain says nothing more
   double alone =

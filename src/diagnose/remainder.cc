@@ -90,8 +90,7 @@ Remainder Divide(const Workbench& bench, const Candidate& base, const Candidate&
   const double between = SquareBetweenRepeats(logs, predicted);
   remainder.not_repeatable =
       std::isfinite(between) ? std::clamp((between - floor * floor) / before, 0.0, left - remainder.sensors) : kNaN;
-  remainder.systematic =
-      left - remainder.sensors - (std::isfinite(between) ? remainder.not_repeatable : 0);
+  remainder.systematic = left - remainder.sensors - (std::isfinite(between) ? remainder.not_repeatable : 0);
   remainder.reachable = remainder.explained + left * beside.free_form;
   return remainder;
 }

@@ -88,7 +88,8 @@ class Searcher {
       const OnBound bound = BoundOf(base.values[static_cast<std::size_t>(c.parameter)], p.low, p.high);
       if (bound == OnBound::kNo || (bound == OnBound::kLow && p.low == 0)) continue;
       const double factor = p.low > 0 ? p.high / p.low : 0, width = p.high - p.low;
-      const double low = p.low > 0 ? p.low / factor : p.low - width, high = p.low > 0 ? p.high * factor : p.high + width;
+      const double low = p.low > 0 ? p.low / factor : p.low - width,
+                   high = p.low > 0 ? p.high * factor : p.high + width;
       (*bench_.bounds)[p.name] = {bound == OnBound::kLow ? low : p.low, bound == OnBound::kHigh ? high : p.high};
       widened = true;
     }

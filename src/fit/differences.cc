@@ -143,8 +143,8 @@ Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const
     if (layout_.shift() >= 0) work.replays += wanted(layout_.shift());
   }
   if (!windows_.empty())
-    work.replays += static_cast<std::size_t>(std::max<Eigen::Index>(
-        0, windows_.front().prior.size() - options.known_states));
+    work.replays +=
+        static_cast<std::size_t>(std::max<Eigen::Index>(0, windows_.front().prior.size() - options.known_states));
   return work;
 }
 

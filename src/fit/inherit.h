@@ -1,4 +1,5 @@
-// What a fit knows of another one's Jacobian: a model that an effect is added to, or taken from, moves nearly as before.
+// What a fit knows of another one's Jacobian: a model that an effect is added to, or taken from, moves nearly as
+// before.
 #ifndef GAPSCOPE_FIT_INHERIT_H_
 #define GAPSCOPE_FIT_INHERIT_H_
 

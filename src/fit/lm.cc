@@ -219,7 +219,12 @@ SolveResult SolveLm(const SolveTask& task, const FitPoint& start, const SolveOpt
   } else {
     Run(task, options, &s);
   }
-  return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations, .work = s.work, .derivatives = s.derivatives};
+  return {.point = s.point,
+          .cost = s.cost,
+          .termination = s.termination,
+          .iterations = s.iterations,
+          .work = s.work,
+          .derivatives = s.derivatives};
 }
 
 }  // namespace gapscope

@@ -62,7 +62,8 @@ struct EffectParameter {
   double start = 0;                               // where a fit starts when nothing better is known
   bool voltage_only = false;                      // acts on a voltage drive; else fixed at neutral
   Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
-  bool takes_over = false;  // another start of a fit: all of the first parameter's torque, at the scale, made by this one
+  bool takes_over =
+      false;  // another start of a fit: all of the first parameter's torque, at the scale, made by this one
 };
 
 // What an effect makes of the motion, whatever its formula.

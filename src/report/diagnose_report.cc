@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "src/diagnose/policy.h"
+
 namespace gapscope {
 
 using nlohmann::ordered_json;
@@ -98,6 +100,53 @@ ordered_json Json(const Statement& s) {
   return entry;
 }
 
+// Every threshold, so that a result says by which rules it was made.
+ordered_json PolicyJson() {
+  constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
+  return {{"search.widenings", policy.search.widenings},
+          {"search.beam", policy.search.beam},
+          {"search.singles", policy.search.singles},
+          {"search.pairs", policy.search.pairs},
+          {"search.triples", policy.search.triples},
+          {"search.go_on", policy.search.go_on},
+          {"search.hopeless", policy.search.hopeless},
+          {"search.scan", policy.search.scan},
+          {"search.scanned", policy.search.scanned},
+          {"search.leaders", policy.search.leaders},
+          {"search.additions", policy.search.additions},
+          {"search.most_effects", policy.search.most_effects},
+          {"search.promise", policy.search.promise},
+          {"search.member", policy.search.member},
+          {"search.rivals", policy.search.rivals},
+          {"search.imitates", policy.search.imitates},
+          {"search.exchange", policy.search.exchange},
+          {"search.tie", policy.search.tie},
+          {"search.tie_share", policy.search.tie_share},
+          {"search.simpler", policy.search.simpler},
+          {"search.jacobians", policy.search.jacobians},
+          {"search.replays", policy.search.replays},
+          {"evidence.torques", policy.evidence.torques},
+          {"evidence.free_form", policy.evidence.free_form},
+          {"evidence.bound_deviations", policy.evidence.bound_deviations},
+          {"evidence.angle_waves", policy.evidence.angle_waves},
+          {"evidence.speed_waves", policy.evidence.speed_waves},
+          {"evidence.torque_share", policy.evidence.torque_share},
+          {"evidence.per_block", policy.evidence.per_block},
+          {"evidence.free_run_s", policy.evidence.free_run_s},
+          {"evidence.free_runs", policy.evidence.free_runs},
+          {"evidence.sums", policy.evidence.sums},
+          {"evidence.most_gain", policy.evidence.most_gain},
+          {"evidence.alone", policy.evidence.alone},
+          {"probability.constant", policy.probability.constant},
+          {"probability.gain", policy.probability.gain},
+          {"probability.mimicry", policy.probability.mimicry},
+          {"probability.discrepancy", policy.probability.discrepancy},
+          {"probability.smooth", policy.probability.smooth},
+          {"probability.present", policy.probability.present},
+          {"verdict.much_missing", policy.verdict.much_missing},
+          {"verdict.retuned", policy.verdict.retuned}};
+}
+
 // What is there, what was considered and is not, and how many more.
 std::string StatementTable(const Diagnosis& d) {
   std::string text = fmt::format("\n{:<34} {:<8} {:>11}  {}\n", "effect", "answer", "probability", "rests on");
@@ -145,12 +194,10 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   for (const auto& c : d.candidates) json["candidates"].push_back(Json(c));
   json["statements"] = ordered_json::array();
   for (const auto& statement : d.statements) json["statements"].push_back(Json(statement));
-  json["remainder"] = {{"explained", JsonNumber(d.remainder.explained)},
-                       {"systematic", JsonNumber(d.remainder.systematic)},
-                       {"not_repeatable", JsonNumber(d.remainder.not_repeatable)},
-                       {"sensors", JsonNumber(d.remainder.sensors)},
-                       {"reachable", JsonNumber(d.remainder.reachable)},
-                       {"where", JsonConditions(d.remains)}};
+  json["remainder"] = {
+      {"explained", JsonNumber(d.remainder.explained)},           {"systematic", JsonNumber(d.remainder.systematic)},
+      {"not_repeatable", JsonNumber(d.remainder.not_repeatable)}, {"sensors", JsonNumber(d.remainder.sensors)},
+      {"reachable", JsonNumber(d.remainder.reachable)},           {"where", JsonConditions(d.remains)}};
   json["at_bounds"] = ordered_json::array();
   for (const auto& p : d.at_bounds)
     json["at_bounds"].push_back({{"name", p.name}, {"value", JsonNumber(p.value)}, {"unit", p.unit}});
@@ -163,6 +210,7 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
   if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
   json["budget"] = {{"work", d.most_steps}, {"spent", d.work.steps}, {"unit", "steps"}, {"cut", d.cut}};
+  json["policy"] = PolicyJson();
   json["seed"] = run.info.seed;
   json["versions"] = JsonVersions(run.info);
   return json;

@@ -24,7 +24,7 @@ struct SearchPolicy {
   double tie = 0.1, tie_share = 0.05;  // what costs more by less than this, or this share of the member's gain, ties
   double simpler = 0.05;               // a richer effect that gains less over one that it contains gives way to it
   std::size_t jacobians = 24;          // kept, of the last fits: what the next ones begin with
-  std::size_t replays = 7000;          // of all training windows: what a diagnosis of normal effort may take
+  std::size_t replays = 3000;          // of all training windows: what a diagnosis of normal effort may take
 };
 
 struct EvidencePolicy {

@@ -290,6 +290,8 @@ class Searcher {
   bool Exchange() {
     for (Member& member : result_.members) {
       member.rivals.clear();
+      // One that hardly gains is not told apart from nothing.
+      if (member.gain < kPolicy.tie) continue;
       for (const EffectUse& use : Shortlist(member)) {
         if (Late("exchange")) return false;
         say_("trying " + use.Text() + " for " + member.use.Text());

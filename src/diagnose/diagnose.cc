@@ -16,6 +16,7 @@
 #include "src/diagnose/judge.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/remainder.h"
+#include "src/diagnose/sizes.h"
 
 namespace gapscope {
 namespace {
@@ -99,27 +100,7 @@ std::vector<AtBound> FindAtBounds(const Candidate& candidate, const Model& base)
   return found;
 }
 
-// Sizes of a candidate's effects with their intervals.
-// `beside`: what random torques add to the covariance.
-std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate,
-                                                               const Eigen::MatrixXd& beside) {
-  std::map<EffectUse, std::vector<EffectEstimate>> sizes;
-  if (candidate.effects.empty()) return sizes;
-  const Linearization at =
-      Linearize(*candidate.problem, candidate.point, {.columns = DifferenceOptions::Columns::kCentral});
-  const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at, beside);
-  for (const EffectUse& use : candidate.effects) {
-    for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {
-      for (const auto& tuned : uncertainty.tuned) {
-        if (candidate.model->parameters()[tuned.index].name == p.name)
-          sizes[use].push_back({p.key, p.unit, tuned.value, tuned.low, tuned.high});
-      }
-    }
-  }
-  return sizes;
-}
-
-// What each effect takes of the gap: Shapley's value (1953) over all sets of up to `most` of them, each refitted; of
+// What each effect takes of the gap: Shapley's value (1953) over all sets of up to three of them, each refitted; of
 // more the mean of adding it to nothing and taking it out of the whole. Errors of sets by held-out logs.
 class GapShares {
  public:
@@ -320,6 +301,10 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);
   result.cut = found.cut;
   result.work = *bench.work;
+  for (const auto* part : {&bench.data.train, bench.by_windows ? nullptr : &bench.data.held_out}) {
+    if (!part) continue;
+    for (const auto& recording : *part) result.data_s += recording.time_s.back() - recording.time_s.front();
+  }
   result.most_steps = bench.most_steps;
   result.model = chosen.model;
   result.values = chosen.values;

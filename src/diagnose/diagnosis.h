@@ -21,6 +21,11 @@ std::string VerdictName(Verdict verdict);
 struct EffectEstimate {
   std::string key, unit;
   double value = 0, low = 0, high = 0;
+  // The size over a base parameter, where that is known much better than the size alone; empty: it is not.
+  struct Ratio {
+    std::string to;
+    double value = 0, low = 0, high = 0;
+  } ratio = {};
 };
 
 // An effect of the verdict.
@@ -61,6 +66,7 @@ struct StatementNumbers {
   double clear = 0;          // held-out gain over its standard error, by half seconds
   bool smooth = false;       // a function of a joint's own motion: what roughness looks like
   bool dry = false;          // dry friction: of these the one with a jump
+  bool second_mass = false;  // brings a motor side, whose start in each window is free
 };
 
 // What is said of one effect.
@@ -85,7 +91,8 @@ struct Remainder {
   double reachable = 0;       // what the named effects and a free-form torque of angle, speed and command would explain
 };
 
-// A base parameter of the final model that ended on a bound other than its nominal value: the truth may lie beyond.
+// A base parameter of the final model that ended on a bound of the experiment file other than its nominal value, or
+// beyond it.
 struct AtBound {
   std::string name, unit;
   double value = 0;
@@ -118,6 +125,7 @@ struct Diagnosis {
   std::vector<Explanation> next_separates;
   std::vector<std::string> train_logs, held_out_logs;
   std::string split, explanation;
+  double data_s = 0;  // of all logs
   double wall_s = 0;
   Work work;                           // spent
   std::size_t most_steps = 0;          // the budget, simulator steps

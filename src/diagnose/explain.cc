@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/diagnose/policy.h"
+
 namespace gapscope {
 
 namespace {
@@ -69,9 +71,11 @@ std::string Explain(const Diagnosis& d) {
     std::string names;
     for (const auto& p : d.at_bounds)
       names += fmt::format("{}{} ({:.3g} {})", names.empty() ? "" : ", ", p.name, p.value, p.unit);
-    text +=
-        " On a bound of the experiment file ended: " + names + "; where the rig allows more, widen it and ask again.";
+    text += " On a bound of the experiment file or beyond it, which was widened, ended: " + names + ".";
   }
+  if (d.data_s < kDiagnosePolicy.evidence.least_data_s)
+    text +=
+        fmt::format(" The logs hold {:.0f} s in all: on so little, what is absent may only not have shown.", d.data_s);
   if (!d.cut.empty()) text += " The budget ended the search early.";
   return text;
 }

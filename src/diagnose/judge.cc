@@ -73,9 +73,12 @@ class Judging {
     numbers.gain_held_out = Log(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
     numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
     numbers.clear = ClearBy(bench_, *without, *found_.chosen);
-    numbers.dry = std::all_of(uses.begin(), uses.end(), [&](const EffectUse& use) {
-      return EffectOf(use, *bench_.rig).character == EffectCharacter::kDryFriction;
-    });
+    const auto all_are = [&](EffectCharacter character) {
+      return std::all_of(uses.begin(), uses.end(),
+                         [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).character == character; });
+    };
+    numbers.dry = all_are(EffectCharacter::kDryFriction);
+    numbers.second_mass = all_are(EffectCharacter::kSecondMass);
     numbers.smooth = std::all_of(uses.begin(), uses.end(),
                                  [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).of_motion; });
     if (torques_.empty()) return numbers;

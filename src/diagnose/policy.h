@@ -31,6 +31,8 @@ struct EvidencePolicy {
   std::size_t torques = 12;                     // random torques a joint: thirds of angle, speed, both
   std::size_t free_form = 30;                   // torques a joint of the yardstick
   double bound_deviations = 1.645;              // of an absent effect's size, above its best value: 95 of 100
+  double ratio_share = 0.5;                     // of a size's deviation, below which its ratio is told beside it
+  double least_data_s = 60;                     // below it little rests on much
   double angle_waves = 1.6, speed_waves = 1.1;  // deviations of their phase's slopes, a deviation of the motion
   double torque_share = 0.05;                   // of the joint's torque: their amplitude
   double per_block = 4;                         // what half a second of residuals counts for

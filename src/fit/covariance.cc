@@ -157,6 +157,9 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
     }
     result.tuned.push_back(tuned);
   }
+  const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
+  result.covariance = range.asDiagonal() * covariance.robust * range.asDiagonal();
+  result.quantile = StudentQuantile(covariance.freedom);
   result.flat = FlatDirections(problem, covariance);
   const Eigen::MatrixXd& own = covariance.model_based;
   for (Eigen::Index i = 0; i < space.size(); ++i) {

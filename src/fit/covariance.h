@@ -31,6 +31,8 @@ struct FlatDirection {
 struct Uncertainty {
   std::vector<TunedParameter> tuned;
   std::vector<FlatDirection> flat;
+  Eigen::MatrixXd covariance;                            // of y
+  double quantile = 0;                                   // deviations of a 95 % interval
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above CovariancePolicy::correlated
 };
 

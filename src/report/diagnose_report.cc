@@ -37,10 +37,21 @@ std::string ConditionTable(const char* title, const std::vector<ConditionShare>&
   return text;
 }
 
-ordered_json Json(const FoundEffect& found) {
+ordered_json JsonSizes(const std::vector<EffectEstimate>& sizes) {
   ordered_json parameters = ordered_json::object();
-  for (const auto& p : found.parameters)
+  for (const auto& p : sizes) {
     parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
+    if (p.ratio.to.empty()) continue;
+    parameters[p.key]["ratio"] = {{"to", p.ratio.to},
+                                  {"value", JsonNumber(p.ratio.value)},
+                                  {"low", JsonNumber(p.ratio.low)},
+                                  {"high", JsonNumber(p.ratio.high)}};
+  }
+  return parameters;
+}
+
+ordered_json Json(const FoundEffect& found) {
+  const ordered_json parameters = JsonSizes(found.parameters);
   return {{"name", found.use.effect},
           {"on", found.use.on},
           {"probability", found.probability},
@@ -73,9 +84,7 @@ ordered_json Json(const CandidateReport& c) {
 }
 
 ordered_json Json(const Statement& s) {
-  ordered_json parameters = ordered_json::object();
-  for (const auto& p : s.parameters)
-    parameters[p.key] = {{"value", JsonNumber(p.value)}, {"low", JsonNumber(p.low)}, {"high", JsonNumber(p.high)}};
+  const ordered_json parameters = JsonSizes(s.parameters);
   ordered_json entry = {{"name", s.use.effect},
                         {"on", s.use.on},
                         {"answer", AnswerName(s.answer)},
@@ -96,7 +105,8 @@ ordered_json Json(const Statement& s) {
                         {"mimicry", n.mimicry},
                         {"clear", JsonNumber(n.clear)},
                         {"smooth", n.smooth ? 1 : 0},
-                        {"dry", n.dry ? 1 : 0}};
+                        {"dry", n.dry ? 1 : 0},
+                        {"second_mass", n.second_mass ? 1 : 0}};
   return entry;
 }
 
@@ -128,6 +138,8 @@ ordered_json PolicyJson() {
           {"evidence.torques", policy.evidence.torques},
           {"evidence.free_form", policy.evidence.free_form},
           {"evidence.bound_deviations", policy.evidence.bound_deviations},
+          {"evidence.ratio_share", policy.evidence.ratio_share},
+          {"evidence.least_data_s", policy.evidence.least_data_s},
           {"evidence.angle_waves", policy.evidence.angle_waves},
           {"evidence.speed_waves", policy.evidence.speed_waves},
           {"evidence.torque_share", policy.evidence.torque_share},
@@ -222,8 +234,12 @@ std::string ToTable(const DiagnoseRun& run) {
   for (const auto& found : d.effects) {
     text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap\n", found.use.effect, found.use.on,
                         found.probability, 100 * found.share_of_gap);
-    for (const auto& p : found.parameters)
+    for (const auto& p : found.parameters) {
       text += fmt::format("    {:<28} {:>11.4g}   {:.4g} .. {:.4g} {}\n", p.key, p.value, p.low, p.high, p.unit);
+      if (!p.ratio.to.empty())
+        text += fmt::format("      over {:<23} {:>11.4g}   {:.4g} .. {:.4g}\n", p.ratio.to, p.ratio.value, p.ratio.low,
+                            p.ratio.high);
+    }
   }
   for (const auto& group : d.ambiguous) {
     std::string names;

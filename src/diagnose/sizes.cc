@@ -1,0 +1,63 @@
+#include "src/diagnose/sizes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
+
+namespace gapscope {
+namespace {
+
+// Place of a parameter among the coordinates that are logarithms; -1: it is none of them.
+Eigen::Index LogarithmOf(const SearchSpace& space, int parameter) {
+  const auto& coordinates = space.coordinates();
+  const auto found = std::find_if(coordinates.begin(), coordinates.end(),
+                                  [&](const Coordinate& c) { return c.parameter == parameter && c.logarithmic; });
+  return found == coordinates.end() ? -1 : found - coordinates.begin();
+}
+
+// The base parameter that a size is known best beside. Its deviation is that of ln(size / parameter).
+void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int parameter, EffectEstimate* size) {
+  const SearchSpace& space = candidate.problem->space();
+  const Eigen::Index own = LogarithmOf(space, parameter);
+  if (own < 0 || !(size->value > 0)) return;
+  const Eigen::MatrixXd& c = uncertainty.covariance;
+  const double alone = std::sqrt(c(own, own)), wanted = kDiagnosePolicy.evidence.ratio_share * alone;
+  double least = wanted;
+  for (std::size_t i = 0; i < space.coordinates().size(); ++i) {
+    const Coordinate& other = space.coordinates()[i];
+    const auto k = static_cast<Eigen::Index>(i);
+    if (!other.logarithmic || space.parameter(other).owner != Parameter::Owner::kBase) continue;
+    const double deviation = std::sqrt(std::max(0.0, c(own, own) + c(k, k) - 2 * c(own, k)));
+    if (!(deviation < least)) continue;
+    least = deviation;
+    const double value = size->value / candidate.values[static_cast<std::size_t>(other.parameter)],
+                 factor = std::exp(uncertainty.quantile * deviation);
+    size->ratio = {.to = space.parameter(other).name, .value = value, .low = value / factor, .high = value * factor};
+  }
+}
+
+}  // namespace
+
+std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate,
+                                                               const Eigen::MatrixXd& beside) {
+  std::map<EffectUse, std::vector<EffectEstimate>> sizes;
+  if (candidate.effects.empty()) return sizes;
+  const Linearization at =
+      Linearize(*candidate.problem, candidate.point, {.columns = DifferenceOptions::Columns::kCentral});
+  const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at, beside);
+  for (const EffectUse& use : candidate.effects) {
+    for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {
+      for (const auto& tuned : uncertainty.tuned) {
+        if (candidate.model->parameters()[tuned.index].name != p.name) continue;
+        EffectEstimate size{p.key, p.unit, tuned.value, tuned.low, tuned.high};
+        if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, tuned.index, &size);
+        sizes[use].push_back(std::move(size));
+      }
+    }
+  }
+  return sizes;
+}
+
+}  // namespace gapscope

@@ -448,5 +448,22 @@ TEST(ExtraColumnTest, SeesADelayBeyondTheNuisanceShift) {
   EXPECT_LT(drop(0.001), 0.01);  // earlier than the shift already is
 }
 
+// The truth lies beyond the model's bound: the options' one lets the fit reach it.
+TEST(FitProblemTest, BoundsOfTheOptionsGoFirst) {
+  const Rig rig = LoadCart(-10, 1);
+  const std::vector<Recording> logs = {CartLog(rig, 600, 0)};
+  ThreadPool pool{1};
+  FitOptions options = CartOptions(rig, ObjectiveKind::kWindows);
+  const auto gain = [&] {
+    std::vector<double> start = rig.model->Nominal();
+    start[static_cast<std::size_t>(rig.Index("cart.gain"))] = 0.5;
+    FitProblem problem(*rig.model, logs, options, start, pool);
+    return problem.Values(Solve(problem, problem.Start(), {}).point)[static_cast<std::size_t>(rig.Index("cart.gain"))];
+  };
+  EXPECT_NEAR(gain(), 1, 1e-6);
+  options.bounds["cart.gain"] = {-10, 3};
+  EXPECT_NEAR(gain(), 1.2, 1e-3);
+}
+
 }  // namespace
 }  // namespace gapscope::testing

@@ -10,6 +10,7 @@
 
 #include "src/core/dense.h"
 #include "src/fit/blocks.h"
+#include "src/fit/inherit.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -85,6 +86,45 @@ TEST(GramTest, LogThatWeighsNothingIsNotThere) {
   EXPECT_NEAR(sum(r, r), expected(q, q), 1e-10 * expected(q, q));
   EXPECT_EQ(gram.columns.back(), "residual");
   EXPECT_EQ(gram.columns[0], "motor.kt");
+}
+
+// At the same point: a child's inherited columns are the parent's, and those that it lacks are differenced anew. Taken
+// back out, the parent has its own again.
+TEST(InheritTest, SharedColumnsAreTakenAndNewOnesMade) {
+  Bench bench;
+  FitProblem parent(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  const FitPoint point = parent.Start();
+  FitOptions options = bench.Options(bench.truth);
+  options.free.push_back(bench.truth.Index("coulomb_friction@arm.friction_n_m"));
+  FitProblem child(*bench.truth.model, bench.logs, options, bench.truth.model->Nominal(), bench.pool);
+  constexpr double kStep = 0.01;
+  const Derivatives known = parent.Differentiate(point, {.step = kStep}),
+                    full = child.Differentiate(child.Start(), {.step = kStep});
+  const Derivatives inherited = Inherit(parent, known, child, child.Start(), kStep);
+  ASSERT_TRUE(known.valid && full.valid && inherited.valid);
+  // Without its friction the child is the parent: all columns are what differencing all of them gives.
+  for (std::size_t w = 0; w < full.jacobians.size(); ++w) {
+    const double size = full.jacobians[w].norm();
+    EXPECT_LT((inherited.jacobians[w] - full.jacobians[w]).norm(), 1e-6 * size) << w;
+    EXPECT_EQ(inherited.residuals[w], full.residuals[w]) << w;
+  }
+  EXPECT_LT(inherited.work.replays, full.work.replays / 2);
+  const Derivatives back = Inherit(child, inherited, parent, point, kStep);
+  for (std::size_t w = 0; w < known.jacobians.size(); ++w) EXPECT_EQ(back.jacobians[w], known.jacobians[w]) << w;
+}
+
+// A fit that begins with the Jacobian of the point nearby ends where the same fit without it ends, with less work.
+TEST(InheritTest, FitEndsAtTheSamePlace) {
+  Bench bench;
+  FitProblem problem(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  const SolveResult plain = Solve(problem, problem.Start(), {.tolerance = 1e-6});
+  ASSERT_TRUE(plain.derivatives);
+  FitPoint near = plain.point;
+  near.y[0] += 0.05;
+  const auto inherited = std::make_shared<const Derivatives>(Inherit(problem, *plain.derivatives, problem, near, 0.01));
+  const SolveResult again = Solve(problem, near, {.tolerance = 1e-6, .inherited = inherited});
+  EXPECT_NEAR(again.cost, plain.cost, 1e-4 * plain.cost);
+  EXPECT_LT((again.point.y - plain.point.y).norm(), 1e-2);
 }
 
 // Against the dense problem: the column, y and every state in one least-squares system, with the states' priors.

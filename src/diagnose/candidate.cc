@@ -117,8 +117,8 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
                              .central = true,
                              .secant = false,
                              .deadline = bench.deadline};
-  const SolveResult solved =
-      Recorded(bench, "polish " + candidate->Name(), start, -kInfinity, [&] { return Solve(*problem, start, options); });
+  const SolveResult solved = Recorded(bench, "polish " + candidate->Name(), start, -kInfinity,
+                                      [&] { return Solve(*problem, start, options); });
   *bench.work += solved.work;
   if (!std::isfinite(solved.cost)) return;
   candidate->scored = false;

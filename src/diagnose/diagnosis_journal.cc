@@ -73,8 +73,8 @@ std::vector<double> Pack(const GramSystem& g) {
   PutAll(out, g.of_priors);
   out.push_back(static_cast<double>(g.blocks.size()));
   for (const GramBlock& block : g.blocks) {
-    for (const double n : {static_cast<double>(block.log), static_cast<double>(block.half_second),
-                           static_cast<double>(block.rows)})
+    for (const double n :
+         {static_cast<double>(block.log), static_cast<double>(block.half_second), static_cast<double>(block.rows)})
       out.push_back(n);
     Put(out, block.products);
   }
@@ -133,7 +133,8 @@ Result<std::unique_ptr<DiagnosisJournal>> DiagnosisJournal::Open(Job job) {
   const bool there = std::filesystem::exists(path, failure);
   if (!job.resume) Remove(job.folder);
   std::unique_ptr<DiagnosisJournal> journal(new DiagnosisJournal(std::move(job)));
-  if (journal->job_.resume && !there) journal->Warn("nothing to resume in " + journal->job_.folder + ": from the start");
+  if (journal->job_.resume && !there)
+    journal->Warn("nothing to resume in " + journal->job_.folder + ": from the start");
   GS_ASSIGN(journal->calls_, Journal::Open(path, journal->job_.key, journal->job_.resume));
   return journal;
 }
@@ -155,8 +156,8 @@ bool DiagnosisJournal::Take(const Hasher& call, Numbers* numbers) {
   const bool before = replaying();
   if (calls_->Next(call, numbers)) return true;
   if (before) {
-    Warn("the journal in " + job_.folder + " is damaged: what follows call " +
-         std::to_string(static_cast<long>(count_)) + " is computed again, and may differ in last digits");
+    Warn("the journal in " + job_.folder + " is damaged: what follows call " + std::to_string(count_) +
+         " is computed again, and may differ in last digits");
   }
   return false;
 }
@@ -167,36 +168,36 @@ void DiagnosisJournal::Record(const Hasher& call, const Numbers& numbers) {
   Stopped();  // says so at once
 }
 
-std::string DiagnosisJournal::File(double number) const {
-  return (std::filesystem::path(job_.folder) / (std::to_string(static_cast<long>(number)) + ".bin")).string();
+std::string DiagnosisJournal::File(std::size_t number) const {
+  return (std::filesystem::path(job_.folder) / (std::to_string(number) + ".bin")).string();
 }
 
-void DiagnosisJournal::WriteLarge(double number, const Numbers& numbers) {
+void DiagnosisJournal::WriteLarge(std::size_t number, const Numbers& numbers) {
   if (!Stopped()) large_ = WriteToDisk(File(number), HashOfNumbers(numbers), numbers);
 }
 
-DiagnosisJournal::Large DiagnosisJournal::ReadLarge(double number, Numbers* numbers) {
+bool DiagnosisJournal::ReadLarge(std::size_t number, Numbers* numbers) {
   const auto bytes = ReadFile(File(number));
-  if (bytes.ok() && bytes.value().empty()) return Large::kForgotten;
+  if (bytes.ok() && bytes.value().empty()) return false;
   std::uint64_t hash = 0;
   if (bytes.ok() && bytes.value().size() >= sizeof hash) {
     std::memcpy(&hash, bytes.value().data(), sizeof hash);
     numbers->resize(bytes.value().size() / 8 - 1);
     std::memcpy(numbers->data(), bytes.value().data() + sizeof hash, 8 * numbers->size());
-    if (HashOfNumbers(*numbers) == hash) return Large::kThere;
+    if (HashOfNumbers(*numbers) == hash) return true;
   }
   Warn(File(number) + " is missing or damaged: the result may differ in last digits");
-  return Large::kForgotten;
+  return false;
 }
 
-void DiagnosisJournal::Forget(double number) {
+void DiagnosisJournal::Forget(std::size_t number) {
   // All that was made with them must be on the disk before.
   if (Stopped() || (!replaying() && !calls_->Sync().ok())) return;
   std::error_code failure;  // what stays takes room, no more
   std::filesystem::resize_file(File(number), 0, failure);
 }
 
-std::shared_ptr<const Derivatives> DiagnosisJournal::Kept(double number,
+std::shared_ptr<const Derivatives> DiagnosisJournal::Kept(std::size_t number,
                                                           std::shared_ptr<const Derivatives> derivatives) {
   const Derivatives* plain = derivatives.get();
   return {plain, [this, number, derivatives](const Derivatives*) { Forget(number); }};
@@ -209,11 +210,11 @@ SolveResult DiagnosisJournal::Solve(const std::string& call, const FitPoint& sta
     PackReader in(numbers);
     const bool large = in.Number() != 0;
     SolveResult result = UnpackSolve(in);
-    if (Numbers kept; large && ReadLarge(count_, &kept) == Large::kThere)
+    if (Numbers kept; large && ReadLarge(count_, &kept))
       result.derivatives = Kept(count_, std::make_shared<const Derivatives>(UnpackDerivatives(kept)));
     return result;
   }
-  const double number = count_;
+  const std::size_t number = count_;
   SolveResult result = make();
   const bool large = result.derivatives && result.cost < keep_below;
   if (large) WriteLarge(number, Pack(*result.derivatives));
@@ -239,13 +240,13 @@ GramSystem DiagnosisJournal::Gram(const std::string& call, const FitPoint& point
   for (const auto& column : columns) hash.Text(column);
   if (Numbers numbers; Take(hash, &numbers)) {
     Numbers kept;
-    if (ReadLarge(count_, &kept) != Large::kThere) return make();
+    if (!ReadLarge(count_, &kept)) return make();
     GramSystem result = UnpackGram(kept);
     result.columns = std::move(columns);
     result.parameters = point.y.size();
     return result;
   }
-  const double number = count_;
+  const std::size_t number = count_;
   GramSystem result = make();
   WriteLarge(number, Pack(result));
   Record(hash, {});

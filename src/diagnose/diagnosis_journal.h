@@ -23,9 +23,9 @@ class DiagnosisJournal {
  public:
   struct Job {
     std::string folder;
-    std::uint64_t key = 0;                           // see Journal::Open
+    std::uint64_t key = 0;  // see Journal::Open
     bool resume = false;
-    Deadline deadline = {};                          // what ends later is cut short, and not recorded
+    Deadline deadline = {};  // what ends later is cut short, and not recorded
     std::function<void(const std::string&)> warn = {};
   };
   // Without `resume` the folder is emptied. Errors: as Journal::Open.
@@ -55,18 +55,18 @@ class DiagnosisJournal {
   void Record(const Hasher& call, const Numbers& numbers);
   // Nothing is recorded or forgotten any more: there is no room, or the time is over.
   bool Stopped();
-  std::string File(double number) const;
-  void WriteLarge(double number, const Numbers& numbers);
-  enum class Large { kThere, kForgotten };
-  Large ReadLarge(double number, Numbers* numbers);
-  void Forget(double number);
+  std::string File(std::size_t number) const;
+  void WriteLarge(std::size_t number, const Numbers& numbers);
+  // False: they were forgotten, or are lost, which is said.
+  bool ReadLarge(std::size_t number, Numbers* numbers);
+  void Forget(std::size_t number);
   // That file `number` is emptied with the last pointer to them.
-  std::shared_ptr<const Derivatives> Kept(double number, std::shared_ptr<const Derivatives> derivatives);
+  std::shared_ptr<const Derivatives> Kept(std::size_t number, std::shared_ptr<const Derivatives> derivatives);
   void Warn(const std::string& text);
 
   Job job_;
   std::unique_ptr<Journal> calls_;
-  double count_ = 0;       // of calls so far
+  std::size_t count_ = 0;  // of calls so far
   Status large_ = Ok();    // of the files
   bool stopped_ = false, warned_ = false;
 };

@@ -59,7 +59,8 @@ Status Journal::Read(std::uint64_t key, std::size_t* good) {
   if (!ours || stored != key) {
     return Error{.what = "the journal belongs to another job",
                  .where = path_,
-                 .actual = "",
+                 .actual = ours ? "key " + std::to_string(stored) + ", this job's is " + std::to_string(key)
+                                : "a file of another kind",
                  .allowed = "the same experiment, model, logs, parameters and options",
                  .cure = "run without --resume"};
   }

@@ -198,7 +198,7 @@ void DiagnosisJournal::Forget(std::size_t number) {
 }
 
 std::shared_ptr<const Derivatives> DiagnosisJournal::Kept(std::size_t number,
-                                                          std::shared_ptr<const Derivatives> derivatives) {
+                                                          const std::shared_ptr<const Derivatives>& derivatives) {
   const Derivatives* plain = derivatives.get();
   return {plain, [this, number, derivatives](const Derivatives*) { Forget(number); }};
 }
@@ -221,7 +221,7 @@ SolveResult DiagnosisJournal::Solve(const std::string& call, const FitPoint& sta
   Numbers numbers = {large ? 1.0 : 0.0};
   for (const double n : Pack(result)) numbers.push_back(n);
   Record(hash, numbers);
-  if (large) result.derivatives = Kept(number, std::move(result.derivatives));
+  if (large) result.derivatives = Kept(number, result.derivatives);
   return result;
 }
 

@@ -61,7 +61,7 @@ class DiagnosisJournal {
   bool ReadLarge(std::size_t number, Numbers* numbers);
   void Forget(std::size_t number);
   // That file `number` is emptied with the last pointer to them.
-  std::shared_ptr<const Derivatives> Kept(std::size_t number, std::shared_ptr<const Derivatives> derivatives);
+  std::shared_ptr<const Derivatives> Kept(std::size_t number, const std::shared_ptr<const Derivatives>& derivatives);
   void Warn(const std::string& text);
 
   Job job_;

@@ -7,6 +7,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
+#include "src/diagnose/diagnosis_journal.h"
 #include "src/diagnose/policy.h"
 #include "src/report/diagnose_report.h"
 #include "src/report/write_run.h"
@@ -20,6 +21,7 @@ struct DiagnoseFlags {
   std::vector<std::string> hold_out, prior;
   SearchEffort effort = SearchEffort::kNormal;
   double budget_s = 0, window_s = 0;
+  bool resume = false;
 };
 
 // `log_values`: of the first log, for the MJCF.
@@ -44,7 +46,25 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
   return WriteRun(out, ToJson(run), files);
 }
 
+Result<DiagnoseOptions> OptionsOf(const DiagnoseFlags& flags, const Experiment& experiment) {
+  DiagnoseOptions options{.budget_s = flags.budget_s,
+                          .effort = flags.effort,
+                          .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s,
+                          .seed = flags.common.seed,
+                          .resume = flags.resume};
+  for (const auto& text : flags.prior) {
+    GS_ASSIGN(const auto assignment, ParseAssignment(text, "--prior"));
+    options.priors.insert_or_assign(assignment.first, assignment.second);
+  }
+  if (!flags.common.out.empty()) options.journal = DiagnosisJournal::FolderIn(flags.common.out);
+  options.warn = [](const std::string& text) { fmt::print(stderr, "warning: {}\n", text); };
+  return options;
+}
+
 Result<int> RunDiagnose(const DiagnoseFlags& flags) {
+  if (flags.resume && flags.common.out.empty())
+    return Error{
+        .what = "nothing to resume from", .where = "--resume", .cure = "name the interrupted run's folder with --out"};
   ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
   GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
@@ -53,22 +73,17 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   PrintFindings(recordings, flags.common.quiet);
   const auto log_values = recordings.front().values;
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);
-  DiagnoseOptions options{.budget_s = flags.budget_s,
-                          .effort = flags.effort,
-                          .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s,
-                          .seed = flags.common.seed};
-  for (const auto& text : flags.prior) {
-    GS_ASSIGN(const auto assignment, ParseAssignment(text, "--prior"));
-    options.priors.insert_or_assign(assignment.first, assignment.second);
-  }
+  GS_ASSIGN(DiagnoseOptions options, OptionsOf(flags, experiment));
   const bool live = !flags.common.quiet && isatty(2);
   if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
   auto diagnosed = Diagnose(experiment, data, options, pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!diagnosed.ok()) return diagnosed.error();
   const DiagnoseRun run{.info = {.seed = flags.common.seed}, .diagnosis = std::move(diagnosed).value()};
-  if (!flags.common.out.empty())
+  if (!flags.common.out.empty()) {
     GS_RETURN_IF_ERROR(WriteDiagnosis(flags.common.out, experiment, data, log_values, run, pool));
+    DiagnosisJournal::Remove(options.journal);
+  }
   fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
@@ -95,13 +110,18 @@ Command DiagnoseCommand() {
        .range = Above(0, 0),
        .unset = "no limit of time",
        .help = "Time; the best verdict so far when it is spent",
-       .more = "Without it the work is limited by --effort alone, and the verdict is the same on any machine"},
+       .more = "Without it the work is limited by --effort alone, and the verdict is the same on any machine. Of a "
+               "resumed run: from its own start on"},
       {.flag = "--effort",
        .value = ChoiceOf(flags->effort),
        .help = "How much work the search may take",
        .more = fmt::format("Work is counted in simulated steps: 0.3, 1 and 4 times {} replays of the training windows",
                            kDiagnosePolicy.search.replays)},
-      WindowOption(flags->window_s)};
+      WindowOption(flags->window_s),
+      {.flag = "--resume",
+       .value = &flags->resume,
+       .help = "Go on with the interrupted run in --out, to the same result",
+       .more = "Fits and columns of a run are kept in --out/diagnosis.journal until its result is written"}};
   return {.name = "diagnose",
           .what = "Where the gap lies, which unmodelled effect causes it, how far it shrinks",
           .options = Join({LogOptions(flags->model),

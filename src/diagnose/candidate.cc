@@ -5,6 +5,7 @@
 
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
+#include "src/fit/inherit.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -14,6 +15,11 @@ namespace {
 // Residuals of neighbouring samples say the same thing twice: the data count for this much less against what is known
 // beforehand.
 constexpr double kCorrelated = 10;
+
+SolveResult Recorded(const Workbench& bench, const std::string& call, const FitPoint& start, double keep_below,
+                     const std::function<SolveResult()>& solve) {
+  return bench.journal ? bench.journal->Solve(call, start, keep_below, solve) : solve();
+}
 
 }  // namespace
 
@@ -54,16 +60,35 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   return candidate;
 }
 
+double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint& point) {
+  const auto evaluate = [&] { return candidate.problem->Evaluate(point, Keep::kCost); };
+  const Evaluation there =
+      bench.journal ? bench.journal->Evaluate("cost " + candidate.Name(), point, evaluate) : evaluate();
+  *bench.work += there.work;
+  return there.cost;
+}
+
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
-                  GiveUp give_up, std::shared_ptr<const Derivatives> inherited) {
-  const SolveOptions options{.max_iterations = iterations,
-                             .tolerance = tolerance,
-                             .coarse_step = kCoarseStep,
-                             .fine_step = 0.01,
-                             .give_up = std::move(give_up),
-                             .inherited = std::move(inherited),
-                             .deadline = bench.deadline};
-  const SolveResult solved = Solve(*candidate->problem, start, options);
+                  GiveUp give_up, const Candidate* from) {
+  const auto solve = [&] {
+    SolveOptions options{.max_iterations = iterations,
+                         .tolerance = tolerance,
+                         .coarse_step = kCoarseStep,
+                         .fine_step = 0.01,
+                         .give_up = std::move(give_up),
+                         .deadline = bench.deadline};
+    Work inheriting;
+    if (from && from->derivatives) {
+      auto made = Inherit(*from->problem, *from->derivatives, *candidate->problem, start, kCoarseStep);
+      inheriting = made.work;
+      if (made.valid) options.inherited = std::make_shared<const Derivatives>(std::move(made));
+    }
+    SolveResult result = Solve(*candidate->problem, start, options);
+    result.work += inheriting;
+    return result;
+  };
+  // A fit that ends above the candidate's is not kept (Ledger), nor is its Jacobian.
+  const SolveResult solved = Recorded(bench, "fit " + candidate->Name(), start, candidate->train_cost, solve);
   *bench.work += solved.work;
   candidate->scored = false;
   candidate->point = solved.point;
@@ -93,7 +118,8 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
                              .central = true,
                              .secant = false,
                              .deadline = bench.deadline};
-  const SolveResult solved = Solve(*problem, start, options);
+  const SolveResult solved = Recorded(bench, "polish " + candidate->Name(), start, -kInfinity,
+                                      [&] { return Solve(*problem, start, options); });
   *bench.work += solved.work;
   if (!std::isfinite(solved.cost)) return;
   candidate->scored = false;
@@ -116,9 +142,12 @@ std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& c
   auto problem =
       std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
   *point = problem->Start();
-  if (!std::isfinite(problem->Evaluate(*point, Keep::kCost).cost)) return nullptr;
-  const SolveResult solved =
-      Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01});
+  const auto solve = [&] {
+    if (!std::isfinite(problem->Evaluate(*point, Keep::kCost).cost)) return SolveResult{.cost = kInfinity};
+    return Solve(*problem, *point, {.max_iterations = 4, .tolerance = 1e-3, .coarse_step = 0.01, .fine_step = 0.01});
+  };
+  const SolveResult solved = Recorded(bench, "held out " + candidate.Name(), *point, -kInfinity, solve);
+  if (!std::isfinite(solved.cost)) return nullptr;
   *bench.work += solved.work;
   *point = solved.point;
   return problem;

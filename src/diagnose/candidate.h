@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "src/diagnose/diagnosis_journal.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {
@@ -62,17 +63,23 @@ struct Workbench {
   std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
   bool by_windows = false;  // train and held-out logs are the same: every third window is held out
+  DiagnosisJournal* journal = nullptr;  // null: none
 
   FitOptions Options(const Model& model, bool train) const;
   // The budget is spent: of work, or of time where one was asked for.
-  bool Late() const { return (most_steps > 0 && work->steps > most_steps) || IsLate(deadline); }
+  bool Late() const { return (most_steps > 0 && work->steps > most_steps) || TimeIsOver(); }
+  // What was done in time before an interruption is not cut afterwards.
+  bool TimeIsOver() const { return !(journal && journal->replaying()) && IsLate(deadline); }
 };
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
-// Fits from `start` on the training logs, until `give_up` says to.
+// Cost on the training logs.
+double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint& point);
+// Fits from `start` on the training logs, until `give_up` says to. `from`: whose Jacobian, if it has one, the first
+// steps are made with; null: none.
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
-                  GiveUp give_up = {}, std::shared_ptr<const Derivatives> inherited = {});
+                  GiveUp give_up = {}, const Candidate* from = nullptr);
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
 void PolishCandidate(const Workbench& bench, Candidate* candidate);
 // Fills the held-out fields, once.

@@ -167,7 +167,12 @@ ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, con
     wanted.columns.push_back(
         {.name = "torque", .child = parent.problem.get(), .values = parent.values, .probe = torque.probe});
   }
-  table.gram = MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01}, parent.derivatives.get());
+  const auto make = [&] {
+    return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01}, parent.derivatives.get());
+  };
+  table.gram = bench.journal ? bench.journal->Gram("columns " + parent.Name(), parent.point,
+                                                   ColumnNames(*parent.problem, wanted.columns), make)
+                             : make();
   *bench.work += table.gram.work;
   if (!table.gram.valid) return table;
   std::erase_if(table.trials, [&](const Trial& trial) {

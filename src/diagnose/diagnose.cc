@@ -7,6 +7,7 @@
 #include <set>
 
 #include "src/compare/noise.h"
+#include "src/core/file.h"
 #include "src/core/names.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
@@ -17,6 +18,7 @@
 #include "src/diagnose/policy.h"
 #include "src/diagnose/remainder.h"
 #include "src/diagnose/sizes.h"
+#include "src/tune/job_key.h"
 
 namespace gapscope {
 namespace {
@@ -381,6 +383,45 @@ Status CheckPriors(const std::map<std::string, double>& priors, const Rig& rig) 
   return Ok();
 }
 
+// Everything that the numbers of a diagnosis depend on, the program among it.
+Result<std::uint64_t> JobKey(const Model& model, const DataSplit& data, const DiagnoseOptions& options) {
+  Hasher hasher;
+  GS_ASSIGN(const std::string program, ReadFile("/proc/self/exe"));
+  hasher.Text("diagnosis").Text(program).Text(mj_versionString());
+  AddModel(model, &hasher);
+  for (const auto* part : {&data.train, &data.held_out}) {
+    hasher.Number(static_cast<double>(part->size()));
+    for (const auto& recording : *part) AddRecording(recording, &hasher);
+  }
+  const double numbers[] = {
+      static_cast<double>(data.asked),   static_cast<double>(options.effort),     options.window_s, options.sample_s,
+      static_cast<double>(options.seed), static_cast<double>(options.max_windows)};
+  hasher.Numbers(numbers);
+  for (const auto& [name, prior] : options.priors) hasher.Text(name).Number(prior);
+  return hasher.value();
+}
+
+DataSplit Coarsened(DataSplit data, double sample_s) {
+  for (auto* part : {&data.train, &data.held_out}) {
+    for (auto& recording : *part) recording = Coarsen(recording, sample_s);
+  }
+  return data;
+}
+
+Deadline DeadlineOf(const DiagnoseOptions& options, std::chrono::steady_clock::time_point begin) {
+  if (!(options.budget_s > 0)) return {};
+  return begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
+}
+
+// Null: none is asked for.
+Result<std::unique_ptr<DiagnosisJournal>> OpenJournal(const Model& model, const DataSplit& data,
+                                                      const DiagnoseOptions& options, const Deadline& deadline) {
+  if (options.journal.empty()) return std::unique_ptr<DiagnosisJournal>();
+  GS_ASSIGN(const std::uint64_t key, JobKey(model, data, options));
+  return DiagnosisJournal::Open(
+      {.folder = options.journal, .key = key, .resume = options.resume, .deadline = deadline, .warn = options.warn});
+}
+
 // Steps of one replay of the training windows.
 std::size_t StepsOfReplay(const Workbench& bench) {
   auto made = MakeCandidate(bench, {});
@@ -394,10 +435,7 @@ std::size_t StepsOfReplay(const Workbench& bench) {
 Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, const DiagnoseOptions& options,
                            ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();
-  DataSplit data = fine;
-  for (auto* part : {&data.train, &data.held_out}) {
-    for (auto& recording : *part) recording = Coarsen(recording, options.sample_s);
-  }
+  const DataSplit data = Coarsened(fine, options.sample_s);
   if (data.train.empty() || data.held_out.empty())
     return Error{.what = "diagnosis needs logs to fit and logs to judge by", .where = experiment.path};
   GS_ASSIGN(const auto model, Model::Load(experiment));
@@ -405,6 +443,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   const ScaleTable scales = EstimateScales(*model, fine.train);
   const std::vector<double> noise = SignalNoise(experiment, fine);
   const Say say = options.progress ? options.progress : [](const std::string&) {};
+  const Deadline deadline = DeadlineOf(options, begin);
+  GS_ASSIGN(const auto journal, OpenJournal(*model, fine, options, deadline));
   const auto make_bench = [&](const DataSplit& part) {
     Workbench bench{.rig = model->rig(),
                     .data = part,
@@ -423,8 +463,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     bench.time_step_s =
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
-    if (options.budget_s > 0)
-      bench.deadline = begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
+    bench.deadline = deadline;
+    bench.journal = journal.get();
     bench.most_steps =
         static_cast<std::size_t>(ShareOfWork(options.effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
                                  static_cast<double>(StepsOfReplay(bench)));

@@ -152,6 +152,11 @@ struct DiagnoseOptions {
   // What is known of effects beforehand: probabilities by "EFFECT" or "EFFECT@PLACE", which goes first. Others: 0.5.
   std::map<std::string, double> priors;
   std::function<void(const std::string&)> progress;
+  // Folder of a DiagnosisJournal, empty: none; whether the run recorded there goes on. It stays when the run has ended:
+  // what it led to is to be written first (DiagnosisJournal::Remove).
+  std::string journal;
+  bool resume = false;
+  std::function<void(const std::string&)> warn;
 };
 
 Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& data, const DiagnoseOptions& options,

@@ -5,7 +5,6 @@
 
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
-#include "src/fit/inherit.h"
 
 namespace gapscope {
 namespace {
@@ -72,24 +71,16 @@ std::vector<Candidate*> Ledger::All() const {
 // Keeps the fit if it ends below the candidate's.
 bool Ledger::Try(Candidate* candidate, const FitPoint& start, const Candidate* from, Effort effort) {
   const double known = candidate->train_cost;
-  const Evaluation there = candidate->problem->Evaluate(start, Keep::kCost);
-  *bench_.work += there.work;
-  if (!std::isfinite(there.cost)) return false;
+  const double there = CostAt(bench_, *candidate, start);
+  if (!std::isfinite(there)) return false;
   const FitPoint before = candidate->point;
   const std::vector<double> values = candidate->values;
   const bool converged = candidate->converged, scored = candidate->scored;
   const double shift_s = candidate->shift_s;
   const auto derivatives = candidate->derivatives;
-  std::shared_ptr<const Derivatives> inherited;
-  if (from && from->derivatives) {
-    auto made = Inherit(*from->problem, *from->derivatives, *candidate->problem, start, kCoarseStep);
-    *bench_.work += made.work;
-    if (made.valid) inherited = std::make_shared<const Derivatives>(std::move(made));
-  }
   const auto [iterations, tolerance] = LimitsOf(effort);
   FitCandidate(bench_, candidate, start, iterations, tolerance,
-               std::isfinite(known) && there.cost > known ? TooSlow(known, iterations) : GiveUp{},
-               std::move(inherited));
+               std::isfinite(known) && there > known ? TooSlow(known, iterations) : GiveUp{}, from);
   Remember(candidate);
   if (candidate->train_cost < known) return true;
   candidate->point = before;
@@ -137,10 +128,9 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
     FitPoint moved = from.point;
     if (share > 0) moved.y = (moved.y + dy).cwiseMax(from.problem->layout().low).cwiseMin(from.problem->layout().high);
     FitPoint start = CarryOver(*from.problem, moved, *candidate.problem, all);
-    const Evaluation there = candidate.problem->Evaluate(start, Keep::kCost);
-    *bench_.work += there.work;
-    if (best.y.size() > 0 && !(there.cost < least)) continue;
-    least = there.cost;
+    const double there = CostAt(bench_, candidate, start);
+    if (best.y.size() > 0 && !(there < least)) continue;
+    least = there;
     best = std::move(start);
   }
   Try(&candidate, best, &from, effort);

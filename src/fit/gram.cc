@@ -12,24 +12,6 @@
 namespace gapscope {
 namespace {
 
-std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra) {
-  std::vector<std::string> names(static_cast<std::size_t>(problem.layout().low.size()));
-  for (std::size_t i = 0; i < problem.space().coordinates().size(); ++i)
-    names[i] = problem.space().parameter(problem.space().coordinates()[i]).name;
-  const auto& signals = problem.layout().signals;
-  for (std::size_t l = 0; l < signals.size(); ++l) {
-    for (std::size_t s = 0; s < signals[l].size(); ++s) {
-      if (signals[l][s].offset < 0) continue;
-      names[static_cast<std::size_t>(signals[l][s].offset)] =
-          "offset " + problem.recordings()[l].measured[s].spec.signal + " log " + std::to_string(l);
-    }
-  }
-  if (problem.layout().shift() >= 0) names.back() = "shift";
-  for (const auto& column : extra) names.push_back(column.name);
-  names.emplace_back("residual");
-  return names;
-}
-
 // A window's columns with its state taken out of them, and the rows of its prior after that.
 struct StateFree {
   Eigen::MatrixXd rows, prior;
@@ -78,6 +60,24 @@ Eigen::MatrixXd Products(const Eigen::MatrixXd& rows, const RowBlock& block, Eig
 }
 
 }  // namespace
+
+std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra) {
+  std::vector<std::string> names(static_cast<std::size_t>(problem.layout().low.size()));
+  for (std::size_t i = 0; i < problem.space().coordinates().size(); ++i)
+    names[i] = problem.space().parameter(problem.space().coordinates()[i]).name;
+  const auto& signals = problem.layout().signals;
+  for (std::size_t l = 0; l < signals.size(); ++l) {
+    for (std::size_t s = 0; s < signals[l].size(); ++s) {
+      if (signals[l][s].offset < 0) continue;
+      names[static_cast<std::size_t>(signals[l][s].offset)] =
+          "offset " + problem.recordings()[l].measured[s].spec.signal + " log " + std::to_string(l);
+    }
+  }
+  if (problem.layout().shift() >= 0) names.back() = "shift";
+  for (const auto& column : extra) names.push_back(column.name);
+  names.emplace_back("residual");
+  return names;
+}
 
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
                     const DifferenceOptions& options, const Derivatives* known) {

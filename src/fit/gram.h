@@ -43,6 +43,9 @@ struct ExtraColumn {
   ProbeTorque probe = {};
 };
 
+// GramSystem::columns of a problem with these.
+std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra);
+
 // `known`: the parent's derivatives at the point where they are at hand; else they are made.
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
                     const DifferenceOptions& options, const Derivatives* known = nullptr);

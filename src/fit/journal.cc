@@ -9,7 +9,7 @@
 #include <span>
 
 #include "src/core/file.h"
-#include "src/core/hash.h"
+#include "src/fit/pack.h"
 
 namespace gapscope {
 namespace {
@@ -19,48 +19,15 @@ constexpr std::size_t kHead = 16;  // bytes of the magic and the key, and of a r
 
 std::span<const double> Span(const Eigen::VectorXd& v) { return {v.data(), static_cast<std::size_t>(v.size())}; }
 
-std::uint64_t HashRecord(const FitPoint& point, const std::vector<double>& record) {
-  Hasher hasher;
-  hasher.Numbers(Span(point.y));
-  for (const auto& state : point.states) hasher.Numbers(Span(state));
-  return hasher.Numbers(record).value();
-}
-
-void Put(std::vector<double>& out, const Eigen::MatrixXd& matrix) {
-  out.push_back(static_cast<double>(matrix.rows()));
-  out.push_back(static_cast<double>(matrix.cols()));
-  out.insert(out.end(), matrix.data(), matrix.data() + matrix.size());
-}
-
-void Put(std::vector<double>& out, const Work& work) {
-  for (const std::size_t n : {work.evaluations, work.replays, work.steps}) out.push_back(static_cast<double>(n));
-}
-
-// Reads a record's numbers in order.
-class Reader {
- public:
-  explicit Reader(const std::vector<double>& in) : in_(in) {}
-  double Number() { return in_.at(at_++); }
-  std::size_t Count() { return static_cast<std::size_t>(Number()); }
-  Work TakeWork() {
-    Work work;
-    work.evaluations = Count(), work.replays = Count(), work.steps = Count();
-    return work;
-  }
-  Eigen::MatrixXd Matrix() {
-    const auto rows = static_cast<Eigen::Index>(Number()), columns = static_cast<Eigen::Index>(Number());
-    GS_CHECK(rows >= 0 && columns >= 0 && at_ + static_cast<std::size_t>(rows * columns) <= in_.size());
-    const Eigen::MatrixXd matrix = Eigen::Map<const Eigen::MatrixXd>(in_.data() + at_, rows, columns);
-    at_ += static_cast<std::size_t>(rows * columns);
-    return matrix;
-  }
-
- private:
-  const std::vector<double>& in_;
-  std::size_t at_ = 0;
-};
+std::uint64_t HashRecord(Hasher call, const std::vector<double>& record) { return call.Numbers(record).value(); }
 
 }  // namespace
+
+Hasher HashOf(const FitPoint& point, Hasher hasher) {
+  hasher.Numbers(Span(point.y));
+  for (const auto& state : point.states) hasher.Numbers(Span(state));
+  return hasher;
+}
 
 Result<std::unique_ptr<Journal>> Journal::Open(const std::string& path, std::uint64_t key, bool resume) {
   std::unique_ptr<Journal> journal(new Journal);
@@ -92,7 +59,8 @@ Status Journal::Read(std::uint64_t key, std::size_t* good) {
   if (!ours || stored != key) {
     return Error{.what = "the journal belongs to another job",
                  .where = path_,
-                 .actual = "",
+                 .actual = ours ? "key " + std::to_string(stored) + ", this job's is " + std::to_string(key)
+                                : "a file of another kind",
                  .allowed = "the same experiment, model, logs, parameters and options",
                  .cure = "run without --resume"};
   }
@@ -115,27 +83,48 @@ Journal::~Journal() {
   if (file_) std::fclose(file_);
 }
 
-bool Journal::Next(const FitPoint& point, std::vector<double>* record) {
-  if (next_ >= records_.size()) return false;
-  if (records_[next_].first != HashRecord(point, records_[next_].second)) {
-    records_.resize(next_);  // another path from here on, or a damaged record
+bool Journal::IsNext(Hasher call) const {
+  return replaying() && records_[next_].first == HashRecord(call, records_[next_].second);
+}
+
+bool Journal::Next(Hasher call, std::vector<double>* record) {
+  if (!replaying()) return false;
+  if (!IsNext(call)) {
+    DropRest();  // another path from here on, or a damaged record
     return false;
   }
   *record = records_[next_++].second;
   return true;
 }
 
-void Journal::Write(const void* bytes, std::size_t size) {
+// What is recorded from here on follows what was handed out.
+void Journal::DropRest() {
+  records_.resize(next_);
+  std::size_t bytes = kHead;
+  for (const auto& [hash, numbers] : records_) bytes += kHead + 8 * numbers.size();
+  if (ftruncate(fileno(file_), static_cast<off_t>(bytes)) != 0 || std::fseek(file_, 0, SEEK_END) != 0) Fail();
+}
+
+Status Journal::Sync() {
+  if (status_.ok() && fsync(fileno(file_)) != 0) Fail();
+  return status_;
+}
+
+void Journal::Fail() {
   if (!status_.ok()) return;
-  if (std::fwrite(bytes, 1, size, file_) == size && std::fflush(file_) == 0) return;
   status_ = Error{.what = "the journal cannot be written",
                   .where = path_,
                   .actual = std::strerror(errno),
                   .cure = "free room there; the run itself goes on, but cannot be resumed from here"};
 }
 
-void Journal::Append(const FitPoint& point, const std::vector<double>& record) {
-  const std::uint64_t head[2] = {HashRecord(point, record), record.size()};
+void Journal::Write(const void* bytes, std::size_t size) {
+  if (!status_.ok()) return;
+  if (std::fwrite(bytes, 1, size, file_) != size || std::fflush(file_) != 0) Fail();
+}
+
+void Journal::Append(Hasher call, const std::vector<double>& record) {
+  const std::uint64_t head[2] = {HashRecord(call, record), record.size()};
   Write(head, sizeof head);
   Write(record.data(), 8 * record.size());
 }
@@ -148,7 +137,7 @@ std::vector<double> Pack(const Evaluation& e) {
 }
 
 Evaluation UnpackEvaluation(const std::vector<double>& numbers) {
-  Reader in(numbers);
+  PackReader in(numbers);
   Evaluation e;
   e.cost = in.Number();
   e.work = in.TakeWork();
@@ -171,7 +160,7 @@ std::vector<double> Pack(const Linearization& l) {
 }
 
 Linearization UnpackLinearization(const std::vector<double>& numbers) {
-  Reader in(numbers);
+  PackReader in(numbers);
   Linearization l;
   l.cost = in.Number();
   l.reduced_cost = in.Number();

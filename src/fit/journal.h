@@ -9,9 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "src/core/hash.h"
 #include "src/fit/normal_equations.h"
 
 namespace gapscope {
+
+// What a call at a point is told by.
+Hasher HashOf(const FitPoint& point, Hasher hasher = Hasher());
 
 class Journal {
  public:
@@ -21,9 +25,18 @@ class Journal {
   static Result<std::unique_ptr<Journal>> Open(const std::string& path, std::uint64_t key, bool resume);
   ~Journal();
 
-  // The recorded result of this evaluation, if the job got this far before.
-  bool Next(const FitPoint& point, std::vector<double>* record);
-  void Append(const FitPoint& point, const std::vector<double>& record);
+  // The recorded result of this call, if the job got this far before. `call`: a hash of what it is given; another one
+  // than is recorded next, and what follows is dropped.
+  bool Next(Hasher call, std::vector<double>* record);
+  void Append(Hasher call, const std::vector<double>& record);
+  // The same of an evaluation.
+  bool Next(const FitPoint& point, std::vector<double>* record) { return Next(HashOf(point), record); }
+  void Append(const FitPoint& point, const std::vector<double>& record) { Append(HashOf(point), record); }
+  // Records are left to hand out; the next one is of this call.
+  bool replaying() const { return next_ < records_.size(); }
+  bool IsNext(Hasher call) const;
+  // Brings what was written to the disk itself, so that not even a power cut takes it back.
+  Status Sync();
   // Whether all could be written so far; the error names file and reason. A run goes on without: nothing but the way
   // back into it is lost.
   const Status& status() const { return status_; }
@@ -33,6 +46,8 @@ class Journal {
   Journal() = default;
   Status Read(std::uint64_t key, std::size_t* good);
   void Write(const void* bytes, std::size_t size);
+  void DropRest();
+  void Fail();  // by errno
 
   std::string path_;
   std::FILE* file_ = nullptr;

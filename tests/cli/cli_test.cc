@@ -104,6 +104,11 @@ TEST_F(CliTest, WrongArguments) {
   ExpectRefused(diagnose + "coulomb_friction=1.2", {"--prior coulomb_friction", "1.2", "0 .. 1"});
   ExpectRefused(diagnose + "coulomb_fricton=0.9", {"--prior", "coulomb_friction"});
   ExpectRefused(diagnose + "coulomb_friction@nowhere=0.9", {"--prior", "coulomb_friction@joint"});
+  ExpectRefused("diagnose " + Joint() + " '" + log + "' --resume", {"--resume", "nothing to resume from", "--out"});
+  std::filesystem::create_directories(scratch_.Path("cwd/left/diagnosis.journal"));
+  scratch_.Write("cwd/left/diagnosis.journal/calls.bin", "of something else");
+  ExpectRefused("diagnose " + Joint() + " '" + log + "' --out left --resume",
+                {"calls.bin", "another job", "another kind", "the same experiment", "without --resume"});
   // No number of 300 digits in a message, and nan is in no range.
   for (const auto& [command, flag, allowed] :
        {std::tuple{"diagnose", "--budget", "above 0 (s)"}, std::tuple{"diagnose", "--window", "above 0 (s)"},

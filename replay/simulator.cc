@@ -19,23 +19,11 @@ int StepsOver(double interval_s, double max_step_s) {
   return std::max(1, static_cast<int>(std::ceil(interval_s / max_step_s - 1e-6)));
 }
 
-// No geom touches another one, and no tendon wraps round one.
-bool OnlyDraws(const mjModel& m) {
-  if (m.npair > 0 || m.nwrap > 0 || m.nflex > 0) return false;
-  for (int g = 0; g < m.ngeom; ++g) {
-    if (m.geom_contype[g] != 0 || m.geom_conaffinity[g] != 0 || m.geom_fluid[mjNFLUID * g] > 0) return false;
-  }
-  return true;
-}
-
 ModelPtr CopyForReplay(const mjModel& model) {
   ModelPtr copy(mj_copyModel(nullptr, &model));
   // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this
   // small.
   copy->opt.disableflags |= mjDSBL_AUTORESET | mjDSBL_SENSOR | mjDSBL_ISLAND;
-  // What is only looked at is not moved along.
-  copy->ncam = copy->nlight = 0;
-  if (OnlyDraws(*copy)) copy->ngeom = 0;
   return copy;
 }
 

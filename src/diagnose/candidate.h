@@ -62,7 +62,7 @@ struct Workbench {
   // Of base parameters, where they were widened.
   std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
-  bool by_windows = false;  // train and held-out logs are the same: every third window is held out
+  bool by_windows = false;              // train and held-out logs are the same: every third window is held out
   DiagnosisJournal* journal = nullptr;  // null: none
 
   FitOptions Options(const Model& model, bool train) const;

@@ -1,0 +1,293 @@
+#include "src/diagnose/describe.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "src/core/statistics.h"
+#include "src/diagnose/beside.h"
+#include "src/diagnose/explain.h"
+#include "src/diagnose/judge.h"
+#include "src/diagnose/policy.h"
+#include "src/diagnose/remainder.h"
+#include "src/diagnose/sizes.h"
+
+namespace gapscope {
+namespace {
+
+// Schwarz's criterion on the training logs, residuals taken as independent and their variance as unknown: a baseline to
+// compare with, no more.
+double Bic(const Candidate& candidate) {
+  const double n = static_cast<double>(candidate.problem->residuals());
+  return n * std::log(std::max(candidate.train_cost, 1e-300)) + std::log(n) * static_cast<double>(candidate.parameters);
+}
+
+// The sensors' noise as a normalised error.
+double FloorError(const std::vector<Recording>& recordings, const std::vector<double>& noise) {
+  double sum = 0, signals = 0;
+  for (const auto& recording : recordings) {
+    for (const auto& measured : recording.measured) {
+      const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
+      if (measured.spec.scored && std::isfinite(share)) sum += share * share, signals += 1;
+    }
+  }
+  return std::sqrt(sum / std::max(1.0, signals));
+}
+
+// Where a model's error lies, on the first held-out log, which stands for all (shares of several logs do not add up).
+std::vector<ConditionShare> Locate(const Candidate& candidate, const std::vector<Recording>& held_out,
+                                   std::uint64_t seed) {
+  std::vector<ConditionShare> where;
+  if (candidate.held_out.empty()) return where;
+  const LogReplay& log = candidate.held_out.front();
+  const Recording& recording = held_out.front();
+  for (std::size_t s = 0; s < log.signals.size(); ++s) {
+    const SignalTrace& trace = log.signals[s];
+    if (!trace.scored) continue;
+    ConditionInput input{
+        .signal = trace.signal, .time_s = log.time_s, .measured = trace.measured, .predicted = trace.predicted};
+    std::vector<double> speed;
+    if (TraitsOf(trace.kind).gives_angle) {
+      for (std::size_t row = 0; row < recording.rows(); ++row)
+        speed.push_back(FitLocally(recording, recording.measured[s], row, kInitialFitHalfWidth_s).slope);
+      input.speed = speed;
+      input.angle = trace.measured;
+    }
+    if (!recording.commands.empty()) input.command = recording.commands.front().values;
+    for (auto& share : LocateError(input, {.seed = seed})) where.push_back(std::move(share));
+  }
+  return MostTelling(where, {.limit = 12});
+}
+
+// Base parameters that ended on a bound.
+std::vector<AtBound> FindAtBounds(const Candidate& candidate, const Model& base) {
+  std::vector<AtBound> found;
+  for (const int i : base.FreeParameters()) {
+    const Parameter& p = base.parameters()[static_cast<std::size_t>(i)];
+    const double value = candidate.values[static_cast<std::size_t>(candidate.model->IndexOf(p.name))];
+    const OnBound bound = BoundOf(value, p.low, p.high);
+    if (bound == OnBound::kNo || bound == BoundOf(p.nominal, p.low, p.high)) continue;
+    found.push_back({.name = p.name, .unit = p.unit, .value = value});
+  }
+  return found;
+}
+
+// What each effect takes of the gap: Shapley's value (1953) over all sets of up to three of them, each refitted; of
+// more the mean of adding it to nothing and taking it out of the whole. Errors of sets by held-out logs.
+class GapShares {
+ public:
+  GapShares(const Workbench& bench, SearchResult& found, const Candidate& final)
+      : bench_(bench), found_(found), final_(final) {}
+
+  double Of(const EffectUse& use) {
+    const double gap = found_.base->held_out_error - final_.held_out_error;
+    if (!(gap > 0)) return 0;
+    const EffectSet others = Without(final_.effects, use);
+    constexpr std::size_t kMost = 3;
+    double sum = 0, weight = 0;
+    for (std::size_t bits = 0; bits < (std::size_t{1} << others.size()); ++bits) {
+      EffectSet part;
+      for (std::size_t i = 0; i < others.size(); ++i) {
+        if (bits >> i & 1) part.push_back(others[i]);
+      }
+      const bool end = part.empty() || part.size() == others.size();
+      if (final_.effects.size() > kMost && !end) continue;
+      const double with = Error(With(part, use)), without = Error(part);
+      if (!std::isfinite(with) || !std::isfinite(without)) continue;
+      // Of n effects: |S|! (n - |S| - 1)! / n!, up to a factor that all have in common.
+      const double w = end ? 1 : 1 / Binomial(others.size(), part.size());
+      sum += w * (without - with), weight += w;
+    }
+    return weight > 0 ? std::clamp(sum / weight / gap, 0.0, 1.0) : 1;
+  }
+
+ private:
+  static double Binomial(std::size_t n, std::size_t k) {
+    double result = 1;
+    for (std::size_t i = 1; i <= k; ++i) result *= static_cast<double>(n - k + i) / static_cast<double>(i);
+    return result;
+  }
+
+  double Error(const EffectSet& set) {
+    if (set == final_.effects) return final_.held_out_error;
+    Candidate* candidate = found_.ledger.Find(set);
+    if (!candidate) candidate = found_.ledger.Refit(set, final_, {}, {}, Effort::kTry);
+    if (!candidate) return kNaN;
+    ScoreCandidate(bench_, candidate);
+    return candidate->held_out_error;
+  }
+
+  const Workbench& bench_;
+  SearchResult& found_;
+  const Candidate& final_;
+};
+
+// The effects that are there, the largest share first.
+std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& found, const Candidate& final,
+                                         const BesideTorques& beside, std::vector<Statement>* statements) {
+  std::vector<FoundEffect> effects;
+  const auto sizes = EstimateSizes(bench, final, beside.widening);
+  GapShares shares(bench, found, final);
+  for (Statement& s : *statements) {
+    if (const auto bounds = beside.bounds.find(s.use); s.answer == Answer::kAbsent && bounds != beside.bounds.end())
+      s.bounds = bounds->second;
+    const auto place = sizes.find(s.use);
+    if (place == sizes.end()) continue;
+    s.parameters = place->second;
+    s.share_of_gap = shares.Of(s.use);
+    const Effect& entry = EffectOf(s.use, *bench.rig);
+    effects.push_back({.use = s.use,
+                       .meaning = entry.meaning,
+                       .signature = entry.signature,
+                       .probability = s.probability,
+                       .parameters = s.parameters,
+                       .error_before = found.base->held_out_error,
+                       .error_after = final.held_out_error,
+                       .share_of_gap = s.share_of_gap});
+  }
+  std::stable_sort(effects.begin(), effects.end(),
+                   [](const auto& a, const auto& b) { return a.share_of_gap > b.share_of_gap; });
+  // What stands before each: the base model with the effects that are listed earlier.
+  EffectSet before;
+  for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
+    before = With(before, effects[i].use);
+    Candidate* part = found.ledger.Find(before);
+    if (!part) part = found.ledger.Refit(before, final, {}, {}, Effort::kTry);
+    if (!part) continue;
+    ScoreCandidate(bench, part);
+    effects[i + 1].error_before = part->held_out_error;
+  }
+  return effects;
+}
+
+// The base model and every single effect, those that were refitted with what they cost.
+std::vector<CandidateReport> DescribeCandidates(const Workbench& bench, const SearchResult& found,
+                                                const Judgement& judgement) {
+  std::vector<CandidateReport> reports;
+  const auto report_of = [&](const Explanation& effect, Candidate* fitted) {
+    CandidateReport report{.effect = effect, .held_out_error = kNaN};
+    if (fitted) {
+      ScoreCandidate(bench, fitted);
+      report.held_out_error = fitted->held_out_error;
+      report.refitted = true;
+      report.converged = fitted->converged;
+      report.bic = Bic(*fitted);
+      report.reason = fmt::format("alone it leaves {:.1f} times the noise", fitted->held_out_floors);
+    }
+    return report;
+  };
+  double total = 0;
+  for (const Statement& s : judgement.statements) {
+    CandidateReport report = report_of(s.use, found.ledger.Find({s.use}));
+    report.probability = s.probability;
+    for (std::size_t t = 0; t < found.columns.trials.size(); ++t) {
+      if (found.columns.trials[t].use == s.use)
+        report.promise = std::max(report.promise, 1 - SetCost(found.columns, {t}) / found.columns.cost);
+    }
+    report.reason = report.reason.empty() ? s.rule : s.rule + "; " + report.reason;
+    total += s.probability;
+    reports.push_back(std::move(report));
+  }
+  double none = 1;
+  for (const auto& report : reports) none *= 1 - report.probability;
+  // Over single explanations, adding up to one.
+  reports.insert(reports.begin(), report_of({}, found.base));
+  reports.front().probability = none;
+  for (auto& report : reports) {
+    if (report.effect) report.probability *= total > 0 ? (1 - none) / total : 0;
+  }
+  std::stable_sort(reports.begin(), reports.end(), [](const auto& a, const auto& b) {
+    return a.probability != b.probability ? a.probability > b.probability : a.promise > b.promise;
+  });
+  return reports;
+}
+
+// The experiment that tells the first of a group from the second, or the leader from its nearest rival.
+void SuggestNext(const SearchResult& found, const Judgement& judgement, const std::string& experiment,
+                 Diagnosis* result) {
+  std::vector<Explanation> rivals;
+  for (const auto& group : result->ambiguous) {
+    if (rivals.empty() && group.size() > 1) rivals = {group[0], group[1]};
+  }
+  if (rivals.empty()) {
+    for (const auto& member : found.members) {
+      if (rivals.empty() && !member.rivals.empty()) rivals = {member.use, member.rivals.front().use};
+    }
+  }
+  if (rivals.empty() && !judgement.statements.empty()) rivals = {judgement.statements.front().use};
+  if (rivals.empty()) return;
+  result->next_command = "gapscope design optimal " + experiment;
+  for (const auto& rival : rivals) result->next_command += " --separate " + NameOf(rival);
+  if (rivals.size() < 2) rivals.push_back({});
+  result->next_separates = rivals;
+}
+
+// The set of the effects that are there, refitted to the end.
+Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement& judgement) {
+  EffectSet set;
+  for (const EffectUse& use : found.chosen->effects) {
+    if (std::any_of(judgement.statements.begin(), judgement.statements.end(),
+                    [&](const Statement& s) { return s.use == use && s.answer == Answer::kPresent; }))
+      set = With(set, use);
+  }
+  if (set.empty()) return found.base;
+  Candidate* final = found.ledger.Find(set);
+  if (!final || final != found.chosen) final = found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kFinish);
+  if (!final) return found.chosen;
+  PolishCandidate(bench, final);
+  ScoreCandidate(bench, final);
+  return final;
+}
+
+}  // namespace
+
+Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const std::vector<double>& noise,
+                           std::uint64_t seed, const Say& say) {
+  Diagnosis result;
+  Judgement judgement = Judge(bench, found, say);
+  const Candidate& base = *found.base;
+  Candidate& chosen = *FinalSet(bench, found, judgement);
+  say("looking beside the final set");
+  const BesideTorques beside = LookBeside(bench, chosen, found.uses);
+  judgement.evidence.floors_left = chosen.held_out_floors;
+  result.verdict = judgement.verdict;
+  result.probability = judgement.probability;
+  result.evidence = judgement.evidence;
+  result.nominal = found.nominal->held_out_error;
+  result.refit = base.held_out_error;
+  result.final = chosen.held_out_error;
+  result.floor = std::min(FloorError(bench.data.held_out, noise), result.final);
+  result.closed = result.refit > result.floor
+                      ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0)
+                      : 0;
+  result.effects = DescribeEffects(bench, found, chosen, beside, &judgement.statements);
+  for (const Statement& s : judgement.statements) {
+    if (s.group < 0 || s.answer != Answer::kPresent) continue;
+    const auto& group = judgement.groups[static_cast<std::size_t>(s.group)];
+    if (group.front() == s.use) result.ambiguous.push_back(group);
+  }
+  result.candidates = DescribeCandidates(bench, found, judgement);
+  result.statements = judgement.statements;
+  result.remainder = Divide(bench, base, chosen, result.floor, beside);
+  result.at_bounds = FindAtBounds(chosen, *base.model);
+  SuggestNext(found, judgement, bench.rig->experiment().path, &result);
+  result.where = Locate(base, bench.data.held_out, seed);
+  result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);
+  result.cut = found.cut;
+  result.work = *bench.work;
+  for (const auto* part : {&bench.data.train, bench.by_windows ? nullptr : &bench.data.held_out}) {
+    if (!part) continue;
+    for (const auto& recording : *part) result.data_s += recording.time_s.back() - recording.time_s.front();
+  }
+  result.most_steps = bench.most_steps;
+  result.model = chosen.model;
+  result.values = chosen.values;
+  result.refit_model = base.model;
+  result.refit_values = base.values;
+  result.explanation = Explain(result);
+  return result;
+}
+
+}  // namespace gapscope

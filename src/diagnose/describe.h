@@ -1,0 +1,16 @@
+// A finished search as a diagnosis: judged, its final set refitted, described and measured.
+#ifndef GAPSCOPE_DIAGNOSE_DESCRIBE_H_
+#define GAPSCOPE_DIAGNOSE_DESCRIBE_H_
+
+#include "src/diagnose/diagnosis.h"
+#include "src/diagnose/search.h"
+
+namespace gapscope {
+
+// `noise`: of each measured signal, SI. Which logs were fitted, and the time, are left to the caller.
+Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const std::vector<double>& noise,
+                           std::uint64_t seed, const Say& say);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_DESCRIBE_H_

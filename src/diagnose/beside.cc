@@ -58,7 +58,7 @@ Eigen::MatrixXd Widening(const ColumnTable& table, const TorquePrior& torques) {
 
 // Coefficient of a trial's effect beside the torques that is exceeded with the policy's probability; NaN: nothing is
 // known.
-double UpperCoefficient(const ColumnTable& table, const Trial& trial, const TorquePrior& torques) {
+double UpperCoefficient(const ColumnTable& table, const Trial& trial, bool both_signs, const TorquePrior& torques) {
   const Eigen::MatrixXd& m = table.reduced;
   const auto columns = Collect(trial.columns, [&](Eigen::Index c) { return table.Reduced(c); }),
              torque = Collect(table.torques, [&](Eigen::Index c) { return table.Reduced(c); });
@@ -79,17 +79,19 @@ double UpperCoefficient(const ColumnTable& table, const Trial& trial, const Torq
   const Eigen::MatrixXd spread = torques.variance * Inverse(own);
   if (trial.form == Trial::Form::kAngle)
     return best.norm() + quantile * std::sqrt(std::max(spread.diagonal().maxCoeff(), 0.0));
-  return std::max(best[0], 0.0) + quantile * std::sqrt(std::max(spread(0, 0), 0.0));
+  return (both_signs ? std::abs(best[0]) : std::max(best[0], 0.0)) + quantile * std::sqrt(std::max(spread(0, 0), 0.0));
 }
 
 // Sizes that an effect stays below: by the trial nearest to its bound, where the columns say most.
 std::vector<EffectEstimate> BoundsOfEffect(const Workbench& bench, const ColumnTable& table, const EffectUse& use,
                                            const TorquePrior& torques) {
+  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+  const bool both_signs = placed.front().low < 0;
   const Trial* nearest = nullptr;
   double coefficient = 0, distance = kInfinity;
   for (const Trial& trial : table.trials) {
     if (trial.use != use) continue;
-    const double upper = UpperCoefficient(table, trial, torques);
+    const double upper = UpperCoefficient(table, trial, both_signs, torques);
     if (!(upper > 0) || std::abs(std::log(upper)) >= distance) continue;
     nearest = &trial, coefficient = upper, distance = std::abs(std::log(upper));
   }
@@ -97,14 +99,16 @@ std::vector<EffectEstimate> BoundsOfEffect(const Workbench& bench, const ColumnT
   // Far beyond its trial values an effect is not what its columns say.
   constexpr double kFar = 3;
   if (!nearest || coefficient > kFar) return bounds;
-  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const PlacedParameter& p = placed[i];
     if (p.trials.empty() || (p.role != ParameterRole::kSize && p.role != ParameterRole::kTime)) continue;
     const double trial = nearest->values[i];
+    if (trial == p.neutral) continue;
     // A limit is nothing at its largest value: where a tighter one is excluded, the true one lies above.
     if (p.neutral == p.high && coefficient > 1) continue;
-    const double value = p.neutral == p.high ? trial : p.neutral + coefficient * (trial - p.neutral);
+    const double moved = p.neutral + coefficient * (trial - p.neutral), value = p.neutral == p.high ? trial
+                                                                                : both_signs        ? std::abs(moved)
+                                                                                                    : moved;
     bounds.push_back({.key = p.key, .unit = p.unit, .value = value, .low = value, .high = value});
   }
   return bounds;

@@ -59,10 +59,6 @@ TorquePrior TorquesBeside(const ColumnTable& table, std::span<const Eigen::Index
   return LikeliestTorques(TakeOut(table, table.torques, columns), numbers, share);
 }
 
-double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals) {
-  return TorquesBeside(table, columns, residuals).likelihood - TorquesBeside(table, {}, residuals).likelihood;
-}
-
 double Mimicry(const ColumnTable& table, const std::vector<RandomTorque>& torques, double held) {
   const Eigen::MatrixXd& m = table.reduced;
   std::mt19937_64 random(11);

@@ -20,10 +20,6 @@ TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double sh
 // The same of a table, with `columns` taken out too. `residuals`: numbers of the logs.
 TorquePrior TorquesBeside(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals);
 
-// Gain in log marginal likelihood when the effect's columns join a prior of the table's random torques, whose amplitude
-// is the likeliest each time. `columns`: of the effect, in the table; `residuals`: numbers of the logs.
-double DiscrepancyEvidence(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals);
-
 // Of random sums of torques in the residual's place: the share of which one of the trials holds at least `held` (of the
 // sum's square), with its own sign.
 double Mimicry(const ColumnTable& table, const std::vector<RandomTorque>& torques, double held);

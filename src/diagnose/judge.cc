@@ -83,9 +83,10 @@ class Judging {
                                  [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).of_motion; });
     if (torques_.empty()) return numbers;
     const ColumnTable table = MakeColumnsOfFit(bench_, *without, *found_.chosen, uses, torques_);
-    if (!table.valid || table.trials.empty()) return numbers;
+    if (!table.valid || table.trials.empty() || !Left().valid) return numbers;
     const std::size_t residuals = without->problem->residuals();
-    numbers.discrepancy = DiscrepancyEvidence(table, table.trials.front().columns, residuals);
+    numbers.discrepancy =
+        TorquesBeside(Left(), {}, residuals).likelihood - TorquesBeside(table, {}, residuals).likelihood;
     const double floor = 0.5 * static_cast<double>(residuals);
     const double held =
         (without->train_cost - found_.chosen->train_cost) / std::max(without->train_cost - floor, 1e-9 * floor);
@@ -110,6 +111,13 @@ class Judging {
   }
 
  private:
+  // What the chosen set leaves, with the torques' columns.
+  const ColumnTable& Left() {
+    if (left_of_ != found_.chosen) left_ = MakeColumns(bench_, *found_.chosen, {}, torques_);
+    left_of_ = found_.chosen;
+    return left_;
+  }
+
   Statement Of(const EffectUse& use) {
     Statement statement{.use = use, .numbers = Numbers({use}), .rule = "its own evidence"};
     Weigh({use}, &statement);
@@ -290,6 +298,8 @@ class Judging {
   const Say& say_;
   std::vector<RandomTorque> torques_;
   double free_left_;
+  ColumnTable left_;
+  const Candidate* left_of_ = nullptr;  // whose table that is
 };
 
 }  // namespace

@@ -172,13 +172,8 @@ std::string StatementTable(const Diagnosis& d) {
     text += fmt::format("{:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", s.use.Text(),
                         AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
   }
-  text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
-  for (const auto& s : d.statements) {
-    if (s.answer != Answer::kAbsent || s.bounds.empty()) continue;
-    text += fmt::format("  no {:<32}", s.use.Text());
-    for (const auto& bound : s.bounds) text += fmt::format(" {} beyond {:.3g} {}", bound.key, bound.value, bound.unit);
-    text += "\n";
-  }
+  text += fmt::format("{} more gain too little (--json: below which size they stay), {} cannot be seen in these logs\n",
+                      absent, unseen);
   return text;
 }
 

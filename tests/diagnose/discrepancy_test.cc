@@ -30,7 +30,9 @@ struct Bank {
     table.reduced = rows.transpose() * rows;
     table.gram.blocks.resize(50);
   }
-  double Evidence() const { return DiscrepancyEvidence(table, table.trials[0].columns, kRows); }
+  double Evidence() const {
+    return TorquesBeside(table, table.trials[0].columns, kRows).likelihood - TorquesBeside(table, {}, kRows).likelihood;
+  }
 };
 
 TEST(DiscrepancyTest, AnEffectThatNoTorqueHoldsCounts) {

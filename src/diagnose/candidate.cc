@@ -68,11 +68,11 @@ double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint
   return there.cost;
 }
 
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, const FitLimits& limits,
                   GiveUp give_up, const Candidate* from) {
   const auto solve = [&] {
-    SolveOptions options{.max_iterations = iterations,
-                         .tolerance = tolerance,
+    SolveOptions options{.max_iterations = limits.iterations,
+                         .tolerance = limits.tolerance,
                          .coarse_step = kCoarseStep,
                          .fine_step = 0.01,
                          .give_up = std::move(give_up),

@@ -76,9 +76,14 @@ struct Workbench {
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
 // Cost on the training logs.
 double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint& point);
+// How far a fit goes.
+struct FitLimits {
+  int iterations = 0;
+  double tolerance = 0;
+};
 // Fits from `start` on the training logs, until `give_up` says to. `from`: whose Jacobian, if it has one, the first
 // steps are made with; null: none.
-void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, int iterations, double tolerance,
+void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, const FitLimits& limits,
                   GiveUp give_up = {}, const Candidate* from = nullptr);
 // Undamped steps at the end of a fit: directions that the logs leave open go to where the prior pulls them.
 void PolishCandidate(const Workbench& bench, Candidate* candidate);

@@ -251,7 +251,14 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   Candidate& chosen = *FinalSet(bench, found, judgement);
   say("looking beside the final set");
   const BesideTorques beside = LookBeside(bench, chosen, found.uses);
-  judgement.evidence.floors_left = chosen.held_out_floors;
+  VerdictEvidence& e = judgement.evidence;
+  e.floors_left = chosen.held_out_floors;
+  const double excess = e.floors_before - std::min(1.0, e.floors_left);
+  e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
+  e.free_run_left = &chosen == &base ? e.free_run_before : FreeRunError(bench, chosen);
+  e.free_run_removed = std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0
+                           ? 1 - e.free_run_left / e.free_run_before
+                           : 0;
   result.verdict = judgement.verdict;
   result.probability = judgement.probability;
   result.evidence = judgement.evidence;

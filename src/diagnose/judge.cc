@@ -270,13 +270,7 @@ class Judging {
     const Candidate &base = *found_.base, &chosen = *found_.chosen;
     VerdictEvidence& e = result->evidence;
     e.floors_before = base.held_out_floors;
-    e.floors_left = chosen.held_out_floors;
-    const double excess = e.floors_before - std::min(1.0, e.floors_left);
-    e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
-    e.free_run_left = free_left_;
     e.free_run_before = &base == &chosen ? free_left_ : FreeRunError(bench_, base);
-    if (std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0)
-      e.free_run_removed = 1 - e.free_run_left / e.free_run_before;
     VerdictFacts facts{.floors_left = e.floors_before};
     double right = 1;
     for (const Statement& s : result->statements) {

@@ -16,8 +16,8 @@ struct Judgement {
   std::vector<Statement> statements;           // the surest first; sizes are left to whoever describes them
   std::vector<std::vector<EffectUse>> groups;  // by Statement::group
   Verdict verdict = Verdict::kNone;
-  double probability = 0;  // of the verdict as a whole
-  VerdictEvidence evidence;
+  double probability = 0;    // of the verdict as a whole
+  VerdictEvidence evidence;  // of the refitted base model; what is left is the final set's
 };
 
 Judgement Judge(const Workbench& bench, SearchResult& found, const Say& say);

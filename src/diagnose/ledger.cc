@@ -9,11 +9,6 @@
 namespace gapscope {
 namespace {
 
-struct FitLimits {
-  int iterations = 0;
-  double tolerance = 0;
-};
-
 FitLimits LimitsOf(Effort effort) {
   switch (effort) {
     case Effort::kTaste:
@@ -78,9 +73,9 @@ bool Ledger::Try(Candidate* candidate, const FitPoint& start, const Candidate* f
   const bool converged = candidate->converged, scored = candidate->scored;
   const double shift_s = candidate->shift_s;
   const auto derivatives = candidate->derivatives;
-  const auto [iterations, tolerance] = LimitsOf(effort);
-  FitCandidate(bench_, candidate, start, iterations, tolerance,
-               std::isfinite(known) && there > known ? TooSlow(known, iterations) : GiveUp{}, from);
+  const FitLimits limits = LimitsOf(effort);
+  FitCandidate(bench_, candidate, start, limits,
+               std::isfinite(known) && there > known ? TooSlow(known, limits.iterations) : GiveUp{}, from);
   Remember(candidate);
   if (candidate->train_cost < known) return true;
   candidate->point = before;

@@ -17,20 +17,10 @@ Eigen::MatrixXd Inverse(const Eigen::MatrixXd& m) {
   return Ldlt(m).Solve(Eigen::MatrixXd::Identity(m.rows(), m.cols()));
 }
 
-// Coordinates of y that are not held by a bound.
-std::vector<Eigen::Index> FreeOf(const ColumnTable& table) {
-  std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < table.gram.parameters; ++i) {
-    const double room = std::min(-table.bounds.low[i], table.bounds.high[i]);
-    if (room > 1e-6 * (table.bounds.high[i] - table.bounds.low[i])) free.push_back(i);
-  }
-  return free;
-}
-
 Eigen::MatrixXd Widening(const ColumnTable& table, const TorquePrior& torques) {
   const Eigen::Index n = table.gram.parameters, residual = table.sum.cols() - 1;
   Eigen::MatrixXd widening = Eigen::MatrixXd::Zero(n, n);
-  const std::vector<Eigen::Index> free = FreeOf(table);
+  const std::vector<Eigen::Index> free = table.FreeCoordinates();
   if (!(torques.ratio > 0) || free.empty()) return widening;
   const double h = torques.share;
   Eigen::MatrixXd own = h * table.sum(free, free);
@@ -119,7 +109,7 @@ double FreeFormShare(const ColumnTable& table, const TorquePrior& torques) {
   if (!(torques.ratio > 0)) return 0;
   const long kBlocks = 4;  // half seconds in a row are one fold's
   const Eigen::Index residual = table.sum.cols() - 1;
-  std::vector<Eigen::Index> columns = FreeOf(table);
+  std::vector<Eigen::Index> columns = table.FreeCoordinates();
   const std::size_t own = columns.size();
   columns.insert(columns.end(), table.torques.begin(), table.torques.end());
   double before = 0, after = 0;

@@ -140,11 +140,7 @@ ColumnBounds BoundsOf(const ColumnTable& table, const FitProblem& problem, const
 // y taken out of all other columns; coordinates on a bound stay there.
 Eigen::MatrixXd Reduce(const ColumnTable& table) {
   const Eigen::Index n = table.gram.parameters, rest = table.sum.cols() - n;
-  std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const double room = std::min(-table.bounds.low[i], table.bounds.high[i]);
-    if (room > 1e-6 * (table.bounds.high[i] - table.bounds.low[i])) free.push_back(i);
-  }
+  const std::vector<Eigen::Index> free = table.FreeCoordinates();
   const auto f = static_cast<Eigen::Index>(free.size());
   Eigen::MatrixXd own(f, f), cross(f, rest);
   for (Eigen::Index a = 0; a < f; ++a) {
@@ -313,6 +309,15 @@ ColumnTable MakeColumnsOfFit(const Workbench& bench, Candidate& parent, Candidat
   if (uses.size() == 1 && TrialValues(bench, uses.front(), nullptr).size() <= kDiagnosePolicy.search.scan)
     AddTrials(bench, child, uses.front(), 0, nullptr, &wanted);
   return Finish(bench, parent, std::move(wanted), torques);
+}
+
+std::vector<Eigen::Index> ColumnTable::FreeCoordinates() const {
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < gram.parameters; ++i) {
+    const double room = std::min(-bounds.low[i], bounds.high[i]);
+    if (room > 1e-6 * (bounds.high[i] - bounds.low[i])) free.push_back(i);
+  }
+  return free;
 }
 
 std::vector<double> ValuesAt(const Workbench& bench, const Trial& trial, std::span<const double> c) {

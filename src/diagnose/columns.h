@@ -46,6 +46,7 @@ struct ColumnTable {
   Eigen::MatrixXd reduced;  // of the columns beside y, and the residual: y, with what is known of it, taken out
   double cost = 0;          // of the parent, y at its optimum as the columns see it
   bool valid = false;
+  std::vector<Eigen::Index> FreeCoordinates() const;  // of y: those that no bound holds
   Eigen::Index Reduced(Eigen::Index column) const { return column - gram.parameters; }
 };
 

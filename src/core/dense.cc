@@ -19,6 +19,7 @@ Eigen::VectorXd Ldlt::SolveVector(const Eigen::VectorXd& right) const {
 }
 Eigen::MatrixXd Ldlt::SolveMatrix(const Eigen::MatrixXd& right) const {
   GS_CHECK(right.rows() == factors_->rows());
+  if (right.cols() == 0) return right;  // Eigen's blocking divides by the number of columns
   return factors_->solve(right);
 }
 bool Ldlt::IsPositive() const { return factors_->isPositive(); }

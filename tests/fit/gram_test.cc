@@ -161,8 +161,9 @@ TEST(GramTest, ExtraColumnDropsWhatTheDenseProblemDrops) {
     b.segment(row + k, m) = parent.windows()[w].prior.cwiseProduct(point.states[w]);
     row += k + m, column += m;
   }
-  a.block(row, 0, n, n) = bounds.prior_weight.cwiseSqrt().asDiagonal();
-  b.segment(row, n) = bounds.prior_weight.cwiseSqrt().cwiseProduct(bounds.prior_gone);
+  const Eigen::VectorXd weight = bounds.prior_weight.head(n).cwiseSqrt();
+  a.block(row, 0, n, n) = weight.asDiagonal();
+  b.segment(row, n) = weight.cwiseProduct(bounds.prior_gone.head(n));
   const Eigen::VectorXd x = SolveLu(a.transpose() * a, -a.transpose() * b);
   EXPECT_NEAR(with.values[n], x[n], 1e-5 * std::abs(x[n]));
   EXPECT_NEAR(with.cost, 0.5 * (a * x + b).squaredNorm(), 1e-6 * with.cost);

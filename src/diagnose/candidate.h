@@ -66,8 +66,11 @@ struct Workbench {
   DiagnosisJournal* journal = nullptr;  // null: none
 
   FitOptions Options(const Model& model, bool train) const;
-  // The budget is spent: of work, or of time where one was asked for.
-  bool Late() const { return (most_steps > 0 && work->steps > most_steps) || TimeIsOver(); }
+  // `share` of the work is spent, or the time where one was asked for.
+  bool Late(double share) const {
+    return (most_steps > 0 && static_cast<double>(work->steps) > share * static_cast<double>(most_steps)) ||
+           TimeIsOver();
+  }
   // What was done in time before an interruption is not cut afterwards.
   bool TimeIsOver() const { return !(journal && journal->replaying()) && IsLate(deadline); }
 };

@@ -9,6 +9,7 @@
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
 #include "src/diagnose/explain.h"
+#include "src/diagnose/gap_shares.h"
 #include "src/diagnose/judge.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/remainder.h"
@@ -74,63 +75,13 @@ std::vector<AtBound> FindAtBounds(const Candidate& candidate, const Model& base)
   return found;
 }
 
-// What each effect takes of the gap: Shapley's value (1953) over all sets of up to three of them, each refitted; of
-// more the mean of adding it to nothing and taking it out of the whole. Errors of sets by held-out logs.
-class GapShares {
- public:
-  GapShares(const Workbench& bench, SearchResult& found, const Candidate& final)
-      : bench_(bench), found_(found), final_(final) {}
-
-  double Of(const EffectUse& use) {
-    const double gap = found_.base->held_out_error - final_.held_out_error;
-    if (!(gap > 0)) return 0;
-    const EffectSet others = Without(final_.effects, use);
-    constexpr std::size_t kMost = 3;
-    double sum = 0, weight = 0;
-    for (std::size_t bits = 0; bits < (std::size_t{1} << others.size()); ++bits) {
-      EffectSet part;
-      for (std::size_t i = 0; i < others.size(); ++i) {
-        if (bits >> i & 1) part.push_back(others[i]);
-      }
-      const bool end = part.empty() || part.size() == others.size();
-      if (final_.effects.size() > kMost && !end) continue;
-      const double with = Error(With(part, use)), without = Error(part);
-      if (!std::isfinite(with) || !std::isfinite(without)) continue;
-      // Of n effects: |S|! (n - |S| - 1)! / n!, up to a factor that all have in common.
-      const double w = end ? 1 : 1 / Binomial(others.size(), part.size());
-      sum += w * (without - with), weight += w;
-    }
-    return weight > 0 ? std::clamp(sum / weight / gap, 0.0, 1.0) : 1;
-  }
-
- private:
-  static double Binomial(std::size_t n, std::size_t k) {
-    double result = 1;
-    for (std::size_t i = 1; i <= k; ++i) result *= static_cast<double>(n - k + i) / static_cast<double>(i);
-    return result;
-  }
-
-  double Error(const EffectSet& set) {
-    if (set == final_.effects) return final_.held_out_error;
-    Candidate* candidate = found_.ledger.Find(set);
-    if (!candidate) candidate = found_.ledger.Refit(set, final_, {}, {}, Effort::kTry);
-    if (!candidate) return kNaN;
-    ScoreCandidate(bench_, candidate);
-    return candidate->held_out_error;
-  }
-
-  const Workbench& bench_;
-  SearchResult& found_;
-  const Candidate& final_;
-};
-
 // The effects that are there, the largest share first.
 std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& found, const Candidate& final,
-                                         const BesideTorques& beside, std::vector<Statement>* statements) {
+                                         const BesideTorques& beside, Judgement* judgement) {
   std::vector<FoundEffect> effects;
   const auto sizes = EstimateSizes(bench, final, beside.widening);
-  GapShares shares(bench, found, final);
-  for (Statement& s : *statements) {
+  GapShares shares(bench, found, final, judgement->groups);
+  for (Statement& s : judgement->statements) {
     if (const auto bounds = beside.bounds.find(s.use); s.answer == Answer::kAbsent && bounds != beside.bounds.end())
       s.bounds = bounds->second;
     const auto place = sizes.find(s.use);
@@ -145,7 +96,11 @@ std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& f
                        .parameters = s.parameters,
                        .error_before = found.base->held_out_error,
                        .error_after = final.held_out_error,
-                       .share_of_gap = s.share_of_gap});
+                       .share_of_gap = s.share_of_gap.value});
+    if (s.group < 0) continue;
+    for (const EffectUse& other : judgement->groups[static_cast<std::size_t>(s.group)]) {
+      if (other != s.use && sizes.contains(other)) effects.back().together.push_back(other);
+    }
   }
   std::stable_sort(effects.begin(), effects.end(),
                    [](const auto& a, const auto& b) { return a.share_of_gap > b.share_of_gap; });
@@ -269,7 +224,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   result.closed = result.refit > result.floor
                       ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0)
                       : 0;
-  result.effects = DescribeEffects(bench, found, chosen, beside, &judgement.statements);
+  result.effects = DescribeEffects(bench, found, chosen, beside, &judgement);
   for (const Statement& s : judgement.statements) {
     if (s.group < 0 || s.answer != Answer::kPresent) continue;
     const auto& group = judgement.groups[static_cast<std::size_t>(s.group)];

@@ -45,6 +45,16 @@ std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& d
 
 std::string NameOf(const Explanation& explanation) { return explanation ? explanation->Text() : "none"; }
 
+std::string NameOfSet(const std::vector<EffectUse>& set) {
+  std::string name;
+  for (const auto& use : set) name += (name.empty() ? "" : " + ") + use.Text();
+  return name.empty() ? "none" : name;
+}
+
+std::string TogetherWith(const FoundEffect& found) {
+  return found.together.empty() ? "" : " together with " + NameOfSet(found.together);
+}
+
 std::string VerdictName(Verdict verdict) {
   switch (verdict) {
     case Verdict::kNone:

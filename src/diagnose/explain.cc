@@ -15,8 +15,8 @@ namespace {
 std::string ExplainEffects(const Diagnosis& d) {
   std::string text;
   for (const auto& found : d.effects) {
-    text += fmt::format("{} explains {:.0f} % of the gap that closes ({}; signature: {}). ", found.use.Text(),
-                        100 * found.share_of_gap, found.meaning, found.signature);
+    text += fmt::format("{}{} explains {:.0f} % of the gap that closes ({}; signature: {}). ", found.use.Text(),
+                        TogetherWith(found), 100 * found.share_of_gap, found.meaning, found.signature);
   }
   return text + fmt::format("With {} the held-out error is {:.3g}, {:.1f} times the noise",
                             d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);

@@ -4,100 +4,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <tuple>
 
-#include "src/core/collect.h"
 #include "src/core/statistics.h"
-#include "src/diagnose/discrepancy.h"
+#include "src/diagnose/evidence.h"
+#include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
-#include "src/fit/policy.h"
 
 namespace gapscope {
 namespace {
 
-double Log(double before, double after) {
-  const double most = kDiagnosePolicy.evidence.most_gain;
-  if (std::isinf(after)) return std::isinf(before) ? kNaN : -most;
-  return std::isinf(before) ? most : std::log(before / std::max(after, 1e-300));
-}
-
-// Errors of free runs as a gain; both beyond their signal: the motion was lost either way.
-double FreeGain(double before, double after) {
-  constexpr double kLost = 1;
-  return std::min(before, after) > kLost ? kNaN : 2 * Log(before, after);
-}
-
-// What the held-out logs gain, over its standard error: half seconds are independent.
-double ClearBy(const Workbench& bench, const Candidate& without, const Candidate& with) {
-  std::map<std::pair<std::size_t, long>, double> gains;
-  for (std::size_t l = 0; l < std::min(without.held_out.size(), with.held_out.size()); ++l) {
-    const LogReplay &a = without.held_out[l], &b = with.held_out[l];
-    for (std::size_t s = 0; s < std::min(a.signals.size(), b.signals.size()); ++s) {
-      const double weight = bench.weights[bench.data.held_out[l].measured[s].index];
-      for (std::size_t r = 0; r < a.time_s.size(); ++r) {
-        const double before = weight * (a.signals[s].predicted[r] - a.signals[s].measured[r]),
-                     after = weight * (b.signals[s].predicted[r] - b.signals[s].measured[r]);
-        if (std::isfinite(before) && std::isfinite(after))
-          gains[{l, std::lround(std::floor(a.time_s[r] / kFitPolicy.block_s))}] += before * before - after * after;
-      }
-    }
-  }
-  const auto values = Collect(gains, [](const auto& entry) { return entry.second; });
-  const Moments moments = MomentsOf(values);
-  return moments.deviation > 0 ? std::sqrt(static_cast<double>(values.size())) * moments.mean / moments.deviation : 0;
-}
-
 class Judging {
  public:
   Judging(const Workbench& bench, SearchResult& found, const Say& say)
-      : bench_(bench),
-        found_(found),
-        say_(say),
-        torques_(MakeTorques(bench)),
-        free_left_(FreeRunError(bench, *found.chosen)) {
-    ScoreCandidate(bench_, found_.chosen);
-  }
-
-  // Of members taken out as a whole.
-  StatementNumbers Numbers(const std::vector<EffectUse>& uses) {
-    say_("judging " + NameOfSet(uses));
-    EffectSet rest = found_.chosen->effects;
-    for (const EffectUse& use : uses) rest = Without(rest, use);
-    Candidate* without = found_.ledger.Find(rest);
-    if (!without || uses.size() > 1) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
-    if (!without) without = found_.base;
-    ScoreCandidate(bench_, without);
-    StatementNumbers numbers;
-    numbers.gain = Log(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
-    numbers.gain_held_out = Log(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
-    numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
-    numbers.clear = ClearBy(bench_, *without, *found_.chosen);
-    const auto all_are = [&](EffectCharacter character) {
-      return std::all_of(uses.begin(), uses.end(),
-                         [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).character == character; });
-    };
-    numbers.dry = all_are(EffectCharacter::kDryFriction);
-    numbers.second_mass = all_are(EffectCharacter::kSecondMass);
-    numbers.smooth = std::all_of(uses.begin(), uses.end(),
-                                 [&](const EffectUse& use) { return EffectOf(use, *bench_.rig).of_motion; });
-    if (torques_.empty()) return numbers;
-    const ColumnTable table = MakeColumnsOfFit(bench_, *without, *found_.chosen, uses, torques_);
-    if (!table.valid || table.trials.empty() || !Left().valid) return numbers;
-    const std::size_t residuals = without->problem->residuals();
-    numbers.discrepancy =
-        TorquesBeside(Left(), {}, residuals).likelihood - TorquesBeside(table, {}, residuals).likelihood;
-    const double floor = 0.5 * static_cast<double>(residuals);
-    const double held =
-        (without->train_cost - found_.chosen->train_cost) / std::max(without->train_cost - floor, 1e-9 * floor);
-    numbers.mimicry = Mimicry(table, torques_, std::min(held, 1.0));
-    return numbers;
-  }
+      : bench_(bench), found_(found), say_(say), evidence_(bench, found) {}
 
   Judgement Make() {
     Judgement result;
+    std::vector<Statement> dropped = Simplify();
     for (const Member& member : found_.members) result.statements.push_back(Of(member.use));
-    const std::vector<Statement> dropped = DropSpare(&result);
+    DropSpare(&result, &dropped);
     Couple(&result);
     AddRivals(&result);
     result.statements.insert(result.statements.end(), dropped.begin(), dropped.end());
@@ -111,23 +37,72 @@ class Judging {
   }
 
  private:
-  // What the chosen set leaves, with the torques' columns.
-  const ColumnTable& Left() {
-    if (left_of_ != found_.chosen) left_ = MakeColumns(bench_, *found_.chosen, {}, torques_);
-    left_of_ = found_.chosen;
-    return left_;
-  }
-
   Statement Of(const EffectUse& use) {
-    Statement statement{.use = use, .numbers = Numbers({use}), .rule = "its own evidence"};
+    say_("judging " + use.Text());
+    Statement statement{.use = use, .numbers = evidence_.Of({use}), .rule = "its own evidence"};
     Weigh({use}, &statement);
     return statement;
   }
 
+  // What a richer description does beyond a simpler one is a finding of its own: where that is not sure, the simpler
+  // one takes its place. One size for all places is simpler than one each, and so is an effect that another contains.
+  std::vector<Statement> Simplify() {
+    std::vector<Statement> dropped;
+    for (const EffectUse& use : found_.uses) {
+      if (use.on == kOnAll && !HasMember(use)) PutInPlace(OnEachPlace(use), use, &dropped);
+    }
+    for (const EffectUse& member : EffectSet(found_.chosen->effects)) {
+      EffectUse simple;
+      double least = kInfinity;
+      for (const EffectUse& use : found_.uses) {
+        if (!Contains(member, use, *bench_.rig, true) || HasMember(use)) continue;
+        const Candidate* tried = RefitInPlace(bench_, found_, {member}, use, Effort::kTaste);
+        if (tried && tried->train_cost < least) least = tried->train_cost, simple = use;
+      }
+      if (std::isfinite(least)) PutInPlace({member}, simple, &dropped);
+    }
+    return dropped;
+  }
+
+  // The members that are an effect on each of its places; empty: not on each.
+  std::vector<EffectUse> OnEachPlace(const EffectUse& all) const {
+    std::vector<EffectUse> each;
+    for (const std::string& place : PlacesOf(all, *bench_.rig)) each.push_back({all.effect, place});
+    const bool have = std::all_of(each.begin(), each.end(), [&](const EffectUse& use) { return HasMember(use); });
+    return have && each.size() > 1 ? each : std::vector<EffectUse>();
+  }
+
+  void PutInPlace(const std::vector<EffectUse>& members, const EffectUse& simple, std::vector<Statement>* dropped) {
+    Candidate* simpler = members.empty() ? nullptr : RefitInPlace(bench_, found_, members, simple, Effort::kTry);
+    if (!simpler) return;
+    say_("judging " + NameOfSet(members) + " beyond " + simple.Text());
+    Statement beyond{.numbers = evidence_.Of(members, simpler),
+                     .rule = "what it does beyond " + simple.Text() + " is not sure"};
+    Weigh(members, &beyond);
+    if (beyond.probability >= kDiagnosePolicy.probability.present) return;
+    const double rise = std::log(simpler->train_cost / found_.chosen->train_cost);
+    Member joined{.use = simple};
+    for (const EffectUse& use : members) {
+      beyond.use = use;
+      dropped->push_back(beyond);
+      const auto gone = std::find_if(found_.members.begin(), found_.members.end(),
+                                     [&](const Member& member) { return member.use == use; });
+      if (members.size() == 1) joined.rivals = gone->rivals;
+      found_.members.erase(gone);
+    }
+    for (Rival& rival : joined.rivals) rival.behind -= rise;
+    std::erase_if(joined.rivals, [&](const Rival& rival) { return rival.use == simple; });
+    found_.members.push_back(joined);
+    evidence_.Choose(simpler);
+  }
+
+  bool HasMember(const EffectUse& use) const {
+    return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& m) { return m.use == use; });
+  }
+
   // A member that is not sure and hardly gains takes evidence from those that it stands in for: it goes, the weakest
   // first, and they are judged without it.
-  std::vector<Statement> DropSpare(Judgement* result) {
-    std::vector<Statement> dropped;
+  void DropSpare(Judgement* result, std::vector<Statement>* dropped) {
     for (;;) {
       auto& all = result->statements;
       const auto least = std::min_element(all.begin(), all.end(), [](const Statement& a, const Statement& b) {
@@ -135,16 +110,14 @@ class Judging {
       });
       if (all.size() < 2 || least->probability >= kDiagnosePolicy.probability.present ||
           least->numbers.gain >= kDiagnosePolicy.search.tie)
-        return dropped;
+        return;
       const EffectSet rest = Without(found_.chosen->effects, least->use);
       Candidate* without = found_.ledger.Find(rest);
-      if (!without) return dropped;
+      if (!without) return;
       found_.ledger.Continue(without, Effort::kTry);
-      ScoreCandidate(bench_, without);
-      found_.chosen = without;
-      free_left_ = FreeRunError(bench_, *without);
-      dropped.push_back(*least);
-      dropped.back().rule = "hardly gains beside the others";
+      evidence_.Choose(without);
+      dropped->push_back(*least);
+      dropped->back().rule = "hardly gains beside the others";
       const EffectUse gone = least->use;
       all.erase(least);
       std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
@@ -185,7 +158,8 @@ class Judging {
     const double present = kDiagnosePolicy.probability.present;
     for (const auto& [imitated, x, y] : pairs) {
       if (std::max(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
-      Statement together{.numbers = Numbers({x->use, y->use}), .rule = "taken out together"};
+      say_("judging " + NameOfSet({x->use, y->use}));
+      Statement together{.numbers = evidence_.Of({x->use, y->use}), .rule = "taken out together"};
       Weigh({x->use, y->use}, &together);
       const double alone = std::max(x->numbers.gain, 0.0) + std::max(y->numbers.gain, 0.0);
       if (together.probability < present || alone > kDiagnosePolicy.evidence.alone * together.numbers.gain) continue;
@@ -270,7 +244,7 @@ class Judging {
     const Candidate &base = *found_.base, &chosen = *found_.chosen;
     VerdictEvidence& e = result->evidence;
     e.floors_before = base.held_out_floors;
-    e.free_run_before = &base == &chosen ? free_left_ : FreeRunError(bench_, base);
+    e.free_run_before = &base == &chosen ? evidence_.free_left() : FreeRunError(bench_, base);
     VerdictFacts facts{.floors_left = e.floors_before};
     double right = 1;
     for (const Statement& s : result->statements) {
@@ -290,10 +264,7 @@ class Judging {
   const Workbench& bench_;
   SearchResult& found_;
   const Say& say_;
-  std::vector<RandomTorque> torques_;
-  double free_left_;
-  ColumnTable left_;
-  const Candidate* left_of_ = nullptr;  // whose table that is
+  Evidence evidence_;
 };
 
 }  // namespace
@@ -306,9 +277,11 @@ double ProbabilityOf(const StatementNumbers& n) {
     if (std::isfinite(gain)) gains.push_back(gain);
   }
   const double gain = gains.empty() ? 0 : Median(gains);
-  const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0, 5.0);
+  const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0, 6.0);
   const double x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
-                   w.mimicry * std::log10(n.mimicry + 0.01) + w.discrepancy * evidence + (n.smooth ? w.smooth : 0);
+                   w.mimicry * std::log10(n.mimicry + 0.01) + w.discrepancy * evidence +
+                   w.clear * std::clamp(n.clear, -3.0, 2.0) + (n.smooth ? w.smooth : 0) + (n.dry ? w.dry : 0) +
+                   w.company * n.company;
   return 1 / (1 + std::exp(-x));
 }
 

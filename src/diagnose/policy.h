@@ -24,7 +24,10 @@ struct SearchPolicy {
   double tie = 0.1, tie_share = 0.05;  // what costs more by less than this, or this share of the member's gain, ties
   double simpler = 0.05;               // a richer effect that gains less over one that it contains gives way to it
   std::size_t jacobians = 24;          // kept, of the last fits: what the next ones begin with
-  std::size_t replays = 3000;          // of all training windows: what a diagnosis of normal effort may take
+  std::size_t replays = 6000;          // of all training windows: what a diagnosis of normal effort may take
+  // Shares of that until which sets are begun and added to, and until which effects are tried in each other's place.
+  // The rest is for judging, shares and intervals, which are never cut.
+  double until_grown = 0.35, until_exchanged = 0.8;
 };
 
 struct EvidencePolicy {
@@ -38,6 +41,7 @@ struct EvidencePolicy {
   double per_block = 4;                         // what half a second of residuals counts for
   double free_run_s = 20;                       // free runs: of logs twice as long as this only parts this long
   std::size_t free_runs = 8;                    // so many of them
+  std::size_t draws = 200;                      // of held-out half seconds, for the intervals of shares
   std::size_t sums = 300;                       // random torques in the residual's place
   double most_gain = 3;                         // above it a gain says nothing more
   double alone =
@@ -46,7 +50,8 @@ struct EvidencePolicy {
 
 // P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).
 struct ProbabilityPolicy {
-  double constant = -4.99, gain = 1.42, mimicry = -0.67, discrepancy = 1.11, smooth = -2.21;
+  double constant = -3.4, gain = 0.6, mimicry = -0.35, discrepancy = 0.4, clear = 0.35;
+  double smooth = -0.6, dry = 1.0, company = -0.6;
   double present = 0.5;  // least probability of an effect that is listed
 };
 

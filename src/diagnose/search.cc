@@ -6,6 +6,8 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
+#include "src/diagnose/diagnosis.h"
+#include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
 
 namespace gapscope {
@@ -73,8 +75,9 @@ class Searcher {
   }
 
  private:
-  bool Late(const char* what) {
-    if (!bench_.Late()) return false;
+  // Of the work, `share` may be spent when `what` begins.
+  bool Late(double share, const char* what) {
+    if (!bench_.Late(share)) return false;
     if (result_.cut.empty() || result_.cut.back() != what) result_.cut.emplace_back(what);
     return true;
   }
@@ -107,7 +110,7 @@ class Searcher {
         // More effects than the best smaller set must promise something. A single one need not: where an effect sets in
         // suddenly (a limit, a gap) its columns say little between their trial values.
         if ((size > 0 || !parent.effects.empty()) && std::log(best / set.cost) < kPolicy.promise) break;
-        if (Late("sets of effects")) return;
+        if (Late(kPolicy.until_grown, "sets of effects")) return;
         if (Candidate* candidate = RefitTrials(parent, table, set)) tasted.push_back(candidate);
       }
       if (!levels[size].empty()) best = std::min(best, levels[size].front().cost);
@@ -121,16 +124,9 @@ class Searcher {
                      [](const auto* a, const auto* b) { return Charged(*a) < Charged(*b); });
     if (tasted.size() > most) tasted.resize(most);
     for (Candidate* candidate : tasted) {
-      if (Late("fits of sets")) return;
+      if (Late(kPolicy.until_grown, "fits of sets")) return;
       if (!candidate->converged) result_.ledger.Continue(candidate, Effort::kTry);
     }
-  }
-
-  // Values of a trial's effect at its columns' coefficients, by the names of its parameters.
-  void SetValues(const Trial& trial, const BoundedSolution& solution, std::map<std::string, double>* values) const {
-    const auto at = ValuesAt(bench_, trial, Collect(trial.columns, [&](Eigen::Index c) { return solution.values[c]; }));
-    const auto placed = PlacedParameters(trial.use, *bench_.rig, bench_.scales);
-    for (std::size_t i = 0; i < placed.size(); ++i) (*values)[placed[i].name] = at[i];
   }
 
   Candidate* RefitTrials(const Candidate& parent, const ColumnTable& table, const TrialSet& set) {
@@ -140,7 +136,7 @@ class Searcher {
     for (const std::size_t t : set.trials) {
       const Trial& trial = table.trials[t];
       effects = With(effects, trial.use);
-      SetValues(trial, solution, &values);
+      SetValues(bench_, trial, solution, &values);
     }
     say_("refitting " + NameOfSet(effects));
     return result_.ledger.Refit(effects, parent, values, solution.values.head(table.gram.parameters), Effort::kTaste);
@@ -167,7 +163,7 @@ class Searcher {
       for (Candidate* leader : leaders) {
         if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) || !grown.insert(leader->effects).second)
           continue;
-        if (Late("additions")) return;
+        if (Late(kPolicy.until_grown, "additions")) return;
         say_("what could be added to " + NameOfSet(leader->effects));
         ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
         if (!table.valid) continue;
@@ -251,36 +247,8 @@ class Searcher {
     return uses;
   }
 
-  // Starts of a rival: its trial values by their cost where the leader stands.
   Candidate* RefitRival(const Member& member, const EffectUse& use) {
-    const ColumnTable& table = result_.columns;
-    const EffectSet set = With(Without(result_.chosen->effects, member.use), use);
-    // The trial that does best beside the other members, by arithmetic at the base.
-    std::vector<std::size_t> others;
-    for (const EffectUse& other : result_.chosen->effects) {
-      if (other == member.use) continue;
-      std::size_t best = table.trials.size();
-      double least = kInfinity;
-      for (std::size_t t = 0; t < table.trials.size(); ++t) {
-        if (table.trials[t].use != other) continue;
-        std::vector<std::size_t> tried = others;
-        tried.push_back(t);
-        if (const double cost = SetCost(table, tried); cost < least) least = cost, best = t;
-      }
-      if (best < table.trials.size()) others.push_back(best);
-    }
-    TrialSet best{.cost = kInfinity};
-    for (std::size_t t = 0; t < table.trials.size(); ++t) {
-      if (table.trials[t].use != use) continue;
-      std::vector<std::size_t> tried = others;
-      tried.push_back(t);
-      if (const double cost = SetCost(table, tried); cost < best.cost) best = {.trials = tried, .cost = cost};
-    }
-    if (best.trials.empty()) return nullptr;
-    const Trial& trial = table.trials[best.trials.back()];
-    std::map<std::string, double> values;
-    SetValues(trial, SolveSet(table, best.trials), &values);
-    Candidate* other = result_.ledger.Refit(set, *result_.chosen, values, {}, Effort::kTaste);
+    Candidate* other = RefitInPlace(bench_, result_, {member.use}, use, Effort::kTaste);
     if (other && !other->converged && Gain(*result_.chosen, *other) > -kPolicy.hopeless)
       result_.ledger.Continue(other, Effort::kTry);
     return other;
@@ -293,7 +261,7 @@ class Searcher {
       // One that hardly gains is not told apart from nothing.
       if (member.gain < kPolicy.tie) continue;
       for (const EffectUse& use : Shortlist(member)) {
-        if (Late("exchange")) return false;
+        if (Late(kPolicy.until_exchanged, "exchange")) return false;
         say_("trying " + use.Text() + " for " + member.use.Text());
         Candidate* other = RefitRival(member, use);
         if (!other) continue;
@@ -339,12 +307,6 @@ Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_i
   if (result->uneven && stop_if_uneven) return result;
   searcher.Find();
   return result;
-}
-
-std::string NameOfSet(const EffectSet& set) {
-  std::string name;
-  for (const auto& use : set) name += (name.empty() ? "" : " + ") + use.Text();
-  return name.empty() ? "none" : name;
 }
 
 }  // namespace gapscope

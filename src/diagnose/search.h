@@ -43,9 +43,6 @@ struct SearchResult {
 // simulated along the logs.
 Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
 
-// Name of a set: "cable_spring@arm + coulomb_friction@arm"; "none".
-std::string NameOfSet(const EffectSet& set);
-
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_DIAGNOSE_SEARCH_H_

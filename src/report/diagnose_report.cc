@@ -92,7 +92,10 @@ ordered_json Json(const Statement& s) {
                         {"prior", s.prior},
                         {"evidence", s.evidence},
                         {"parameters", parameters},
-                        {"share_of_gap", JsonNumber(s.share_of_gap)},
+                        {"share_of_gap",
+                         {{"value", JsonNumber(s.share_of_gap.value)},
+                          {"low", JsonNumber(s.share_of_gap.low)},
+                          {"high", JsonNumber(s.share_of_gap.high)}}},
                         {"group", s.group < 0 ? ordered_json() : ordered_json(s.group)},
                         {"rule", s.rule}};
   for (const auto& bound : s.bounds) entry["bound"][bound.key] = JsonNumber(bound.value);
@@ -106,7 +109,8 @@ ordered_json Json(const Statement& s) {
                         {"clear", JsonNumber(n.clear)},
                         {"smooth", n.smooth ? 1 : 0},
                         {"dry", n.dry ? 1 : 0},
-                        {"second_mass", n.second_mass ? 1 : 0}};
+                        {"second_mass", n.second_mass ? 1 : 0},
+                        {"company", n.company}};
   return entry;
 }
 
@@ -135,6 +139,8 @@ ordered_json PolicyJson() {
           {"search.simpler", policy.search.simpler},
           {"search.jacobians", policy.search.jacobians},
           {"search.replays", policy.search.replays},
+          {"search.until_grown", policy.search.until_grown},
+          {"search.until_exchanged", policy.search.until_exchanged},
           {"evidence.torques", policy.evidence.torques},
           {"evidence.free_form", policy.evidence.free_form},
           {"evidence.bound_deviations", policy.evidence.bound_deviations},
@@ -146,6 +152,7 @@ ordered_json PolicyJson() {
           {"evidence.per_block", policy.evidence.per_block},
           {"evidence.free_run_s", policy.evidence.free_run_s},
           {"evidence.free_runs", policy.evidence.free_runs},
+          {"evidence.draws", policy.evidence.draws},
           {"evidence.sums", policy.evidence.sums},
           {"evidence.most_gain", policy.evidence.most_gain},
           {"evidence.alone", policy.evidence.alone},
@@ -153,7 +160,10 @@ ordered_json PolicyJson() {
           {"probability.gain", policy.probability.gain},
           {"probability.mimicry", policy.probability.mimicry},
           {"probability.discrepancy", policy.probability.discrepancy},
+          {"probability.clear", policy.probability.clear},
           {"probability.smooth", policy.probability.smooth},
+          {"probability.dry", policy.probability.dry},
+          {"probability.company", policy.probability.company},
           {"probability.present", policy.probability.present},
           {"verdict.much_missing", policy.verdict.much_missing},
           {"verdict.retuned", policy.verdict.retuned}};
@@ -227,8 +237,8 @@ std::string ToTable(const DiagnoseRun& run) {
   const Diagnosis& d = run.diagnosis;
   std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
   for (const auto& found : d.effects) {
-    text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap\n", found.use.effect, found.use.on,
-                        found.probability, 100 * found.share_of_gap);
+    text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap{}\n", found.use.effect, found.use.on,
+                        found.probability, 100 * found.share_of_gap, TogetherWith(found));
     for (const auto& p : found.parameters) {
       text += fmt::format("    {:<28} {:>11.4g}   {:.4g} .. {:.4g} {}\n", p.key, p.value, p.low, p.high, p.unit);
       if (!p.ratio.to.empty())

@@ -193,8 +193,11 @@ Headline HeadlineOf(const DiagnoseRun& run) {
     const bool last = i + 1 == d.effects.size();
     const double error =
         last ? (std::isfinite(d.final) ? d.final : d.effects[i].error_after) : d.effects[i + 1].error_before;
+    // A group has one share: it stands where the last of its members is added.
+    const auto& together = d.effects[i].together;
+    const bool goes_on = !last && std::find(together.begin(), together.end(), d.effects[i + 1].use) != together.end();
     AddStage(&headline.stages, "with " + found[i], error, last ? Stage::Mark::kBest : Stage::Mark::kNone,
-             d.effects[i].share_of_gap);
+             goes_on ? kNaN : d.effects[i].share_of_gap);
   }
   if (d.effects.empty() && d.final != d.refit) AddStage(&headline.stages, "final", d.final, Stage::Mark::kBest);
   AddStage(&headline.stages, "floor of the sensors", d.floor, Stage::Mark::kFloor);

@@ -1,0 +1,105 @@
+#include "src/diagnose/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/collect.h"
+#include "src/core/statistics.h"
+#include "src/diagnose/block_squares.h"
+#include "src/diagnose/discrepancy.h"
+#include "src/diagnose/policy.h"
+
+namespace gapscope {
+namespace {
+
+double LogRatio(double before, double after) {
+  const double most = kDiagnosePolicy.evidence.most_gain;
+  if (std::isinf(after)) return std::isinf(before) ? kNaN : -most;
+  return std::isinf(before) ? most : std::log(before / std::max(after, 1e-300));
+}
+
+// Errors of free runs as a gain; both beyond their signal: the motion was lost either way.
+double FreeGain(double before, double after) {
+  constexpr double kLost = 1;
+  return std::min(before, after) > kLost ? kNaN : 2 * LogRatio(before, after);
+}
+
+// What the held-out logs gain, over its standard error: half seconds are independent.
+double ClearBy(const Workbench& bench, const Candidate& without, const Candidate& with) {
+  const auto weight = [&](std::size_t log, std::size_t signal) {
+    const double w = bench.weights[bench.data.held_out[log].measured[signal].index];
+    return w * w;
+  };
+  BlockSquares gains = SquaresByBlock(without.held_out, weight);
+  for (const auto& [block, square] : SquaresByBlock(with.held_out, weight)) gains[block] -= square;
+  const auto values = Collect(gains, [](const auto& entry) { return entry.second; });
+  const Moments moments = MomentsOf(values);
+  return moments.deviation > 0 ? std::sqrt(static_cast<double>(values.size())) * moments.mean / moments.deviation : 0;
+}
+
+}  // namespace
+
+Evidence::Evidence(const Workbench& bench, SearchResult& found)
+    : bench_(bench), found_(found), torques_(MakeTorques(bench)), free_left_(FreeRunError(bench, *found.chosen)) {
+  ScoreCandidate(bench_, found_.chosen);
+}
+
+void Evidence::Choose(Candidate* candidate) {
+  ScoreCandidate(bench_, candidate);
+  found_.chosen = candidate;
+  free_left_ = FreeRunError(bench_, *candidate);
+}
+
+void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const {
+  const auto all = [&](const auto& is) {
+    return std::all_of(uses.begin(), uses.end(),
+                       [&](const EffectUse& use) { return is(EffectOf(use, *bench_.rig)); });
+  };
+  const auto is_dry = [](const Effect& effect) { return effect.character == EffectCharacter::kDryFriction; };
+  numbers->dry = all(is_dry);
+  numbers->second_mass = all([](const Effect& effect) { return effect.character == EffectCharacter::kSecondMass; });
+  numbers->smooth = all([](const Effect& effect) { return effect.of_motion; });
+  if (!numbers->smooth || numbers->dry) return;
+  for (const EffectUse& use : found_.chosen->effects) {
+    const Effect& other = EffectOf(use, *bench_.rig);
+    numbers->company += use.on == uses.front().on && std::find(uses.begin(), uses.end(), use) == uses.end() &&
+                        other.of_motion && !is_dry(other);
+  }
+}
+
+StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses) {
+  EffectSet rest = found_.chosen->effects;
+  for (const EffectUse& use : uses) rest = Without(rest, use);
+  Candidate* without = found_.ledger.Find(rest);
+  if (!without || uses.size() > 1) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
+  return Of(uses, without ? without : found_.base);
+}
+
+StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without) {
+  ScoreCandidate(bench_, without);
+  StatementNumbers numbers;
+  numbers.gain = LogRatio(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
+  numbers.gain_held_out = LogRatio(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
+  numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
+  numbers.clear = ClearBy(bench_, *without, *found_.chosen);
+  SetCharacter(uses, &numbers);
+  if (torques_.empty()) return numbers;
+  const ColumnTable table = MakeColumnsOfFit(bench_, *without, *found_.chosen, uses, torques_);
+  if (!table.valid || table.trials.empty() || !Left().valid) return numbers;
+  const std::size_t residuals = without->problem->residuals();
+  numbers.discrepancy =
+      TorquesBeside(Left(), {}, residuals).likelihood - TorquesBeside(table, {}, residuals).likelihood;
+  const double floor = 0.5 * static_cast<double>(residuals);
+  const double held =
+      (without->train_cost - found_.chosen->train_cost) / std::max(without->train_cost - floor, 1e-9 * floor);
+  numbers.mimicry = Mimicry(table, torques_, std::min(held, 1.0));
+  return numbers;
+}
+
+const ColumnTable& Evidence::Left() {
+  if (left_of_ != found_.chosen) left_ = MakeColumns(bench_, *found_.chosen, {}, torques_);
+  left_of_ = found_.chosen;
+  return left_;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,43 @@
+// The numbers that statements rest on: sets with and without effects, both refitted, on logs that were fitted and on
+// those that were not, in free runs, and beside random torques.
+#ifndef GAPSCOPE_DIAGNOSE_EVIDENCE_H_
+#define GAPSCOPE_DIAGNOSE_EVIDENCE_H_
+
+#include <vector>
+
+#include "src/diagnose/columns.h"
+#include "src/diagnose/diagnosis.h"
+#include "src/diagnose/search.h"
+
+namespace gapscope {
+
+class Evidence {
+ public:
+  // Both must outlive this.
+  Evidence(const Workbench& bench, SearchResult& found);
+
+  // Of members of the chosen set, taken out as a whole.
+  StatementNumbers Of(const std::vector<EffectUse>& uses);
+  // Of what the chosen set has more than another one, `uses` for it.
+  StatementNumbers Of(const std::vector<EffectUse>& uses, Candidate* without);
+  // Another set becomes the chosen one.
+  void Choose(Candidate* candidate);
+  double free_left() const { return free_left_; }  // FreeRunError of the chosen set
+
+ private:
+  // What kind of effect the numbers are of, and how many more of the kind are in the chosen set.
+  void SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const;
+  // What the chosen set leaves, with the torques' columns.
+  const ColumnTable& Left();
+
+  const Workbench& bench_;
+  SearchResult& found_;
+  std::vector<RandomTorque> torques_;
+  double free_left_;
+  ColumnTable left_;
+  const Candidate* left_of_ = nullptr;  // whose table that is
+};
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_EVIDENCE_H_

@@ -1,0 +1,56 @@
+#include "src/diagnose/exchange.h"
+
+#include "src/core/collect.h"
+#include "src/core/statistics.h"
+
+namespace gapscope {
+namespace {
+
+// The trial of `use` that costs least beside `others`, at the end of these; false: it has none.
+bool AddBestTrial(const ColumnTable& table, const EffectUse& use, std::vector<std::size_t>* others) {
+  std::size_t best = table.trials.size();
+  double least = kInfinity;
+  for (std::size_t t = 0; t < table.trials.size(); ++t) {
+    if (table.trials[t].use != use) continue;
+    std::vector<std::size_t> tried = *others;
+    tried.push_back(t);
+    if (const double cost = SetCost(table, tried); cost < least) least = cost, best = t;
+  }
+  if (best < table.trials.size()) others->push_back(best);
+  return best < table.trials.size();
+}
+
+EffectSet Rest(const SearchResult& found, const EffectSet& members) {
+  EffectSet rest = found.chosen->effects;
+  for (const EffectUse& use : members) rest = Without(rest, use);
+  return rest;
+}
+
+// The trials of the chosen set with `use` in the place of `members`, that of `use` last; empty: it has no column.
+std::vector<std::size_t> TrialsInPlace(const SearchResult& found, const EffectSet& members, const EffectUse& use) {
+  std::vector<std::size_t> trials;
+  for (const EffectUse& other : Rest(found, members)) AddBestTrial(found.columns, other, &trials);
+  if (!AddBestTrial(found.columns, use, &trials)) trials.clear();
+  return trials;
+}
+
+}  // namespace
+
+void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution& solution,
+               std::map<std::string, double>* values) {
+  const auto at = ValuesAt(bench, trial, Collect(trial.columns, [&](Eigen::Index c) { return solution.values[c]; }));
+  const auto placed = PlacedParameters(trial.use, *bench.rig, bench.scales);
+  for (std::size_t i = 0; i < placed.size(); ++i) (*values)[placed[i].name] = at[i];
+}
+
+Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
+                        Effort effort) {
+  const ColumnTable& table = found.columns;
+  const auto trials = TrialsInPlace(found, members, use);
+  if (trials.empty()) return nullptr;
+  std::map<std::string, double> values;
+  SetValues(bench, table.trials[trials.back()], SolveSet(table, trials), &values);
+  return found.ledger.Refit(With(Rest(found, members), use), *found.chosen, values, {}, effort);
+}
+
+}  // namespace gapscope

@@ -1,0 +1,24 @@
+// One effect of a set in another one's place.
+#ifndef GAPSCOPE_DIAGNOSE_EXCHANGE_H_
+#define GAPSCOPE_DIAGNOSE_EXCHANGE_H_
+
+#include <map>
+#include <string>
+
+#include "src/diagnose/search.h"
+
+namespace gapscope {
+
+// Values of a trial's effect at its columns' coefficients, by the names of its parameters.
+void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution& solution,
+               std::map<std::string, double>* values);
+
+// The chosen set with `use` in the place of `members`, begun from the chosen set's optimum: a set that starts elsewhere and is
+// not at its end looks exactly like a worse one. `use` starts at the trial that does best beside the other members, by
+// arithmetic at the base. Null: it has no column there, or the set cannot be built or simulated.
+Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
+                        Effort effort);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_EXCHANGE_H_

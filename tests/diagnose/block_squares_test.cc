@@ -1,0 +1,44 @@
+#include "src/diagnose/block_squares.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "src/core/statistics.h"
+
+namespace gapscope {
+namespace {
+
+// `rows` rows, 0.1 s apart, that are predicted `off` too large.
+LogReplay Log(std::size_t rows, double off, bool scored_too) {
+  LogReplay log;
+  for (const bool scored : {true, scored_too}) {
+    SignalTrace trace{.signal = "angle", .scored = scored};
+    for (std::size_t r = 0; r < rows; ++r) {
+      trace.measured.push_back(std::sin(0.7 * static_cast<double>(r)));
+      trace.predicted.push_back(r == 0 ? kNaN : trace.measured.back() + off * (1 + static_cast<double>(r % 3)));
+    }
+    log.signals.push_back(trace);
+  }
+  for (std::size_t r = 0; r < rows; ++r) log.time_s.push_back(0.1 * static_cast<double>(r) + 0.05);
+  return log;
+}
+
+TEST(BlockSquaresTest, NormalisedOnesAddUpToTheReplaysError) {
+  const std::vector<LogReplay> logs = {Log(40, 0.3, true), Log(25, 0.1, false)};
+  const BlockSquares squares = NormalisedSquares(logs);
+  double sum = 0;
+  for (const auto& [block, square] : squares) sum += square;
+  EXPECT_NEAR(std::sqrt(sum), ReplayError(logs), 1e-12);
+  EXPECT_EQ(squares.size(), 8U + 5U);  // 4 s and 2.5 s
+}
+
+TEST(BlockSquaresTest, HalfSecondsHoldWhatWasMissedInThem) {
+  LogReplay log = Log(20, 0, true);
+  log.signals[0].predicted[7] += 2;  // at 0.75 s
+  const BlockSquares squares = SquaresByBlock({log}, [](std::size_t, std::size_t s) { return s == 0 ? 3 : 1; });
+  for (const auto& [block, square] : squares) EXPECT_NEAR(square, block.second == 1 ? 12 : 0, 1e-12);
+}
+
+}  // namespace
+}  // namespace gapscope

@@ -2,7 +2,7 @@
 """What a probability should be, from banks of twin cases: logistic fits of "right" on the evidence.
 
     scripts/blind/calibrate.py out/blind/902 [out/blind/...]
-    scripts/blind/calibrate.py --features middle_gain:-1:3,log_mimicry,log_discrepancy:-1:5,smooth out/blind/rough_1
+    scripts/blind/calibrate.py --features middle_gain:-1:3,log_discrepancy:-1:6,clear:-3:2,smooth,dry out/blind/rough_1
 
 Without --features: of verdicts, one fit for each kind. With: of statements, on the named members of each one's
 `numbers` (missing: 0; NAME:LOW:HIGH clips; those of DERIVED are made of them): `ProbabilityPolicy` of
@@ -20,7 +20,6 @@ PRIOR = 2.0
 DERIVED = {  # as ProbabilityOf in src/diagnose/judge.cc has them
     "middle_gain": lambda n: stats.median(
         n[k] for k in ("gain", "gain_held_out", "gain_free") if n[k] is not None),
-    "log_mimicry": lambda n: math.log10(n["mimicry"] + 0.01),
     "log_discrepancy": lambda n: math.copysign(math.log1p(abs(n["discrepancy"])), n["discrepancy"]),
 }
 

@@ -144,7 +144,7 @@ BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::ve
   const std::size_t residuals = final.problem->residuals();
   const ColumnTable table = MakeColumns(bench, final, uses, MakeTorques(bench));
   if (table.valid && !table.torques.empty()) {
-    const TorquePrior torques = TorquesBeside(table, {}, residuals);
+    const TorquePrior torques = TorquesBeside(table, residuals);
     result.widening = Widening(table, torques);
     for (const EffectUse& use : uses) {
       if (auto bounds = BoundsOfEffect(bench, table, use, torques); !bounds.empty()) result.bounds[use] = bounds;
@@ -152,7 +152,7 @@ BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::ve
   }
   const ColumnTable free_form = MakeColumns(bench, final, {}, MakeFreeForm(bench));
   if (free_form.valid && !free_form.torques.empty())
-    result.free_form = FreeFormShare(free_form, TorquesBeside(free_form, {}, residuals));
+    result.free_form = FreeFormShare(free_form, TorquesBeside(free_form, residuals));
   final.derivatives.reset();
   return result;
 }

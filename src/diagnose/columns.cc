@@ -156,12 +156,12 @@ Eigen::MatrixXd Reduce(const ColumnTable& table) {
   return reduced;
 }
 
-ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, const std::vector<RandomTorque>& torques) {
+ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, const std::vector<ProbeTorque>& torques) {
   ColumnTable table{.trials = std::move(wanted.trials)};
-  for (const RandomTorque& torque : torques) {
+  for (const ProbeTorque& torque : torques) {
     table.torques.push_back(wanted.first + static_cast<Eigen::Index>(wanted.columns.size()));
     wanted.columns.push_back(
-        {.name = "torque", .child = parent.problem.get(), .values = parent.values, .probe = torque.probe});
+        {.name = "torque", .child = parent.problem.get(), .values = parent.values, .probe = torque});
   }
   const auto make = [&] {
     return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01}, parent.derivatives.get());
@@ -236,9 +236,9 @@ DriveMotion DriveOf(const Workbench& bench, int joint) {
 
 // `count` a joint, in thirds of angle, of speed and of both. `free_form`: of both alone, and of the command in two of
 // three.
-std::vector<RandomTorque> DrawTorques(const Workbench& bench, std::size_t count, bool free_form) {
+std::vector<ProbeTorque> DrawTorques(const Workbench& bench, std::size_t count, bool free_form) {
   const EvidencePolicy& policy = kDiagnosePolicy.evidence;
-  std::vector<RandomTorque> torques;
+  std::vector<ProbeTorque> torques;
   std::mt19937_64 random(free_form ? 8 : 7);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> phase(0, 2 * std::numbers::pi);
@@ -250,9 +250,9 @@ std::vector<RandomTorque> DrawTorques(const Workbench& bench, std::size_t count,
     if (!(motion.angle_deviation > 0) || !(motion.speed_deviation > 0)) continue;
     const DriveMotion drive = free_form ? DriveOf(bench, joint) : DriveMotion{};
     for (std::size_t i = 0; i < count; ++i) {
-      const auto of = free_form ? RandomTorque::Of::kBoth : static_cast<RandomTorque::Of>(3 * i / count);
-      const double a = of == RandomTorque::Of::kSpeed ? 0 : policy.angle_waves * normal(random),
-                   b = of == RandomTorque::Of::kAngle ? 0 : policy.speed_waves * normal(random);
+      const std::size_t third = free_form ? 2 : 3 * i / count;  // of angle, of speed, of both
+      const double a = third == 1 ? 0 : policy.angle_waves * normal(random),
+                   b = third == 0 ? 0 : policy.speed_waves * normal(random);
       ProbeTorque probe{.joint = joint,
                         .amplitude_n_m = policy.torque_share * bench.scales.at(name).torque_n_m,
                         .per_rad = a / motion.angle_deviation,
@@ -263,7 +263,7 @@ std::vector<RandomTorque> DrawTorques(const Workbench& bench, std::size_t count,
         probe.actuator = drive.actuator;
         probe.per_command = policy.speed_waves * normal(random) / drive.deviation;
       }
-      torques.push_back({.of = of, .probe = probe});
+      torques.push_back(probe);
     }
   }
   return torques;
@@ -271,16 +271,16 @@ std::vector<RandomTorque> DrawTorques(const Workbench& bench, std::size_t count,
 
 }  // namespace
 
-std::vector<RandomTorque> MakeTorques(const Workbench& bench) {
+std::vector<ProbeTorque> MakeTorques(const Workbench& bench) {
   return DrawTorques(bench, kDiagnosePolicy.evidence.torques, false);
 }
 
-std::vector<RandomTorque> MakeFreeForm(const Workbench& bench) {
+std::vector<ProbeTorque> MakeFreeForm(const Workbench& bench) {
   return DrawTorques(bench, kDiagnosePolicy.evidence.free_form, true);
 }
 
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
-                        const std::vector<RandomTorque>& torques, const ColumnTable* scan) {
+                        const std::vector<ProbeTorque>& torques, const ColumnTable* scan) {
   Wanted wanted = WantedOf(parent);
   std::vector<std::unique_ptr<Candidate>> children;  // until the columns are made
   for (std::size_t u = 0; u < uses.size(); ++u) {
@@ -292,22 +292,6 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
     children.push_back(std::make_unique<Candidate>(std::move(made).value()));
     AddTrials(bench, *children.back(), uses[u], u, scan, &wanted);
   }
-  return Finish(bench, parent, std::move(wanted), torques);
-}
-
-ColumnTable MakeColumnsOfFit(const Workbench& bench, Candidate& parent, Candidate& child,
-                             const std::vector<EffectUse>& uses, const std::vector<RandomTorque>& torques) {
-  Wanted wanted = WantedOf(parent);
-  Trial fitted{.use = uses.front()};
-  for (const EffectUse& use : uses) {
-    std::vector<double> values;
-    for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales))
-      values.push_back(child.values[child.model->IndexOf(p.name)]);
-    fitted.columns.push_back(wanted.Add(use.Text(), child, use, bench, values));
-  }
-  wanted.trials.push_back(std::move(fitted));
-  if (uses.size() == 1 && TrialValues(bench, uses.front(), nullptr).size() <= kDiagnosePolicy.search.scan)
-    AddTrials(bench, child, uses.front(), 0, nullptr, &wanted);
   return Finish(bench, parent, std::move(wanted), torques);
 }
 

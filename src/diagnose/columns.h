@@ -27,15 +27,11 @@ struct Trial {
   std::vector<Eigen::Index> columns;
 };
 
-// A random smooth torque on a joint.
-struct RandomTorque {
-  enum class Of { kAngle, kSpeed, kBoth } of = Of::kAngle;
-  ProbeTorque probe;
-};
-// The same ones in every call. Joints: those of measured signals.
-std::vector<RandomTorque> MakeTorques(const Workbench& bench);
+// Random smooth torques on the joints of measured signals, in thirds of angle, of speed and of both. The same ones in
+// every call.
+std::vector<ProbeTorque> MakeTorques(const Workbench& bench);
 // More of them, of the drive's command as well: together nearly any smooth torque.
-std::vector<RandomTorque> MakeFreeForm(const Workbench& bench);
+std::vector<ProbeTorque> MakeFreeForm(const Workbench& bench);
 
 struct ColumnTable {
   std::vector<Trial> trials;
@@ -54,12 +50,7 @@ struct ColumnTable {
 // trial. `scan`: a table at the base model, null: none; an effect of very many trials is tried at those that did best
 // there (SearchPolicy::scan).
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
-                        const std::vector<RandomTorque>& torques, const ColumnTable* scan = nullptr);
-// Effects as they are fitted in `child`, beside the parent that lacks them: one trial with a column each. A single one
-// has its trial values too.
-ColumnTable MakeColumnsOfFit(const Workbench& bench, Candidate& parent, Candidate& child,
-                             const std::vector<EffectUse>& uses, const std::vector<RandomTorque>& torques);
-
+                        const std::vector<ProbeTorque>& torques, const ColumnTable* scan = nullptr);
 // Values of an effect's parameters (in the order of PlacedParameters) at coefficients of its columns.
 std::vector<double> ValuesAt(const Workbench& bench, const Trial& trial, std::span<const double> coefficients);
 

@@ -67,12 +67,9 @@ struct StatementNumbers {
   double gain_held_out = 0;  // the same two fits on logs that they did not see
   double gain_free = 0;      // likewise, each log one free run; NaN: it tells nothing
   double discrepancy = 0;    // gain in log marginal likelihood beside random torques
-  double mimicry = 1;        // share of random torques that the effect would hold as much of
   double clear = 0;          // held-out gain over its standard error, by half seconds
   bool smooth = false;       // a function of a joint's own motion: what roughness looks like
   bool dry = false;          // dry friction: of these the one with a jump
-  bool second_mass = false;  // brings a motor side, whose start in each window is free
-  int company = 0;           // of a smooth one that is not dry friction: others of the set on the same joint
 };
 
 // Share of the gap that closes, with the interval that 95 of 100 draws of the held-out logs' half seconds are in.

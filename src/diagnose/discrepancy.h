@@ -17,12 +17,8 @@ struct TorquePrior {
 };
 // `m`: products of [torques | residual], all else taken out.
 TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double share);
-// The same of a table, with `columns` taken out too. `residuals`: numbers of the logs.
-TorquePrior TorquesBeside(const ColumnTable& table, std::span<const Eigen::Index> columns, std::size_t residuals);
-
-// Of random sums of torques in the residual's place: the share of which one of the trials holds at least `held` (of the
-// sum's square), with its own sign.
-double Mimicry(const ColumnTable& table, const std::vector<RandomTorque>& torques, double held);
+// The same of a table. `residuals`: numbers of the logs.
+TorquePrior TorquesBeside(const ColumnTable& table, std::size_t residuals);
 
 }  // namespace gapscope
 

@@ -45,26 +45,22 @@ Evidence::Evidence(const Workbench& bench, SearchResult& found)
 }
 
 void Evidence::Choose(Candidate* candidate) {
+  Finish(candidate);
   ScoreCandidate(bench_, candidate);
   found_.chosen = candidate;
   free_left_ = FreeRunError(bench_, *candidate);
 }
 
+void Evidence::Finish(Candidate* candidate) {
+  if (!candidate->converged && finished_.insert(candidate).second) found_.ledger.Continue(candidate, Effort::kFinish);
+}
+
 void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const {
   const auto all = [&](const auto& is) {
-    return std::all_of(uses.begin(), uses.end(),
-                       [&](const EffectUse& use) { return is(EffectOf(use, *bench_.rig)); });
+    return std::all_of(uses.begin(), uses.end(), [&](const EffectUse& use) { return is(EffectOf(use, *bench_.rig)); });
   };
-  const auto is_dry = [](const Effect& effect) { return effect.character == EffectCharacter::kDryFriction; };
-  numbers->dry = all(is_dry);
-  numbers->second_mass = all([](const Effect& effect) { return effect.character == EffectCharacter::kSecondMass; });
+  numbers->dry = all([](const Effect& effect) { return effect.character == EffectCharacter::kDryFriction; });
   numbers->smooth = all([](const Effect& effect) { return effect.of_motion; });
-  if (!numbers->smooth || numbers->dry) return;
-  for (const EffectUse& use : found_.chosen->effects) {
-    const Effect& other = EffectOf(use, *bench_.rig);
-    numbers->company += use.on == uses.front().on && std::find(uses.begin(), uses.end(), use) == uses.end() &&
-                        other.of_motion && !is_dry(other);
-  }
 }
 
 StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses) {
@@ -76,6 +72,7 @@ StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses) {
 }
 
 StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without) {
+  Finish(without);
   ScoreCandidate(bench_, without);
   StatementNumbers numbers;
   numbers.gain = LogRatio(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
@@ -84,15 +81,10 @@ StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses, Candidate* wit
   numbers.clear = ClearBy(bench_, *without, *found_.chosen);
   SetCharacter(uses, &numbers);
   if (torques_.empty()) return numbers;
-  const ColumnTable table = MakeColumnsOfFit(bench_, *without, *found_.chosen, uses, torques_);
-  if (!table.valid || table.trials.empty() || !Left().valid) return numbers;
+  const ColumnTable table = MakeColumns(bench_, *without, {}, torques_);
+  if (!table.valid || !Left().valid) return numbers;
   const std::size_t residuals = without->problem->residuals();
-  numbers.discrepancy =
-      TorquesBeside(Left(), {}, residuals).likelihood - TorquesBeside(table, {}, residuals).likelihood;
-  const double floor = 0.5 * static_cast<double>(residuals);
-  const double held =
-      (without->train_cost - found_.chosen->train_cost) / std::max(without->train_cost - floor, 1e-9 * floor);
-  numbers.mimicry = Mimicry(table, torques_, std::min(held, 1.0));
+  numbers.discrepancy = TorquesBeside(Left(), residuals).likelihood - TorquesBeside(table, residuals).likelihood;
   return numbers;
 }
 

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_EVIDENCE_H_
 #define GAPSCOPE_DIAGNOSE_EVIDENCE_H_
 
+#include <set>
 #include <vector>
 
 #include "src/diagnose/columns.h"
@@ -25,15 +26,18 @@ class Evidence {
   double free_left() const { return free_left_; }  // FreeRunError of the chosen set
 
  private:
-  // What kind of effect the numbers are of, and how many more of the kind are in the chosen set.
+  // A fit that is not at its end promises, by its columns, what it does not reach. Once each.
+  void Finish(Candidate* candidate);
+  // What kind of effect the numbers are of.
   void SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const;
   // What the chosen set leaves, with the torques' columns.
   const ColumnTable& Left();
 
   const Workbench& bench_;
   SearchResult& found_;
-  std::vector<RandomTorque> torques_;
+  std::vector<ProbeTorque> torques_;
   double free_left_;
+  std::set<const Candidate*> finished_;
   ColumnTable left_;
   const Candidate* left_of_ = nullptr;  // whose table that is
 };

@@ -13,9 +13,9 @@ namespace gapscope {
 void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution& solution,
                std::map<std::string, double>* values);
 
-// The chosen set with `use` in the place of `members`, begun from the chosen set's optimum: a set that starts elsewhere and is
-// not at its end looks exactly like a worse one. `use` starts at the trial that does best beside the other members, by
-// arithmetic at the base. Null: it has no column there, or the set cannot be built or simulated.
+// The chosen set with `use` in the place of `members`, begun from the chosen set's optimum: a set that starts elsewhere
+// and is not at its end looks exactly like a worse one. `use` starts at the trial that does best beside the other
+// members, by arithmetic at the base. Null: it has no column there, or the set cannot be built or simulated.
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort);
 

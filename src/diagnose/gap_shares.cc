@@ -104,7 +104,9 @@ ShareOfGap GapShares::Of(const EffectUse& use) {
   }
   const double value = shares.front();
   shares.erase(shares.begin());
-  return {.value = value, .low = std::min(value, Quantile(shares, 0.025)), .high = std::max(value, Quantile(shares, 0.975))};
+  return {.value = value,
+          .low = std::min(value, Quantile(shares, 0.025)),
+          .high = std::max(value, Quantile(shares, 0.975))};
 }
 
 }  // namespace gapscope

@@ -143,7 +143,8 @@ class Judging {
   }
 
   // Members that stand in for each other, neither of them sure alone, are judged by taking both out, the nearest pairs
-  // first. Most of what they gain must show only then: else the stronger one would lend the weaker one its evidence.
+  // first. Most of what they gain must show only then, or both must gain alike: else the stronger one would lend the
+  // weaker one its evidence.
   void Couple(Judgement* result) {
     constexpr double kImitates = 0.5;
     std::vector<std::tuple<double, Statement*, Statement*>> pairs;
@@ -161,8 +162,10 @@ class Judging {
       say_("judging " + NameOfSet({x->use, y->use}));
       Statement together{.numbers = evidence_.Of({x->use, y->use}), .rule = "taken out together"};
       Weigh({x->use, y->use}, &together);
-      const double alone = std::max(x->numbers.gain, 0.0) + std::max(y->numbers.gain, 0.0);
-      if (together.probability < present || alone > kDiagnosePolicy.evidence.alone * together.numbers.gain) continue;
+      const auto [less, more] = std::minmax({std::max(x->numbers.gain, 0.0), std::max(y->numbers.gain, 0.0)});
+      const bool carried = less < kDiagnosePolicy.evidence.alike * more &&
+                           less + more > kDiagnosePolicy.evidence.alone * together.numbers.gain;
+      if (together.probability < present || carried) continue;
       together.group = static_cast<int>(result->groups.size());
       result->groups.push_back({x->use, y->use});
       for (Statement* s : {x, y}) {
@@ -277,11 +280,11 @@ double ProbabilityOf(const StatementNumbers& n) {
     if (std::isfinite(gain)) gains.push_back(gain);
   }
   const double gain = gains.empty() ? 0 : Median(gains);
-  const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0, 6.0);
-  const double x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
-                   w.mimicry * std::log10(n.mimicry + 0.01) + w.discrepancy * evidence +
-                   w.clear * std::clamp(n.clear, -3.0, 2.0) + (n.smooth ? w.smooth : 0) + (n.dry ? w.dry : 0) +
-                   w.company * n.company;
+  const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0,
+                                     w.most_discrepancy),
+               clear = std::clamp(n.clear, w.least_clear, w.most_clear),
+               x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
+                   w.discrepancy * evidence + w.clear * clear + (n.smooth ? w.smooth : 0) + (n.dry ? w.dry : 0);
   return 1 / (1 + std::exp(-x));
 }
 

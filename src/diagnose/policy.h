@@ -42,17 +42,17 @@ struct EvidencePolicy {
   double free_run_s = 20;                       // free runs: of logs twice as long as this only parts this long
   std::size_t free_runs = 8;                    // so many of them
   std::size_t draws = 200;                      // of held-out half seconds, for the intervals of shares
-  std::size_t sums = 300;                       // random torques in the residual's place
   double most_gain = 3;                         // above it a gain says nothing more
-  double alone =
-      0.5;  // most of a pair's gain that shows when one of the two is taken out, for the two to be told as one
+  // For two to be told as one: most of their gain that shows when one of them is taken out, or least share of the
+  // larger gain that the lesser one is.
+  double alone = 0.5, alike = 0.5;
 };
 
 // P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).
 struct ProbabilityPolicy {
-  double constant = -3.4, gain = 0.6, mimicry = -0.35, discrepancy = 0.4, clear = 0.35;
-  double smooth = -0.6, dry = 1.0, company = -0.6;
-  double present = 0.5;  // least probability of an effect that is listed
+  double constant = -3.5, gain = 0.85, discrepancy = 0.6, clear = 0.4, smooth = -1.2, dry = 1.8;
+  double most_discrepancy = 6, most_clear = 2, least_clear = -3;  // beyond them they say nothing more
+  double present = 0.5;                                           // least probability of an effect that is listed
 };
 
 struct VerdictPolicy {

@@ -105,12 +105,9 @@ ordered_json Json(const Statement& s) {
                         {"gain_held_out", JsonNumber(n.gain_held_out)},
                         {"gain_free", JsonNumber(n.gain_free)},
                         {"discrepancy", JsonNumber(n.discrepancy)},
-                        {"mimicry", n.mimicry},
                         {"clear", JsonNumber(n.clear)},
                         {"smooth", n.smooth ? 1 : 0},
-                        {"dry", n.dry ? 1 : 0},
-                        {"second_mass", n.second_mass ? 1 : 0},
-                        {"company", n.company}};
+                        {"dry", n.dry ? 1 : 0}};
   return entry;
 }
 
@@ -153,17 +150,18 @@ ordered_json PolicyJson() {
           {"evidence.free_run_s", policy.evidence.free_run_s},
           {"evidence.free_runs", policy.evidence.free_runs},
           {"evidence.draws", policy.evidence.draws},
-          {"evidence.sums", policy.evidence.sums},
           {"evidence.most_gain", policy.evidence.most_gain},
           {"evidence.alone", policy.evidence.alone},
+          {"evidence.alike", policy.evidence.alike},
           {"probability.constant", policy.probability.constant},
           {"probability.gain", policy.probability.gain},
-          {"probability.mimicry", policy.probability.mimicry},
           {"probability.discrepancy", policy.probability.discrepancy},
           {"probability.clear", policy.probability.clear},
           {"probability.smooth", policy.probability.smooth},
           {"probability.dry", policy.probability.dry},
-          {"probability.company", policy.probability.company},
+          {"probability.most_discrepancy", policy.probability.most_discrepancy},
+          {"probability.most_clear", policy.probability.most_clear},
+          {"probability.least_clear", policy.probability.least_clear},
           {"probability.present", policy.probability.present},
           {"verdict.much_missing", policy.verdict.much_missing},
           {"verdict.retuned", policy.verdict.retuned}};

@@ -9,25 +9,23 @@ namespace gapscope {
 namespace {
 
 constexpr StatementNumbers kClear{
-    .gain = 3, .gain_held_out = 3, .gain_free = 3, .discrepancy = 80, .mimicry = 0, .clear = 4, .smooth = false};
+    .gain = 3, .gain_held_out = 3, .gain_free = 3, .discrepancy = 80, .clear = 4, .smooth = false};
 
 TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
   const double clear = ProbabilityOf(kClear);
-  EXPECT_GT(clear, 0.75);
+  EXPECT_GT(clear, 0.9);
   StatementNumbers weaker = kClear;
   weaker.gain_held_out = weaker.gain_free = 0;
   EXPECT_LT(ProbabilityOf(weaker), clear);
   weaker = kClear, weaker.discrepancy = -3;
   EXPECT_LT(ProbabilityOf(weaker), clear);
-  weaker = kClear, weaker.mimicry = 0.9;
-  EXPECT_LT(ProbabilityOf(weaker), clear);
   weaker = kClear, weaker.clear = -1;
   EXPECT_LT(ProbabilityOf(weaker), clear);
   weaker = kClear, weaker.smooth = true;
   EXPECT_LT(ProbabilityOf(weaker), clear);
-  StatementNumbers crowded = weaker;
-  crowded.company = 2;
-  EXPECT_LT(ProbabilityOf(crowded), ProbabilityOf(weaker));
+  StatementNumbers dry = weaker;
+  dry.dry = true;
+  EXPECT_GT(ProbabilityOf(dry), ProbabilityOf(weaker));
   EXPECT_LT(ProbabilityOf({}), 0.05);
 }
 

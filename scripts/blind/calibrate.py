@@ -6,9 +6,10 @@
 
 Without --features: of verdicts, one fit for each kind. With: of statements, on the named members of each one's
 `numbers` (missing: 0; NAME:LOW:HIGH clips; those of DERIVED are made of them): `ProbabilityPolicy` of
-src/diagnose/policy.h. Prints weights, the AUC of every number alone, and the calibration error where each rig is judged
-by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian prior of deviation
-2 on each weight: banks are small."""
+src/diagnose/policy.h. Prints weights, the AUC of every number alone, and the calibration error where each case, and
+each rig, is judged by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian
+prior on each weight, banks being small: around 0 with deviation 2, or where KNOWN says, from an earlier bank of 234
+statements."""
 import argparse, json, math, statistics as stats, sys
 from pathlib import Path
 
@@ -16,7 +17,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import score  # noqa: E402
 import statements  # noqa: E402
 
-PRIOR = 2.0
+PRIOR = (0.0, 2.0)
+KNOWN = {"constant": (-3.65, 0.5), "middle_gain": (1.42, 0.5), "log_discrepancy": (1.11, 0.5), "smooth": (-2.21, 0.5),
+         "clear": (0.0, 1.0), "dry": (0.0, 1.5)}  # weights by mean and deviation; the constant where mimicry is 0
 DERIVED = {  # as ProbabilityOf in src/diagnose/judge.cc has them
     "middle_gain": lambda n: stats.median(
         n[k] for k in ("gain", "gain_held_out", "gain_free") if n[k] is not None),
@@ -51,16 +54,22 @@ def solve(matrix, right):
     return x
 
 
-def logistic(x, y):
-    """Weights, the constant first; Laplace's rule keeps a kind that was never wrong from certainty."""
+def smoothed(y):
+    """Laplace's rule keeps a kind that was never wrong from certainty."""
+    return [(t * (len(y) + 1) + 0.5) / (len(y) + 2) for t in y]
+
+
+def logistic(x, y, priors=None):
+    """Weights, the constant first. `priors`: mean and deviation of each."""
     x = [[1.0] + row for row in x]
     n = len(x[0])
-    y = [(t * (len(y) + 1) + 0.5) / (len(y) + 2) if len(y) else t for t in y]
-    w = [0.0] * n
+    priors = priors or [PRIOR] * n
+    w = [mean for mean, _ in priors]
     for _ in range(50):
         p = [probability(w, row[1:]) for row in x]
-        gradient = [sum((p[i] - y[i]) * x[i][j] for i in range(len(x))) + w[j] / PRIOR**2 for j in range(n)]
-        hessian = [[sum(p[i] * (1 - p[i]) * x[i][j] * x[i][k] for i in range(len(x))) + (j == k) / PRIOR**2
+        gradient = [sum((p[i] - y[i]) * x[i][j] for i in range(len(x))) + (w[j] - priors[j][0]) / priors[j][1]**2
+                    for j in range(n)]
+        hessian = [[sum(p[i] * (1 - p[i]) * x[i][j] * x[i][k] for i in range(len(x))) + (j == k) / priors[j][1]**2
                     for k in range(n)] for j in range(n)]
         w = [a - b for a, b in zip(w, solve(hessian, gradient))]
     return w
@@ -84,14 +93,14 @@ def auc(values, truth):
 
 
 def candidates(cases):
-    """(rig, numbers, truth) of all that is told present or absent; what is told together once."""
-    for case in cases:
+    """(case, rig, numbers, truth) of all that is told present or absent; what is told together once."""
+    for at, case in enumerate(cases):
         for finding in statements.findings(case):
             best = max(finding.statements, key=lambda s: s["probability"] or 0)
-            yield case.rig, best.get("numbers") or {}, float(finding.true)
+            yield at, case.rig, best.get("numbers") or {}, float(finding.true)
         for s in statements.told(case.verdict):
             if s["answer"] == "absent":
-                yield case.rig, s.get("numbers") or {}, float((s["name"], s["on"]) in case.truth)
+                yield at, case.rig, s.get("numbers") or {}, float((s["name"], s["on"]) in case.truth)
 
 
 def read(features, numbers):
@@ -105,29 +114,33 @@ def read(features, numbers):
 
 
 def of_statements(cases, features):
-    told = [(rig, numbers, truth) for rig, numbers, truth in candidates(cases) if numbers]
+    told = [entry for entry in candidates(cases) if entry[2]]
     if not told:
         sys.exit("calibrate.py: no statement with `numbers` in these banks")
-    rigs, truth = [rig for rig, _, _ in told], [t for _, _, t in told]
+    at, rigs, truth = [e[0] for e in told], [e[1] for e in told], [e[3] for e in told]
     print(f"{len(told)} statements of {len(cases)} cases, {sum(truth):.0f} true")
-    for name in sorted({n for _, numbers, _ in told for n in numbers}):
-        print(f"  AUC {auc([read([name], numbers)[0] for _, numbers, _ in told], truth):.3f}  {name}")
-    rows = [read(features, numbers) for _, numbers, _ in told]
-    weights = logistic(rows, truth)
+    for name in sorted({n for entry in told for n in entry[2]}):
+        print(f"  AUC {auc([read([name], entry[2])[0] for entry in told], truth):.3f}  {name}")
+    rows = [read(features, entry[2]) for entry in told]
+    priors = [KNOWN.get(name.split(":")[0], PRIOR) for name in ["constant", *features]]
+    weights = logistic(rows, truth, priors)
     print(f"x = {weights[0]:.3f} " + " ".join(f"{w:+.3f} {n}" for w, n in zip(weights[1:], features)))
-    stated = [probability(weights, row) for row in rows]
-    apart = [0.0] * len(rows)
-    for rig in set(rigs):
-        others = [i for i, r in enumerate(rigs) if r != rig]
-        if others:
-            w = logistic([rows[i] for i in others], [truth[i] for i in others])
-            for i in (i for i, r in enumerate(rigs) if r == rig):
+
+    def by_others(groups):
+        apart = [0.0] * len(rows)
+        for group in set(groups):
+            others = [i for i, g in enumerate(groups) if g != group]
+            w = logistic([rows[i] for i in others], [truth[i] for i in others], priors)
+            for i in (i for i, g in enumerate(groups) if g == group):
                 apart[i] = probability(w, rows[i])
-    for name, given in (("same statements", stated), ("each rig by the others", apart)):
+        return apart
+    for name, given in (("same statements", [probability(weights, row) for row in rows]),
+                        ("each case by the others", by_others(at)), ("each rig by the others", by_others(rigs))):
         error, bins = statements.calibration(list(zip(given, truth)))
         sure = [t for p, t in zip(given, truth) if p >= statements.SURE]
-        print(f"{name}: AUC {auc(given, truth):.3f}, calibration error {error:.3f}, P >= 0.5 true "
-              f"{sum(sure):.0f}/{len(sure)}, found {sum(sure):.0f}/{sum(truth):.0f}; "
+        likely = sum(math.log(max(p if t else 1 - p, 1e-9)) for p, t in zip(given, truth))
+        print(f"{name}: log likelihood {likely:.2f}, AUC {auc(given, truth):.3f}, calibration error {error:.3f}, "
+              f"P >= 0.5 true {sum(sure):.0f}/{len(sure)}, found {sum(sure):.0f}/{sum(truth):.0f}; "
               + ", ".join(f"{b['stated']:.2f}:{b['right']:.2f}" for b in bins))
 
 
@@ -145,7 +158,7 @@ def main():
     for name in ("none", "effects", "ambiguous", "unknown"):
         part = [c for c in cases if kind(c.verdict) == name]
         if part:
-            weights = logistic([features(c.verdict) for c in part], [float(c.right()) for c in part])
+            weights = logistic([features(c.verdict) for c in part], smoothed([float(c.right()) for c in part]))
             print(f"{name:10s} {len(part):4d} cases, {sum(c.right() for c in part)} right; weights "
                   + ", ".join(f"{w:.2f}" for w in weights))
 

@@ -50,7 +50,7 @@ struct EvidencePolicy {
 
 // P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).
 struct ProbabilityPolicy {
-  double constant = -3.5, gain = 0.85, discrepancy = 0.6, clear = 0.4, smooth = -1.2, dry = 1.8;
+  double constant = -3.84, gain = 1.19, discrepancy = 0.74, clear = 0.33, smooth = -1.96, dry = 1.87;
   double most_discrepancy = 6, most_clear = 2, least_clear = -3;  // beyond them they say nothing more
   double present = 0.5;                                           // least probability of an effect that is listed
 };

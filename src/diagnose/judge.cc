@@ -185,19 +185,38 @@ class Judging {
     return most;
   }
 
+  // What was tried in a member's place: by the search, or where the ledger has that set by another way. `present`: the
+  // sure members, whose set is what remains in the end.
+  std::vector<Rival> RivalsOf(const Member& member, const EffectSet& present) const {
+    std::vector<Rival> rivals;
+    for (const EffectUse& use : found_.uses) {
+      if (std::count(found_.chosen->effects.begin(), found_.chosen->effects.end(), use) > 0) continue;
+      double behind = AreOneMotion(use, member.use, *found_.base->model, found_.logged) ? 0 : kInfinity;
+      for (const Rival& tried : member.rivals) {
+        if (tried.use == use) behind = std::min(behind, tried.behind);
+      }
+      const bool same = Contains(use, member.use, *bench_.rig, true) || Contains(member.use, use, *bench_.rig, true);
+      for (const EffectSet& set : {EffectSet(found_.chosen->effects), present}) {
+        if (same || std::find(set.begin(), set.end(), member.use) == set.end()) continue;
+        const Candidate *own = found_.ledger.Find(set),
+                        *other = found_.ledger.Find(With(Without(set, member.use), use));
+        if (own && other) behind = std::min(behind, std::log(other->train_cost / own->train_cost));
+      }
+      if (std::isfinite(behind)) rivals.push_back({.use = use, .behind = behind});
+    }
+    return rivals;
+  }
+
   // What costs as little in a member's place is told with it.
   void AddRivals(Judgement* result) {
     const SearchPolicy& policy = kDiagnosePolicy.search;
+    EffectSet present;
+    for (const Statement& s : result->statements) {
+      if (s.probability >= kDiagnosePolicy.probability.present) present = With(present, s.use);
+    }
     for (std::size_t m = 0; m < found_.members.size(); ++m) {
       const Member& member = found_.members[m];
-      std::vector<Rival> rivals = member.rivals;
-      for (const EffectUse& use : found_.uses) {  // one motion on these logs, whether it was tried or not
-        const bool tried = std::any_of(rivals.begin(), rivals.end(), [&](const Rival& r) { return r.use == use; });
-        const bool chosen = std::count(found_.chosen->effects.begin(), found_.chosen->effects.end(), use) > 0;
-        if (!tried && !chosen && AreOneMotion(use, member.use, *found_.base->model, found_.logged))
-          rivals.push_back({.use = use});
-      }
-      for (const Rival& rival : rivals) {
+      for (const Rival& rival : RivalsOf(member, present)) {
         const Model& base = *found_.base->model;
         const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
         if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;

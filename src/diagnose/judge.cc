@@ -21,13 +21,9 @@ class Judging {
 
   Judgement Make() {
     Judgement result;
-    std::vector<Statement> dropped;
-    JudgeMembers(&result);
+    std::vector<Statement> dropped = Simplify();
+    for (const Member& member : found_.members) result.statements.push_back(Of(member.use));
     DropSpare(&result, &dropped);
-    if (Simplify(&dropped)) {
-      JudgeMembers(&result);
-      DropSpare(&result, &dropped);
-    }
     Couple(&result);
     AddRivals(&result);
     result.statements.insert(result.statements.end(), dropped.begin(), dropped.end());
@@ -41,11 +37,6 @@ class Judging {
   }
 
  private:
-  void JudgeMembers(Judgement* result) {
-    result->statements.clear();
-    for (const Member& member : found_.members) result->statements.push_back(Of(member.use));
-  }
-
   Statement Of(const EffectUse& use) {
     say_("judging " + use.Text());
     Statement statement{.use = use, .numbers = evidence_.Of({use}), .rule = "its own evidence"};
@@ -55,11 +46,10 @@ class Judging {
 
   // What a richer description does beyond a simpler one is a finding of its own: where that is not sure, the simpler
   // one takes its place. One size for all places is simpler than one each, and so is an effect that another contains.
-  // True: something was replaced.
-  bool Simplify(std::vector<Statement>* dropped) {
-    const std::size_t before = dropped->size();
+  std::vector<Statement> Simplify() {
+    std::vector<Statement> dropped;
     for (const EffectUse& use : found_.uses) {
-      if (use.on == kOnAll && !HasMember(use)) PutInPlace(OnEachPlace(use), use, dropped);
+      if (use.on == kOnAll && !HasMember(use)) PutInPlace(OnEachPlace(use), use, &dropped);
     }
     for (const EffectUse& member : EffectSet(found_.chosen->effects)) {
       EffectUse simple;
@@ -69,9 +59,9 @@ class Judging {
         const Candidate* tried = RefitInPlace(bench_, found_, {member}, use, Effort::kTaste);
         if (tried && tried->train_cost < least) least = tried->train_cost, simple = use;
       }
-      if (std::isfinite(least)) PutInPlace({member}, simple, dropped);
+      if (std::isfinite(least)) PutInPlace({member}, simple, &dropped);
     }
-    return dropped->size() > before;
+    return dropped;
   }
 
   // The members that are an effect on each of its places; empty: not on each.
@@ -110,19 +100,17 @@ class Judging {
     return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& m) { return m.use == use; });
   }
 
-  // A member that is not sure and hardly gains, or that is surely not there, takes evidence from those that it stands
-  // in for: it goes, the weakest first, and they are judged without it.
+  // A member that is not sure and hardly gains takes evidence from those that it stands in for: it goes, the weakest
+  // first, and they are judged without it.
   void DropSpare(Judgement* result, std::vector<Statement>* dropped) {
     for (;;) {
       auto& all = result->statements;
-      const ProbabilityPolicy& policy = kDiagnosePolicy.probability;
-      auto least = all.end();
-      for (auto s = all.begin(); s != all.end(); ++s) {
-        const bool hardly = s->probability < policy.present && s->numbers.gain < kDiagnosePolicy.search.tie;
-        if (!hardly && s->probability >= policy.surely_absent) continue;
-        if (least == all.end() || s->numbers.gain < least->numbers.gain) least = s;
-      }
-      if (all.size() < 2 || least == all.end()) return;
+      const auto least = std::min_element(all.begin(), all.end(), [](const Statement& a, const Statement& b) {
+        return a.numbers.gain < b.numbers.gain;
+      });
+      if (all.size() < 2 || least->probability >= kDiagnosePolicy.probability.present ||
+          least->numbers.gain >= kDiagnosePolicy.search.tie)
+        return;
       const EffectSet rest = Without(found_.chosen->effects, least->use);
       Candidate* without = found_.ledger.Find(rest);
       if (!without) return;

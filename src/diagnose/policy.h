@@ -53,7 +53,6 @@ struct ProbabilityPolicy {
   double constant = -3.84, gain = 1.19, discrepancy = 0.74, clear = 0.33, smooth = -1.96, dry = 1.87;
   double most_discrepancy = 6, most_clear = 2, least_clear = -3;  // beyond them they say nothing more
   double present = 0.5;                                           // least probability of an effect that is listed
-  double surely_absent = 0.1;                                     // a member below it goes before the others are judged
 };
 
 struct VerdictPolicy {

@@ -163,7 +163,6 @@ ordered_json PolicyJson() {
           {"probability.most_clear", policy.probability.most_clear},
           {"probability.least_clear", policy.probability.least_clear},
           {"probability.present", policy.probability.present},
-          {"probability.surely_absent", policy.probability.surely_absent},
           {"verdict.much_missing", policy.verdict.much_missing},
           {"verdict.retuned", policy.verdict.retuned}};
 }

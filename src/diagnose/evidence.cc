@@ -64,8 +64,7 @@ void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers
 }
 
 StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses) {
-  EffectSet rest = found_.chosen->effects;
-  for (const EffectUse& use : uses) rest = Without(rest, use);
+  const EffectSet rest = Without(found_.chosen->effects, uses);
   Candidate* without = found_.ledger.Find(rest);
   if (!without || uses.size() > 1) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
   return Of(uses, without ? without : found_.base);

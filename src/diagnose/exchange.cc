@@ -20,16 +20,10 @@ bool AddBestTrial(const ColumnTable& table, const EffectUse& use, std::vector<st
   return best < table.trials.size();
 }
 
-EffectSet Rest(const SearchResult& found, const EffectSet& members) {
-  EffectSet rest = found.chosen->effects;
-  for (const EffectUse& use : members) rest = Without(rest, use);
-  return rest;
-}
-
 // The trials of the chosen set with `use` in the place of `members`, that of `use` last; empty: it has no column.
 std::vector<std::size_t> TrialsInPlace(const SearchResult& found, const EffectSet& members, const EffectUse& use) {
   std::vector<std::size_t> trials;
-  for (const EffectUse& other : Rest(found, members)) AddBestTrial(found.columns, other, &trials);
+  for (const EffectUse& other : Without(found.chosen->effects, members)) AddBestTrial(found.columns, other, &trials);
   if (!AddBestTrial(found.columns, use, &trials)) trials.clear();
   return trials;
 }
@@ -50,7 +44,7 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
   if (trials.empty()) return nullptr;
   std::map<std::string, double> values;
   SetValues(bench, table.trials[trials.back()], SolveSet(table, trials), &values);
-  return found.ledger.Refit(With(Rest(found, members), use), *found.chosen, values, {}, effort);
+  return found.ledger.Refit(With(Without(found.chosen->effects, members), use), *found.chosen, values, {}, effort);
 }
 
 }  // namespace gapscope

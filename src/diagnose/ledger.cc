@@ -44,6 +44,12 @@ EffectSet Without(const EffectSet& set, const EffectUse& use) {
   return rest;
 }
 
+EffectSet Without(const EffectSet& set, const std::vector<EffectUse>& uses) {
+  EffectSet rest = set;
+  for (const EffectUse& use : uses) std::erase(rest, use);
+  return rest;
+}
+
 EffectSet With(const EffectSet& set, const EffectUse& use) {
   EffectSet more = set;
   more.insert(std::lower_bound(more.begin(), more.end(), use), use);

@@ -14,6 +14,7 @@ namespace gapscope {
 
 using EffectSet = std::vector<EffectUse>;  // sorted
 EffectSet Without(const EffectSet& set, const EffectUse& use);
+EffectSet Without(const EffectSet& set, const std::vector<EffectUse>& uses);
 EffectSet With(const EffectSet& set, const EffectUse& use);
 
 // How far a fit goes: far enough to see whether it leads anywhere, to compare it, to its end.

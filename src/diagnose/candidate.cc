@@ -184,6 +184,7 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
     options.objective = ObjectiveKind::kFreeRun;
   }
   options.weights.clear();
+  options.prior_offset_rad = 0;  // which is in the sensors' noises
   FitPoint point;
   const auto problem = OnHeldOut(bench, candidate, options, &point);
   return problem ? ReplayError(problem->Predict(point)) : kInfinity;

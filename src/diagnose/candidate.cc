@@ -74,7 +74,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
     SolveOptions options{.max_iterations = limits.iterations,
                          .tolerance = limits.tolerance,
                          .coarse_step = kCoarseStep,
-                         .fine_step = 0.01,
+                         .fine_step = kFineStep,
                          .give_up = std::move(give_up),
                          .deadline = bench.deadline};
     Work inheriting;

@@ -164,7 +164,8 @@ ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, con
         {.name = "torque", .child = parent.problem.get(), .values = parent.values, .probe = torque});
   }
   const auto make = [&] {
-    return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01}, parent.derivatives.get());
+    // Not with the fit's own Jacobian, which is too fine to look ahead.
+    return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01}, nullptr);
   };
   table.gram = bench.journal ? bench.journal->Gram("columns " + parent.Name(), parent.point,
                                                    ColumnNames(*parent.problem, wanted.columns), make)

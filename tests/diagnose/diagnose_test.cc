@@ -105,6 +105,20 @@ TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
   EXPECT_EQ(names[1], "coulomb_friction@hub");
 }
 
+// A sensor that is off by a constant changes no motion: free runs, too, find the constant.
+TEST(DiagnoseTest, FreeRunsFindZeroOffsets) {
+  Logs logs = MakeLogs("qube", twin::Kind::kNone, "", 35);
+  const Diagnosis as_logged = DiagnoseLogs(logs);
+  for (auto& recording : logs.recordings) {
+    for (auto& measured : recording.measured) {
+      if (measured.spec.on != "pendulum") continue;
+      for (double& value : measured.values) value += 0.1;
+    }
+  }
+  const Diagnosis off = DiagnoseLogs(logs);
+  EXPECT_NEAR(off.evidence.free_run_before / as_logged.evidence.free_run_before, 1, 0.1);
+}
+
 // Commands that have nothing to do with the motion: no effect may be named with confidence.
 TEST(DiagnoseTest, ShuffledCommandsAreNoEffect) {
   Logs logs = MakeLogs("flexlink", twin::Kind::kNone, "", 34);

@@ -39,8 +39,9 @@ struct Candidate {
   }
 };
 
-// Finite differences of a fit's Jacobians, in search coordinates. The first ones look ahead as far as steps go. The last
-// ones are as fine as replays, which are exact, allow: a coarser Jacobian is bent, and fits end early in curved valleys.
+// Finite differences of a fit's Jacobians, in search coordinates. The first ones look ahead as far as steps go. The
+// last ones are as fine as replays, which are exact, allow: a coarser Jacobian is bent, and fits end early in curved
+// valleys.
 inline constexpr double kCoarseStep = 0.03, kFineStep = 3e-4;
 
 using Say = std::function<void(const std::string&)>;

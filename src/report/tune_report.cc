@@ -78,7 +78,9 @@ std::string HeldOutLines(const TuneRun& run, const Console& console) {
 std::string FlatText(const FlatDirection& flat, const Model& model) {
   // Two that grow alike, both on logarithmic scales: their ratio stays, and is what is known.
   if (flat.parts.size() == 2 && std::abs(std::abs(flat.parts[1].second) - 1) < 0.1) {
-    const Parameter &a = model.parameters()[flat.parts[0].first], &b = model.parameters()[flat.parts[1].first];
+    // In the model's order: which of two equals is the larger is a matter of rounding.
+    const auto [first, second] = std::minmax(flat.parts[0].first, flat.parts[1].first);
+    const Parameter &a = model.parameters()[first], &b = model.parameters()[second];
     if (a.low > 0 && b.low > 0)
       return fmt::format("only {} {} {} is known from these logs, neither alone", a.name,
                          flat.parts[1].second > 0 ? "/" : "*", b.name);

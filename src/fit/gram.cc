@@ -80,14 +80,10 @@ std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const 
 }
 
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options, const Derivatives* known) {
+                    const DifferenceOptions& options) {
   GramSystem gram{.columns = ColumnNames(parent, extra), .parameters = parent.layout().low.size()};
-  Derivatives made;
-  if (!known) {
-    made = parent.Differentiate(point, options);
-    gram.work = made.work;
-  }
-  const Derivatives& at = known ? *known : made;
+  const Derivatives at = parent.Differentiate(point, options);
+  gram.work = at.work;
   if (!at.valid) return gram;
   std::vector<Residuals> others;
   for (const ExtraColumn& column : extra) {

@@ -46,9 +46,8 @@ struct ExtraColumn {
 // GramSystem::columns of a problem with these.
 std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra);
 
-// `known`: the parent's derivatives at the point where they are at hand; else they are made.
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options, const Derivatives* known = nullptr);
+                    const DifferenceOptions& options);
 
 // Weighted sum over blocks; a fold that is left out weighs 0. `block_weights`: one per block, or empty for all ones.
 // The states' priors of a log weigh as much as its blocks do on average.

@@ -66,15 +66,29 @@ class Searcher {
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
-    Grow();
+    Grow(Leaders());
     Lead();
+    Settle();
+    // What leads after an exchange has other gaps than what growth ended on.
+    until_ = kPolicy.until_exchanged;
+    while (!grown_.contains(result_.chosen->effects)) {
+      Grow({result_.chosen});
+      Candidate* before = result_.chosen;
+      Lead();
+      if (result_.chosen == before) break;
+      Settle();
+    }
+  }
+
+ private:
+  // Members are taken out and others tried in their places, until neither changes the set.
+  void Settle() {
     for (int round = 0; round < 3; ++round) {
       TakeOut();
       if (!Exchange()) break;
     }
   }
 
- private:
   // Of the work, `share` may be spent when `what` begins.
   bool Late(double share, const char* what) {
     if (!bench_.Late(share)) return false;
@@ -110,7 +124,7 @@ class Searcher {
         // More effects than the best smaller set must promise something. A single one need not: where an effect sets in
         // suddenly (a limit, a gap) its columns say little between their trial values.
         if ((size > 0 || !parent.effects.empty()) && std::log(best / set.cost) < kPolicy.promise) break;
-        if (Late(kPolicy.until_grown, "sets of effects")) return;
+        if (Late(until_, "sets of effects")) return;
         if (Candidate* candidate = RefitTrials(parent, table, set)) tasted.push_back(candidate);
       }
       if (!levels[size].empty()) best = std::min(best, levels[size].front().cost);
@@ -124,7 +138,7 @@ class Searcher {
                      [](const auto* a, const auto* b) { return Charged(*a) < Charged(*b); });
     if (tasted.size() > most) tasted.resize(most);
     for (Candidate* candidate : tasted) {
-      if (Late(kPolicy.until_grown, "fits of sets")) return;
+      if (Late(until_, "fits of sets")) return;
       if (!candidate->converged) result_.ledger.Continue(candidate, Effort::kTry);
     }
   }
@@ -153,17 +167,15 @@ class Searcher {
     return 2 * candidate.train_cost < static_cast<double>(candidate.problem->residuals());
   }
 
-  // Additions to the leaders, as long as one of them leads.
-  void Grow() {
-    std::set<EffectSet> grown = {{}};
+  // Additions to these, then to what leads, as long as it is another one.
+  void Grow(std::vector<Candidate*> leaders) {
     for (std::size_t round = 0; round < kPolicy.most_effects; ++round) {
       bool again = false;
-      std::vector<Candidate*> leaders = Leaders();
-      if (round > 0) leaders.resize(1);
       for (Candidate* leader : leaders) {
-        if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) || !grown.insert(leader->effects).second)
+        if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) ||
+            !grown_.insert(leader->effects).second)
           continue;
-        if (Late(kPolicy.until_grown, "additions")) return;
+        if (Late(until_, "additions")) return;
         say_("what could be added to " + NameOfSet(leader->effects));
         ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
         if (!table.valid) continue;
@@ -171,6 +183,7 @@ class Searcher {
         again = true;
       }
       if (!again) return;
+      leaders = {Leaders().front()};
     }
   }
 
@@ -289,6 +302,8 @@ class Searcher {
   const Workbench& bench_;
   const Say& say_;
   SearchResult& result_;
+  double until_ = kPolicy.until_grown;  // of the work, until which sets are begun
+  std::set<EffectSet> grown_ = {{}};    // what was added to
   std::set<std::pair<EffectSet, EffectUse>> looked_;  // members taken out from a leader's optimum
 };
 

@@ -45,14 +45,17 @@ Evidence::Evidence(const Workbench& bench, SearchResult& found)
 }
 
 void Evidence::Choose(Candidate* candidate) {
-  Finish(candidate);
+  found_.ledger.Continue(candidate, Effort::kFinish);
   ScoreCandidate(bench_, candidate);
   found_.chosen = candidate;
   free_left_ = FreeRunError(bench_, *candidate);
 }
 
-void Evidence::Finish(Candidate* candidate) {
-  if (!candidate->converged && finished_.insert(candidate).second) found_.ledger.Continue(candidate, Effort::kFinish);
+// Only chosen sets are fitted to the end.
+void Evidence::Compare(Candidate* candidate) {
+  if (candidate->converged || !compared_.insert(candidate).second) return;
+  const double far = found_.chosen->train_cost * std::exp(kDiagnosePolicy.search.far_behind);
+  found_.ledger.Continue(candidate, Effort::kTry, far);
 }
 
 void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const {
@@ -71,7 +74,7 @@ StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses) {
 }
 
 StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without) {
-  Finish(without);
+  Compare(without);
   ScoreCandidate(bench_, without);
   StatementNumbers numbers;
   numbers.gain = LogRatio(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());

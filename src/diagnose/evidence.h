@@ -27,7 +27,7 @@ class Evidence {
 
  private:
   // A fit that is not at its end promises, by its columns, what it does not reach. Once each.
-  void Finish(Candidate* candidate);
+  void Compare(Candidate* candidate);
   // What kind of effect the numbers are of.
   void SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const;
   // What the chosen set leaves, with the torques' columns.
@@ -37,7 +37,7 @@ class Evidence {
   SearchResult& found_;
   std::vector<ProbeTorque> torques_;
   double free_left_;
-  std::set<const Candidate*> finished_;
+  std::set<const Candidate*> compared_;
   ColumnTable left_;
   const Candidate* left_of_ = nullptr;  // whose table that is
 };

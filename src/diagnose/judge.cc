@@ -22,8 +22,7 @@ class Judging {
   Judgement Make() {
     Judgement result;
     std::vector<Statement> dropped = Simplify();
-    for (const Member& member : found_.members) result.statements.push_back(Of(member.use));
-    DropSpare(&result, &dropped);
+    JudgeMembers(&result, &dropped);
     Couple(&result);
     AddRivals(&result);
     result.statements.insert(result.statements.end(), dropped.begin(), dropped.end());
@@ -100,31 +99,41 @@ class Judging {
     return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& m) { return m.use == use; });
   }
 
-  // A member that is not sure and hardly gains takes evidence from those that it stands in for: it goes, the weakest
-  // first, and they are judged without it.
-  void DropSpare(Judgement* result, std::vector<Statement>* dropped) {
-    for (;;) {
-      auto& all = result->statements;
-      const auto least = std::min_element(all.begin(), all.end(), [](const Statement& a, const Statement& b) {
-        return a.numbers.gain < b.numbers.gain;
-      });
-      if (all.size() < 2 || least->probability >= kDiagnosePolicy.probability.present ||
-          least->numbers.gain >= kDiagnosePolicy.search.tie)
-        return;
-      const EffectSet rest = Without(found_.chosen->effects, least->use);
-      Candidate* without = found_.ledger.Find(rest);
-      if (!without) return;
-      found_.ledger.Continue(without, Effort::kTry);
-      evidence_.Choose(without);
-      dropped->push_back(*least);
-      dropped->back().rule = "hardly gains beside the others";
-      const EffectUse gone = least->use;
-      all.erase(least);
-      std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
-      for (Statement& s : all) {
-        if (ImitatedBy(s.use, gone) >= kDiagnosePolicy.search.imitates) s = Of(s.use);
+  // The weakest first: a member that is not sure and hardly gains takes evidence from those that it stands in for. It
+  // goes, and they are judged without it.
+  void JudgeMembers(Judgement* result, std::vector<Statement>* dropped) {
+    std::stable_sort(found_.members.begin(), found_.members.end(),
+                     [](const Member& a, const Member& b) { return a.gain < b.gain; });
+    auto& all = result->statements;
+    while (all.size() < found_.members.size()) {
+      all.push_back(Of(found_.members[all.size()].use));
+      for (auto spare = Spare(all); spare != all.end(); spare = Spare(all)) {
+        dropped->push_back(*spare);
+        dropped->back().rule = "hardly gains beside the others";
+        const EffectUse gone = spare->use;
+        all.erase(spare);
+        std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
+        for (Statement& s : all) {
+          if (ImitatedBy(s.use, gone) >= kDiagnosePolicy.search.imitates) s = Of(s.use);
+        }
       }
     }
+  }
+
+  // The weakest of those judged if the set can do without it, which is then chosen.
+  std::vector<Statement>::iterator Spare(std::vector<Statement>& all) {
+    const auto least = std::min_element(all.begin(), all.end(), [](const Statement& a, const Statement& b) {
+      return a.numbers.gain < b.numbers.gain;
+    });
+    if (found_.members.size() < 2 || least == all.end() ||
+        least->probability >= kDiagnosePolicy.probability.present ||
+        least->numbers.gain >= kDiagnosePolicy.search.tie)
+      return all.end();
+    Candidate* without = found_.ledger.Find(Without(found_.chosen->effects, least->use));
+    if (!without) return all.end();
+    found_.ledger.Continue(without, Effort::kTry);
+    evidence_.Choose(without);
+    return least;
   }
 
   double PriorOf(const EffectUse& use) const {
@@ -142,7 +151,7 @@ class Judging {
     statement->probability = AtPrior(statement->evidence, statement->prior);
   }
 
-  // Members that stand in for each other, neither of them sure alone, are judged by taking both out, the nearest pairs
+  // Members that stand in for each other, not both of them sure alone, are judged by taking both out, the nearest pairs
   // first. Most of what they gain must show only then, or both must gain alike: else the stronger one would lend the
   // weaker one its evidence.
   void Couple(Judgement* result) {
@@ -158,7 +167,7 @@ class Judging {
                      [](const auto& a, const auto& b) { return std::get<0>(a) > std::get<0>(b); });
     const double present = kDiagnosePolicy.probability.present;
     for (const auto& [imitated, x, y] : pairs) {
-      if (std::max(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
+      if (std::min(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
       say_("judging " + NameOfSet({x->use, y->use}));
       Statement together{.numbers = evidence_.Of({x->use, y->use}), .rule = "taken out together"};
       Weigh({x->use, y->use}, &together);

@@ -69,19 +69,18 @@ std::vector<Candidate*> Ledger::All() const {
   return all;
 }
 
-// Keeps the fit if it ends below the candidate's.
-bool Ledger::Try(Candidate* candidate, const FitPoint& start, const Candidate* from, Effort effort) {
+// Keeps the fit if it ends below the candidate's. Above `reach` it goes on only as fast as would lead below it.
+bool Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double reach) {
+  if (!std::isfinite(start.cost)) return false;
   const double known = candidate->train_cost;
-  const double there = CostAt(bench_, *candidate, start);
-  if (!std::isfinite(there)) return false;
   const FitPoint before = candidate->point;
   const std::vector<double> values = candidate->values;
   const bool converged = candidate->converged, scored = candidate->scored;
   const double shift_s = candidate->shift_s;
   const auto derivatives = candidate->derivatives;
   const FitLimits limits = LimitsOf(effort);
-  FitCandidate(bench_, candidate, start, limits,
-               std::isfinite(known) && there > known ? TooSlow(known, limits.iterations) : GiveUp{}, from);
+  FitCandidate(bench_, candidate, start.point, limits,
+               start.cost > reach ? TooSlow(reach, limits.iterations) : GiveUp{}, start.from);
   Remember(candidate);
   if (candidate->train_cost < known) return true;
   candidate->point = before;
@@ -121,24 +120,35 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
     if (const int index = from.model->IndexOf(name); index >= 0) all[i] = from.values[index];
     if (const auto given = values.find(name); given != values.end()) all[i] = given->second;
   }
-  // With as much of the other one's answer as pays: far outside of where it was linear it leads along valleys.
-  FitPoint best;
-  double least = kInfinity;
+  // A set that starts far above one of its subsets is only fitted from there.
+  constexpr double kFar = 10;
+  const Candidate* part = BestSubset(candidate);
+  const double reach = part ? std::min(part->train_cost, candidate.train_cost) : candidate.train_cost;
+  if (const Start start = StartFrom(candidate, from, all, dy); start.cost <= kFar * reach) {
+    Try(&candidate, start, effort, reach);
+    StartFromOtherShapes(&candidate, from, effort);
+  }
+  if (part && part->train_cost < candidate.train_cost) {
+    const bool first = !std::isfinite(candidate.train_cost);
+    Try(&candidate, StartFromSubset(candidate, *part), effort, candidate.train_cost);
+    if (first) StartFromOtherShapes(&candidate, from, effort);
+  }
+  return std::isfinite(candidate.train_cost) ? &candidate : nullptr;
+}
+
+// With as much of the other one's answer as pays: far outside of where it was linear it leads along valleys.
+Ledger::Start Ledger::StartFrom(const Candidate& candidate, const Candidate& from, const std::vector<double>& values,
+                                const Eigen::VectorXd& dy) const {
+  Start best{.from = &from, .cost = kInfinity};
   for (const double share : {1.0, 0.0}) {
     if (share > 0 && dy.size() != from.point.y.size()) continue;
     FitPoint moved = from.point;
     if (share > 0) moved.y = (moved.y + dy).cwiseMax(from.problem->layout().low).cwiseMin(from.problem->layout().high);
-    FitPoint start = CarryOver(*from.problem, moved, *candidate.problem, all);
+    FitPoint start = CarryOver(*from.problem, moved, *candidate.problem, values);
     const double there = CostAt(bench_, candidate, start);
-    if (best.y.size() > 0 && !(there < least)) continue;
-    least = there;
-    best = std::move(start);
+    if (there < best.cost) best.point = std::move(start), best.cost = there;
   }
-  Try(&candidate, best, &from, effort);
-  if (!std::isfinite(candidate.train_cost)) return nullptr;
-  StartFromOtherShapes(&candidate, from, effort);
-  StartFromSubsets(&candidate, effort);
-  return &candidate;
+  return best;
 }
 
 void Ledger::Clear() {
@@ -146,7 +156,9 @@ void Ledger::Clear() {
   fitted_.clear();
 }
 
-void Ledger::Continue(Candidate* candidate, Effort effort) { Try(candidate, candidate->point, nullptr, effort); }
+void Ledger::Continue(Candidate* candidate, Effort effort, double reach) {
+  Try(candidate, {.point = candidate->point, .cost = candidate->train_cost}, effort, reach);
+}
 
 void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort) {
   constexpr double kLeft = 0.05;  // of the size that another shape took over
@@ -166,30 +178,36 @@ void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, E
                  of_shape = ScaleOf(shape->scale, scales->second);
     values[index(0)] = kLeft * size;
     values[index(s)] = std::clamp(values[index(s)] + size / of_size * of_shape, placed[s].low, placed[s].high);
-    Try(candidate, candidate->problem->At(values, candidate->point), nullptr, std::max(effort, Effort::kTry));
+    FitPoint point = candidate->problem->At(values, candidate->point);
+    const double cost = CostAt(bench_, *candidate, point);
+    Try(candidate, {.point = std::move(point), .cost = cost}, std::max(effort, Effort::kTry), candidate->train_cost);
   }
 }
 
-void Ledger::StartFromSubsets(Candidate* candidate, Effort effort) {
+const Candidate* Ledger::BestSubset(const Candidate& candidate) const {
   const Candidate* best = nullptr;
   for (const auto& [set, other] : fitted_) {
-    if (other->problem && IsPart(set, candidate->effects) && other->train_cost < candidate->train_cost &&
-        (!best || other->train_cost < best->train_cost))
+    if (other->problem && IsPart(set, candidate.effects) && (!best || other->train_cost < best->train_cost))
       best = other.get();
   }
-  if (!best) return;
-  // What the subset lacks begins small.
-  std::vector<double> values = candidate->model->Nominal();
-  for (const auto& use : candidate->effects) {
-    if (std::find(best->effects.begin(), best->effects.end(), use) != best->effects.end()) continue;
+  return best;
+}
+
+// What the subset lacks begins small.
+Ledger::Start Ledger::StartFromSubset(const Candidate& candidate, const Candidate& part) const {
+  std::vector<double> values = candidate.model->Nominal();
+  for (const auto& use : candidate.effects) {
+    if (std::find(part.effects.begin(), part.effects.end(), use) != part.effects.end()) continue;
     for (const auto& p : PlacedParameters(use, *bench_.rig, bench_.scales)) {
       constexpr double kSmall = 0.1;
-      double& value = values[candidate->model->IndexOf(p.name)];
+      double& value = values[candidate.model->IndexOf(p.name)];
       value = p.trials.empty() || p.role == ParameterRole::kPlace ? p.start
                                                                   : p.neutral + kSmall * (p.trials.front() - p.neutral);
     }
   }
-  Try(candidate, CarryOver(*best->problem, best->point, *candidate->problem, values), best, effort);
+  Start start{.point = CarryOver(*part.problem, part.point, *candidate.problem, values), .from = &part};
+  start.cost = CostAt(bench_, candidate, start.point);
+  return start;
 }
 
 }  // namespace gapscope

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "src/core/statistics.h"
 #include "src/diagnose/candidate.h"
 
 namespace gapscope {
@@ -35,15 +36,23 @@ class Ledger {
                    const Eigen::VectorXd& dy, Effort effort);
   // Forgets all sets, before the first of them is pointed to.
   void Clear();
-  // Fits on from where the set is.
-  void Continue(Candidate* candidate, Effort effort);
+  // Fits on from where the set is: above `reach` only as fast as would lead below it.
+  void Continue(Candidate* candidate, Effort effort, double reach = kInfinity);
 
  private:
-  void StartFromSubsets(Candidate* candidate, Effort effort);
+  struct Start {
+    FitPoint point;
+    const Candidate* from = nullptr;  // whose Jacobian, if it has one, the first steps are made with; null: none
+    double cost = kInfinity;          // there
+  };
+  Start StartFrom(const Candidate& candidate, const Candidate& from, const std::vector<double>& values,
+                  const Eigen::VectorXd& dy) const;
+  // Null: no subset was fitted.
+  const Candidate* BestSubset(const Candidate& candidate) const;
+  Start StartFromSubset(const Candidate& candidate, const Candidate& part) const;
   // From where another shape of the effects that `from` lacks makes their torque (EffectParameter::takes_over).
   void StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort);
-  // `from`: whose Jacobian, if it has one, the first steps are made with; null: none.
-  bool Try(Candidate* candidate, const FitPoint& start, const Candidate* from, Effort effort);
+  bool Try(Candidate* candidate, const Start& start, Effort effort, double reach);
   // Jacobians are large: only those of the last few fits are kept.
   void Remember(Candidate* candidate);
 

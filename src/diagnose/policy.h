@@ -13,6 +13,7 @@ struct SearchPolicy {
   std::size_t singles = 5, pairs = 3, triples = 1;  // of the base model, that are refitted
   std::size_t go_on = 2;                            // of the sets that were begun, how many are fitted on
   double hopeless = 0.4;                            // a rival behind by more after a few steps is given up
+  double far_behind = 1;                            // a set without a member by more: its fit may end early
   std::size_t scan = 12, scanned = 6;               // an effect of more trials is tried on a leader at its best few
   std::size_t leaders = 2, additions = 3;           // sets that are added to, and effects tried on each
   std::size_t most_effects = 6;

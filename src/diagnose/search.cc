@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 #include "src/core/collect.h"
@@ -113,9 +114,28 @@ class Searcher {
     return widened;
   }
 
+  // Takes out the sets that cost as much with a simpler effect in a richer one's place: they come in by exchange.
+  void GiveWay(const ColumnTable& table, std::vector<TrialSet>* level) const {
+    const auto use = [&](std::size_t trial) { return table.trials[trial].use; };
+    const auto is_simpler = [&](const TrialSet& a, const TrialSet& b) {
+      if (std::log(a.cost / b.cost) >= kPolicy.simpler) return false;
+      std::vector<EffectUse> of_a = Collect(a.trials, use), of_b = Collect(b.trials, use), only_a, only_b;
+      std::sort(of_a.begin(), of_a.end());
+      std::sort(of_b.begin(), of_b.end());
+      std::set_difference(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(), std::back_inserter(only_a));
+      std::set_difference(of_b.begin(), of_b.end(), of_a.begin(), of_a.end(), std::back_inserter(only_b));
+      return only_a.size() == 1 && only_b.size() == 1 && Contains(only_b.front(), only_a.front(), *bench_.rig);
+    };
+    const std::vector<TrialSet> all = *level;
+    std::erase_if(*level, [&](const TrialSet& rich) {
+      return std::any_of(all.begin(), all.end(), [&](const TrialSet& simple) { return is_simpler(simple, rich); });
+    });
+  }
+
   // Refits the best sets of each size on top of the parent, where arithmetic promises enough.
   void RefitSets(const Candidate& parent, const ColumnTable& table, const std::vector<std::size_t>& counts) {
-    const auto levels = BeamSearch(table, counts.size(), kPolicy.beam);
+    auto levels = BeamSearch(table, counts.size(), kPolicy.beam);
+    for (auto& level : levels) GiveWay(table, &level);
     double best = table.cost;
     std::vector<Candidate*> tasted;
     for (std::size_t size = 0; size < levels.size(); ++size) {
@@ -180,6 +200,7 @@ class Searcher {
         ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
         if (!table.valid) continue;
         RefitSets(*leader, table, {kPolicy.additions, 1});
+        if (bench_.Late(until_)) grown_.erase(leader->effects);
         again = true;
       }
       if (!again) return;
@@ -193,6 +214,9 @@ class Searcher {
     result_.ledger.Continue(result_.chosen, Effort::kFinish);
   }
 
+  // Above this a set is so far behind the chosen one that it matters little how far.
+  double MuchMore() const { return result_.chosen->train_cost * std::exp(kPolicy.far_behind); }
+
   // The chosen set without a member, refitted from the leader's optimum, or an earlier fit that is better.
   Candidate* TakenOut(const EffectUse& use, Effort effort) {
     const EffectSet rest = Without(result_.chosen->effects, use);
@@ -203,7 +227,7 @@ class Searcher {
       if (!known || looked_.insert({result_.chosen->effects, use}).second)
         without = result_.ledger.Refit(rest, *result_.chosen, {}, {}, effort);
     } else if (without && !known) {
-      result_.ledger.Continue(without, effort);
+      result_.ledger.Continue(without, effort, MuchMore());
     }
     return without ? without : result_.base;
   }
@@ -263,7 +287,7 @@ class Searcher {
   Candidate* RefitRival(const Member& member, const EffectUse& use) {
     Candidate* other = RefitInPlace(bench_, result_, {member.use}, use, Effort::kTaste);
     if (other && !other->converged && Gain(*result_.chosen, *other) > -kPolicy.hopeless)
-      result_.ledger.Continue(other, Effort::kTry);
+      result_.ledger.Continue(other, Effort::kTry, result_.chosen->train_cost * std::exp(kPolicy.tie));
     return other;
   }
 

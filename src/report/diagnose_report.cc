@@ -121,6 +121,7 @@ ordered_json PolicyJson() {
           {"search.triples", policy.search.triples},
           {"search.go_on", policy.search.go_on},
           {"search.hopeless", policy.search.hopeless},
+          {"search.far_behind", policy.search.far_behind},
           {"search.scan", policy.search.scan},
           {"search.scanned", policy.search.scanned},
           {"search.leaders", policy.search.leaders},

@@ -120,19 +120,10 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
     if (const int index = from.model->IndexOf(name); index >= 0) all[i] = from.values[index];
     if (const auto given = values.find(name); given != values.end()) all[i] = given->second;
   }
-  // A set that starts far above one of its subsets is only fitted from there.
-  constexpr double kFar = 10;
-  const Candidate* part = BestSubset(candidate);
-  const double reach = part ? std::min(part->train_cost, candidate.train_cost) : candidate.train_cost;
-  if (const Start start = StartFrom(candidate, from, all, dy); start.cost <= kFar * reach) {
-    Try(&candidate, start, effort, reach);
-    StartFromOtherShapes(&candidate, from, effort);
-  }
-  if (part && part->train_cost < candidate.train_cost) {
-    const bool first = !std::isfinite(candidate.train_cost);
+  Try(&candidate, StartFrom(candidate, from, all, dy), effort, candidate.train_cost);
+  if (std::isfinite(candidate.train_cost)) StartFromOtherShapes(&candidate, from, effort);
+  if (const Candidate* part = BestSubset(candidate); part && part->train_cost < candidate.train_cost)
     Try(&candidate, StartFromSubset(candidate, *part), effort, candidate.train_cost);
-    if (first) StartFromOtherShapes(&candidate, from, effort);
-  }
   return std::isfinite(candidate.train_cost) ? &candidate : nullptr;
 }
 

@@ -107,7 +107,7 @@ class Judging {
     auto& all = result->statements;
     while (all.size() < found_.members.size()) {
       all.push_back(Of(found_.members[all.size()].use));
-      for (auto spare = Spare(all); spare != all.end(); spare = Spare(all)) {
+      for (auto spare = TakeOutSpare(all); spare != all.end(); spare = TakeOutSpare(all)) {
         dropped->push_back(*spare);
         dropped->back().rule = "hardly gains beside the others";
         const EffectUse gone = spare->use;
@@ -121,17 +121,14 @@ class Judging {
   }
 
   // The weakest of those judged if the set can do without it, which is then chosen.
-  std::vector<Statement>::iterator Spare(std::vector<Statement>& all) {
-    const auto least = std::min_element(all.begin(), all.end(), [](const Statement& a, const Statement& b) {
-      return a.numbers.gain < b.numbers.gain;
-    });
-    if (found_.members.size() < 2 || least == all.end() ||
-        least->probability >= kDiagnosePolicy.probability.present ||
+  std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
+    const auto least = std::min_element(
+        all.begin(), all.end(), [](const Statement& a, const Statement& b) { return a.numbers.gain < b.numbers.gain; });
+    if (found_.members.size() < 2 || least == all.end() || least->probability >= kDiagnosePolicy.probability.present ||
         least->numbers.gain >= kDiagnosePolicy.search.tie)
       return all.end();
     Candidate* without = found_.ledger.Find(Without(found_.chosen->effects, least->use));
     if (!without) return all.end();
-    found_.ledger.Continue(without, Effort::kTry);
     evidence_.Choose(without);
     return least;
   }
@@ -152,8 +149,7 @@ class Judging {
   }
 
   // Members that stand in for each other, not both of them sure alone, are judged by taking both out, the nearest pairs
-  // first. Most of what they gain must show only then, or both must gain alike: else the stronger one would lend the
-  // weaker one its evidence.
+  // first.
   void Couple(Judgement* result) {
     constexpr double kImitates = 0.5;
     std::vector<std::tuple<double, Statement*, Statement*>> pairs;
@@ -171,10 +167,8 @@ class Judging {
       say_("judging " + NameOfSet({x->use, y->use}));
       Statement together{.numbers = evidence_.Of({x->use, y->use}), .rule = "taken out together"};
       Weigh({x->use, y->use}, &together);
-      const auto [less, more] = std::minmax({std::max(x->numbers.gain, 0.0), std::max(y->numbers.gain, 0.0)});
-      const bool carried = less < kDiagnosePolicy.evidence.alike * more &&
-                           less + more > kDiagnosePolicy.evidence.alone * together.numbers.gain;
-      if (together.probability < present || carried) continue;
+      if (together.probability < present || !AreOneFinding(x->numbers.gain, y->numbers.gain, together.numbers.gain))
+        continue;
       together.group = static_cast<int>(result->groups.size());
       result->groups.push_back({x->use, y->use});
       for (Statement* s : {x, y}) {
@@ -314,6 +308,11 @@ double ProbabilityOf(const StatementNumbers& n) {
                x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
                    w.discrepancy * evidence + w.clear * clear + (n.smooth ? w.smooth : 0) + (n.dry ? w.dry : 0);
   return 1 / (1 + std::exp(-x));
+}
+
+bool AreOneFinding(double gain_a, double gain_b, double together) {
+  const auto [less, more] = std::minmax({std::max(gain_a, 0.0), std::max(gain_b, 0.0)});
+  return less >= kDiagnosePolicy.evidence.alike * more || less + more <= kDiagnosePolicy.evidence.alone * together;
 }
 
 double AtPrior(double evidence, double prior) {

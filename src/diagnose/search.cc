@@ -326,8 +326,8 @@ class Searcher {
   const Workbench& bench_;
   const Say& say_;
   SearchResult& result_;
-  double until_ = kPolicy.until_grown;  // of the work, until which sets are begun
-  std::set<EffectSet> grown_ = {{}};    // what was added to
+  double until_ = kPolicy.until_grown;                // of the work, until which sets are begun
+  std::set<EffectSet> grown_ = {{}};                  // what was added to
   std::set<std::pair<EffectSet, EffectUse>> looked_;  // members taken out from a leader's optimum
 };
 

@@ -43,6 +43,13 @@ TEST(ProbabilityTest, WhatTellsNothingIsLeftOut) {
   EXPECT_EQ(ProbabilityOf(numbers), ProbabilityOf(kClear));
 }
 
+TEST(OneFindingTest, TwoThatGainAlikeOrOnlyTogether) {
+  EXPECT_TRUE(AreOneFinding(2.4, 1.4, 2.5));
+  EXPECT_TRUE(AreOneFinding(0.3, 0.05, 2.5));  // each does the other's work
+  EXPECT_FALSE(AreOneFinding(2.4, 0.3, 2.5));  // one carries both
+  EXPECT_FALSE(AreOneFinding(2.4, -0.1, 2.3));
+}
+
 // Odds multiply: 1 to 3 at nine to one are 3 to 1.
 TEST(PriorTest, MultipliesTheOdds) {
   EXPECT_DOUBLE_EQ(AtPrior(0.25, 0.9), 0.75);

@@ -54,8 +54,7 @@ void Evidence::Choose(Candidate* candidate) {
 // Only chosen sets are fitted to the end.
 void Evidence::Compare(Candidate* candidate) {
   if (candidate->converged || !compared_.insert(candidate).second) return;
-  const double far = found_.chosen->train_cost * std::exp(kDiagnosePolicy.search.far_behind);
-  found_.ledger.Continue(candidate, Effort::kTry, far);
+  found_.ledger.Continue(candidate, Effort::kTry, FarBehind(*found_.chosen));
 }
 
 void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const {

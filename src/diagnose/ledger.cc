@@ -69,9 +69,9 @@ std::vector<Candidate*> Ledger::All() const {
   return all;
 }
 
-// Keeps the fit if it ends below the candidate's. Above `reach` it goes on only as fast as would lead below it.
-bool Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double reach) {
-  if (!std::isfinite(start.cost)) return false;
+// Keeps the fit if it ends below the candidate's. Above that and `reach` it goes on only as fast as would lead below.
+void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double reach) {
+  if (!std::isfinite(start.cost)) return;
   const double known = candidate->train_cost;
   const FitPoint before = candidate->point;
   const std::vector<double> values = candidate->values;
@@ -79,10 +79,11 @@ bool Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   const double shift_s = candidate->shift_s;
   const auto derivatives = candidate->derivatives;
   const FitLimits limits = LimitsOf(effort);
-  FitCandidate(bench_, candidate, start.point, limits,
-               start.cost > reach ? TooSlow(reach, limits.iterations) : GiveUp{}, start.from);
+  const double goal = std::min(known, reach);
+  FitCandidate(bench_, candidate, start.point, limits, start.cost > goal ? TooSlow(goal, limits.iterations) : GiveUp{},
+               start.from);
   Remember(candidate);
-  if (candidate->train_cost < known) return true;
+  if (candidate->train_cost < known) return;
   candidate->point = before;
   candidate->values = values;
   candidate->train_cost = known;
@@ -90,7 +91,6 @@ bool Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   candidate->scored = scored;
   candidate->shift_s = shift_s;
   candidate->derivatives = derivatives;
-  return false;
 }
 
 void Ledger::Remember(Candidate* candidate) {
@@ -120,10 +120,10 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
     if (const int index = from.model->IndexOf(name); index >= 0) all[i] = from.values[index];
     if (const auto given = values.find(name); given != values.end()) all[i] = given->second;
   }
-  Try(&candidate, StartFrom(candidate, from, all, dy), effort, candidate.train_cost);
+  Try(&candidate, StartFrom(candidate, from, all, dy), effort);
   if (std::isfinite(candidate.train_cost)) StartFromOtherShapes(&candidate, from, effort);
   if (const Candidate* part = BestSubset(candidate); part && part->train_cost < candidate.train_cost)
-    Try(&candidate, StartFromSubset(candidate, *part), effort, candidate.train_cost);
+    Try(&candidate, StartFromSubset(candidate, *part), effort);
   return std::isfinite(candidate.train_cost) ? &candidate : nullptr;
 }
 
@@ -171,7 +171,7 @@ void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, E
     values[index(s)] = std::clamp(values[index(s)] + size / of_size * of_shape, placed[s].low, placed[s].high);
     FitPoint point = candidate->problem->At(values, candidate->point);
     const double cost = CostAt(bench_, *candidate, point);
-    Try(candidate, {.point = std::move(point), .cost = cost}, std::max(effort, Effort::kTry), candidate->train_cost);
+    Try(candidate, {.point = std::move(point), .cost = cost}, std::max(effort, Effort::kTry));
   }
 }
 

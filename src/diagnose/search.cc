@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <set>
 
 #include "src/core/collect.h"
@@ -119,11 +118,8 @@ class Searcher {
     const auto use = [&](std::size_t trial) { return table.trials[trial].use; };
     const auto is_simpler = [&](const TrialSet& a, const TrialSet& b) {
       if (std::log(a.cost / b.cost) >= kPolicy.simpler) return false;
-      std::vector<EffectUse> of_a = Collect(a.trials, use), of_b = Collect(b.trials, use), only_a, only_b;
-      std::sort(of_a.begin(), of_a.end());
-      std::sort(of_b.begin(), of_b.end());
-      std::set_difference(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(), std::back_inserter(only_a));
-      std::set_difference(of_b.begin(), of_b.end(), of_a.begin(), of_a.end(), std::back_inserter(only_b));
+      const std::vector<EffectUse> of_a = Collect(a.trials, use), of_b = Collect(b.trials, use);
+      const std::vector<EffectUse> only_a = Without(of_a, of_b), only_b = Without(of_b, of_a);
       return only_a.size() == 1 && only_b.size() == 1 && Contains(only_b.front(), only_a.front(), *bench_.rig);
     };
     const std::vector<TrialSet> all = *level;
@@ -214,9 +210,6 @@ class Searcher {
     result_.ledger.Continue(result_.chosen, Effort::kFinish);
   }
 
-  // Above this a set is so far behind the chosen one that it matters little how far.
-  double MuchMore() const { return result_.chosen->train_cost * std::exp(kPolicy.far_behind); }
-
   // The chosen set without a member, refitted from the leader's optimum, or an earlier fit that is better.
   Candidate* TakenOut(const EffectUse& use, Effort effort) {
     const EffectSet rest = Without(result_.chosen->effects, use);
@@ -227,7 +220,7 @@ class Searcher {
       if (!known || looked_.insert({result_.chosen->effects, use}).second)
         without = result_.ledger.Refit(rest, *result_.chosen, {}, {}, effort);
     } else if (without && !known) {
-      result_.ledger.Continue(without, effort, MuchMore());
+      result_.ledger.Continue(without, effort, FarBehind(*result_.chosen));
     }
     return without ? without : result_.base;
   }
@@ -332,6 +325,8 @@ class Searcher {
 };
 
 }  // namespace
+
+double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(kPolicy.far_behind); }
 
 Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
   auto result = std::make_unique<SearchResult>(bench);

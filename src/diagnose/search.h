@@ -39,6 +39,9 @@ struct SearchResult {
   std::vector<std::string> cut;  // what the budget left out
 };
 
+// The cost above which a set is so far behind the chosen one that it matters little how far.
+double FarBehind(const Candidate& chosen);
+
 // `stop_if_uneven`: ends after the base model's refit when the split is a poor one. Errors: the base model cannot be
 // simulated along the logs.
 Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);

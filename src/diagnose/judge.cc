@@ -188,6 +188,15 @@ class Judging {
     return most;
   }
 
+  // Whether it could be in the place of a member that the set leaves out: it then gains what that one gained.
+  bool StandsIn(const EffectUse& use, const EffectSet& set) const {
+    return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& member) {
+      return std::find(set.begin(), set.end(), member.use) == set.end() &&
+             (AreOneMotion(use, member.use, *found_.base->model, found_.logged) ||
+              ImitatedBy(member.use, use) >= kDiagnosePolicy.search.imitates);
+    });
+  }
+
   // What was tried in a member's place: by the search, or where the ledger has that set by another way. `present`: the
   // sure members, whose set is what remains in the end.
   std::vector<Rival> RivalsOf(const Member& member, const EffectSet& present) const {
@@ -200,7 +209,7 @@ class Judging {
       }
       const bool same = Contains(use, member.use, *bench_.rig, true) || Contains(member.use, use, *bench_.rig, true);
       for (const EffectSet& set : {EffectSet(found_.chosen->effects), present}) {
-        if (same || std::find(set.begin(), set.end(), member.use) == set.end()) continue;
+        if (same || std::find(set.begin(), set.end(), member.use) == set.end() || StandsIn(use, set)) continue;
         const Candidate *own = found_.ledger.Find(set),
                         *other = found_.ledger.Find(With(Without(set, member.use), use));
         if (own && other) behind = std::min(behind, std::log(other->train_cost / own->train_cost));

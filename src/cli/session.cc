@@ -112,6 +112,25 @@ Option TimeStepOption(double& time_step_s) {
           .more = "A step never reaches over a logged row, so steps are parts of the log's sample time"};
 }
 
+namespace {
+
+Status CheckOneRig(const std::vector<Recording>& recordings) {
+  const Recording* named = nullptr;
+  for (const Recording& recording : recordings) {
+    if (recording.rig.empty()) continue;
+    if (!named) named = &recording;
+    if (recording.rig != named->rig)
+      return Error{.what = "logs of different rigs",
+                   .where = recording.log_path,
+                   .actual = "'" + recording.rig + "', while " + named->log_path + " is of '" + named->rig + "'",
+                   .allowed = "logs of one rig, which one model can explain",
+                   .cure = "give each rig's logs to a run of its own, with its own experiment file"};
+  }
+  return Ok();
+}
+
+}  // namespace
+
 Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,
                                               ThreadPool& pool) {
   std::vector<Result<Recording>> loaded(paths.size(), Error{.what = "not loaded"});
@@ -121,6 +140,7 @@ Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, cons
     if (!result.ok()) return result.error();
     recordings.push_back(std::move(result).value());
   }
+  GS_RETURN_IF_ERROR(CheckOneRig(recordings));
   return recordings;
 }
 

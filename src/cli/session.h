@@ -69,7 +69,7 @@ Status OverrideValues(const Model& model, const std::vector<std::string>& params
 
 Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common);
 
-// Reads all logs, in parallel; the first error in the order of the arguments.
+// Reads all logs, in parallel; the first error in the order of the arguments. Error: they name different rigs.
 Result<std::vector<Recording>> LoadRecordings(const Experiment& experiment, const std::vector<std::string>& paths,
                                               ThreadPool& pool);
 

@@ -113,6 +113,7 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
   GS_RETURN_IF_ERROR(CutTimeline(experiment, log, &timeline));
   Recording recording;
   recording.log_path = log_path;
+  recording.rig = log.rig;
   recording.rows_in_log = log.rows();
   recording.findings = log.findings;
   recording.findings.insert(recording.findings.end(), timeline.findings.begin(), timeline.findings.end());

@@ -25,6 +25,7 @@ struct Recording {
   };
 
   std::string log_path;
+  std::string rig;             // that the log says it is of; empty: it does not say
   std::vector<double> time_s;  // from zero, strictly increasing
   std::vector<Command> commands;
   std::vector<Measured> measured;  // only those that the log has

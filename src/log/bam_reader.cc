@@ -102,6 +102,7 @@ class Handler : public nlohmann::json_sax<Json> {
     if (depth_ == 1 && !in_entries_) {
       if (!CheckHeaderKey()) return false;
       log_->header_text[key_] = text;
+      if (key_ == "motor") log_->rig = text;
       return true;
     }
     if (depth_ == 0) return NotAnObject("a text");

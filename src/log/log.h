@@ -42,6 +42,7 @@ struct Log {
   std::vector<Column> columns;
   std::map<std::string, double> header;            // numbers of the header, by name
   std::map<std::string, std::string> header_text;  // texts of the header, by name
+  std::string rig;                                 // what the header says it was recorded on; empty: nothing
   std::vector<Finding> findings;
   std::vector<LineAnchor> lines;  // ascending in row; empty: a format without lines
   std::size_t header_line = 1;    // where the columns' names are

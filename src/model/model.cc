@@ -33,8 +33,9 @@ bool MayConstrain(const mjModel& m) {
   const auto any = [](const auto* values, mjtSize count) {
     return std::any_of(values, values + count, [](auto value) { return value > 0; });
   };
-  const bool collides = !(m.opt.disableflags & mjDSBL_CONTACT) &&
-                        (m.npair > 0 || m.nflex > 0 || any(m.geom_contype, m.ngeom) || any(m.geom_conaffinity, m.ngeom));
+  const bool collides =
+      !(m.opt.disableflags & mjDSBL_CONTACT) &&
+      (m.npair > 0 || m.nflex > 0 || any(m.geom_contype, m.ngeom) || any(m.geom_conaffinity, m.ngeom));
   return m.neq > 0 || collides || any(m.jnt_limited, m.njnt) || any(m.dof_frictionloss, m.nv) ||
          any(m.tendon_limited, m.ntendon) || any(m.tendon_frictionloss, m.ntendon);
 }

@@ -173,6 +173,25 @@ TEST_F(CliTest, FilesEffectsAndParametersThatAreWrong) {
   ExpectRefused("replay '" + experiment + "' '" + log + "'", {"e.yaml:1:"});
 }
 
+TEST_F(CliTest, LogsOfDifferentRigsAreRefused) {
+  const auto log = [&](const std::string& name, const std::string& motor) {
+    std::string entries;
+    for (int k = 0; k < 100; ++k)
+      entries += (k > 0 ? ", " : "") + std::string("{\"position\": 0.0, \"goal_position\": 0.0, \"timestamp\": ") +
+                 std::to_string(0.005 * k) + ", \"torque_enable\": true}";
+    return "'" +
+           scratch_.Write(name, "{\"mass\": 0.5, \"length\": 0.1, \"kp\": 100, \"vin\": 7.4, " + motor +
+                                    "\"entries\": [" + entries + "]}") +
+           "' ";
+  };
+  const std::string replay = "replay '" + kModels + "xl330/experiment.yaml' ";
+  const std::string own = log("own.json", "\"motor\": \"xl330\", "), silent = log("silent.json", "");
+  ExpectRefused(replay + own + silent + log("other.json", "\"motor\": \"sts3032\", "),
+                {"other.json", "logs of different rigs", "'sts3032'", "'xl330'"});
+  const Answer answer = Run(replay + own + silent + "--quiet --json");
+  EXPECT_EQ(answer.status, 0) << answer.err;
+}
+
 TEST_F(CliTest, JsonAloneOnStdoutMessagesOnStderr) {
   // A gap and a repeated stamp: both are reported.
   std::string text = ReadAll(JointLog());

@@ -197,9 +197,21 @@ class Judging {
     });
   }
 
+  // By how much a set costs more with `use` in a member's place, where both are in the ledger. Infinite where the
+  // member hardly gains: nothing at all would cost as little there.
+  double BehindIn(const EffectSet& set, const EffectUse& member, const EffectUse& use) {
+    const EffectSet rest = Without(set, member);
+    const Candidate *own = found_.ledger.Find(set), *other = found_.ledger.Find(With(rest, use));
+    if (!own || !other) return kInfinity;
+    const Candidate* without = found_.ledger.Find(rest);
+    if (!without) without = found_.ledger.Refit(rest, *own, {}, {}, Effort::kTry);
+    const bool gains = without && std::log(without->train_cost / own->train_cost) >= kDiagnosePolicy.search.tie;
+    return gains ? std::log(other->train_cost / own->train_cost) : kInfinity;
+  }
+
   // What was tried in a member's place: by the search, or where the ledger has that set by another way. `present`: the
   // sure members, whose set is what remains in the end.
-  std::vector<Rival> RivalsOf(const Member& member, const EffectSet& present) const {
+  std::vector<Rival> RivalsOf(const Member& member, const EffectSet& present) {
     std::vector<Rival> rivals;
     for (const EffectUse& use : found_.uses) {
       if (std::count(found_.chosen->effects.begin(), found_.chosen->effects.end(), use) > 0) continue;
@@ -210,9 +222,7 @@ class Judging {
       const bool same = Contains(use, member.use, *bench_.rig, true) || Contains(member.use, use, *bench_.rig, true);
       for (const EffectSet& set : {EffectSet(found_.chosen->effects), present}) {
         if (same || std::find(set.begin(), set.end(), member.use) == set.end() || StandsIn(use, set)) continue;
-        const Candidate *own = found_.ledger.Find(set),
-                        *other = found_.ledger.Find(With(Without(set, member.use), use));
-        if (own && other) behind = std::min(behind, std::log(other->train_cost / own->train_cost));
+        behind = std::min(behind, BehindIn(set, member.use, use));
       }
       if (std::isfinite(behind)) rivals.push_back({.use = use, .behind = behind});
     }

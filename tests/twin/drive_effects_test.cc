@@ -148,12 +148,14 @@ TEST(DriveEffectsTest, DeadZoneIsContinuous) {
 }
 
 TEST(DriveEffectsTest, AsymmetryScalesBySignOfTorque) {
-  Plant plant = TorqueSource();
-  plant.drive.asymmetry = 0.1;
-  Simulator up(plant, kStep_s), down(plant, kStep_s);
-  RunFor(0.1, Constant(0, 2), &up);
-  RunFor(0.1, Constant(0, -2), &down);
-  EXPECT_NEAR(up.w1() / -down.w1(), 1.1 / 0.9, 1e-9);
+  for (const double asymmetry : {0.1, -0.1}) {
+    Plant plant = TorqueSource();
+    plant.drive.asymmetry = asymmetry;
+    Simulator up(plant, kStep_s), down(plant, kStep_s);
+    RunFor(0.1, Constant(0, 2), &up);
+    RunFor(0.1, Constant(0, -2), &down);
+    EXPECT_NEAR(up.w1() / -down.w1(), (1 + asymmetry) / (1 - asymmetry), 1e-9);
+  }
 }
 
 TEST(DriveEffectsTest, EveryListedParameterCanBeSet) {

@@ -172,7 +172,7 @@ DriveOutput Simulator::DriveAt(const State& x, const Inputs& in, State* rate) co
   if (d.droop > 0) {
     torque *= 1 - d.droop * std::pow(std::min(std::abs(torque) / d.droop_peak_n_m, 1.0), d.droop_exponent);
   }
-  out.torque_n_m = gain * torque * (1 + std::copysign(d.asymmetry, torque));
+  out.torque_n_m = gain * torque * (1 + d.asymmetry * std::copysign(1.0, torque));
   if (d.sag_ceiling < kNever) (*rate)[kSag] = (std::abs(load) / d.sag_ceiling - x[kSag]) / d.sag_time_s;
   return out;
 }

@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -28,22 +29,37 @@ struct DiagnoseFlags {
 Status WriteDiagnosis(const std::string& out, const Experiment& experiment, const DataSplit& data,
                       const std::map<std::string, double>& log_values, const DiagnoseRun& run, ThreadPool& pool) {
   const Diagnosis& diagnosis = run.diagnosis;
-  GS_ASSIGN(const auto base, Model::Build(diagnosis.model->rig()));
+  GS_ASSIGN(const auto bare, Model::Build(diagnosis.model->rig()));
   RunFiles files;
-  GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*base, data.train)));
+  GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*bare, data.train)));
   const ReportLogs logs{data.train, data.held_out};
   ReportSource source = SourceOf(experiment, logs);
   source.content = PageOf(run);
   source.predictions = Predict(experiment, logs,
-                               {{"nominal", base, base->Nominal()},
+                               {{"nominal", diagnosis.refit_model, diagnosis.nominal_values},
                                 {"refitted", diagnosis.refit_model, diagnosis.refit_values},
                                 {"diagnosed", diagnosis.model, diagnosis.values}},
                                pool);
-  source.model = base.get();
-  source.values = base->Nominal();
+  source.model = diagnosis.refit_model.get();
+  source.values = diagnosis.nominal_values;
   source.parameters = diagnosis.model->parameters();
   files.report = &source;
   return WriteRun(out, ToJson(run), files);
+}
+
+// What --with, --set and --params say of the base model.
+Status AddKnown(const ModelFlags& flags, const Experiment& experiment, const DataSplit& data,
+                DiagnoseOptions* options) {
+  if (flags.with.empty() && flags.set.empty() && flags.params.empty()) return Ok();
+  GS_ASSIGN(const auto bare, Model::Load(experiment));
+  GS_ASSIGN(options->known, ParseEffects(flags.with, *bare->rig()));
+  GS_ASSIGN(const auto base, Model::Build(bare->rig(), options->known, EstimateScales(*bare, data.train)));
+  std::vector<double> given(base->parameters().size(), kNaN);
+  GS_RETURN_IF_ERROR(OverrideValues(*base, flags.params, flags.set, &given));
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (std::isfinite(given[i])) options->values[base->parameters()[i].name] = given[i];
+  }
+  return Ok();
 }
 
 Result<DiagnoseOptions> OptionsOf(const DiagnoseFlags& flags, const Experiment& experiment) {
@@ -74,6 +90,7 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   const auto log_values = recordings.front().values;
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);
   GS_ASSIGN(DiagnoseOptions options, OptionsOf(flags, experiment));
+  GS_RETURN_IF_ERROR(AddKnown(flags.model, experiment, data, &options));
   const bool live = !flags.common.quiet && isatty(2);
   if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
   auto diagnosed = Diagnose(experiment, data, options, pool);
@@ -125,6 +142,7 @@ Command DiagnoseCommand() {
   return {.name = "diagnose",
           .what = "Where the gap lies, which unmodelled effect causes it, how far it shrinks",
           .options = Join({LogOptions(flags->model),
+                           EffectOptions(flags->model),
                            own,
                            {FolderOption(flags->common, "result.json, report.html and model.xml")},
                            CommonOptions(flags->common)}),

@@ -47,10 +47,22 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
   return options;
 }
 
+std::vector<double> Workbench::Nominal(const Model& model) const {
+  std::vector<double> nominal = model.Nominal();
+  for (const EffectUse& use : known) {
+    for (const auto& p : PlacedParameters(use, *rig, scales))
+      nominal[static_cast<std::size_t>(model.IndexOf(p.name))] = p.start;
+  }
+  for (const auto& [name, value] : values) nominal[static_cast<std::size_t>(model.IndexOf(name))] = value;
+  return nominal;
+}
+
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects) {
   Candidate candidate{.effects = effects};
-  GS_ASSIGN(candidate.model, Model::Build(bench.rig, effects, bench.scales));
-  candidate.values = candidate.model->Nominal();
+  std::vector<EffectUse> all = bench.known;
+  all.insert(all.end(), effects.begin(), effects.end());
+  GS_ASSIGN(candidate.model, Model::Build(bench.rig, all, bench.scales));
+  candidate.values = bench.Nominal(*candidate.model);
   candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train,
                                                    bench.Options(*candidate.model, true), candidate.values, bench.pool);
   for (const auto& use : effects) {
@@ -106,7 +118,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   fit.logarithmic_effects = true;
   // What is known lies around nominal; a model that leaves more than the noise has residuals that lie, and count for
   // less.
-  fit.prior_centre = candidate->model->Nominal();
+  fit.prior_centre = bench.Nominal(*candidate->model);
   fit.prior_scale = std::max(1.0, candidate->held_out_floors * candidate->held_out_floors);
   auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
   const FitPoint start = CarryOver(*candidate->problem, candidate->point, *problem, candidate->values);

@@ -61,6 +61,8 @@ struct Workbench {
   std::shared_ptr<Work> work = std::make_shared<Work>();  // done so far
   std::size_t most_steps = 0;                             // of the simulator; 0: no limit
   std::map<std::string, double> priors;                   // DiagnoseOptions::priors
+  std::vector<EffectUse> known;                           // in every model
+  std::map<std::string, double> values;                   // DiagnoseOptions::values
   // Of base parameters, where they were widened.
   std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
@@ -68,11 +70,14 @@ struct Workbench {
   DiagnosisJournal* journal = nullptr;  // null: none
 
   FitOptions Options(const Model& model, bool train) const;
-  // `share` of the work is spent, or the time where one was asked for.
-  bool Late(double share) const {
-    return (most_steps > 0 && static_cast<double>(work->steps) > share * static_cast<double>(most_steps)) ||
-           TimeIsOver();
+  // Where fits start: nominal values, and those that are known better; known effects where an effect's trial starts.
+  std::vector<double> Nominal(const Model& model) const;
+  // Share of the work that may be done.
+  double WorkDone() const {
+    return most_steps > 0 ? static_cast<double>(work->steps) / static_cast<double>(most_steps) : 0;
   }
+  // `share` of it is done, or the time is over where one was asked for.
+  bool Late(double share) const { return WorkDone() > share || TimeIsOver(); }
   // What was done in time before an interruption is not cut afterwards.
   bool TimeIsOver() const { return !(journal && journal->replaying()) && IsLate(deadline); }
 };

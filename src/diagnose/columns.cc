@@ -66,7 +66,7 @@ struct Wanted {
   Eigen::Index first = 0;  // of the extra columns
   Eigen::Index Add(std::string name, Candidate& child, const EffectUse& use, const Workbench& bench,
                    const std::vector<double>& values) {
-    std::vector<double> all = child.model->Nominal();
+    std::vector<double> all = bench.Nominal(*child.model);
     const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
     for (std::size_t i = 0; i < placed.size(); ++i) all[child.model->IndexOf(placed[i].name)] = values[i];
     columns.push_back({.name = std::move(name), .child = child.problem.get(), .values = std::move(all)});

@@ -246,6 +246,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   result.most_steps = bench.most_steps;
   result.model = chosen.model;
   result.values = chosen.values;
+  result.nominal_values = found.nominal->values;
   result.refit_model = base.model;
   result.refit_values = base.values;
   result.explanation = Explain(result);

@@ -133,6 +133,8 @@ Result<std::uint64_t> JobKey(const Model& model, const DataSplit& data, const Di
       static_cast<double>(options.seed), static_cast<double>(options.max_windows)};
   hasher.Numbers(numbers);
   for (const auto& [name, prior] : options.priors) hasher.Text(name).Number(prior);
+  for (const EffectUse& use : options.known) hasher.Text(use.Text());
+  for (const auto& [name, value] : options.values) hasher.Text(name).Number(value);
   return hasher.value();
 }
 
@@ -188,7 +190,9 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .weights = {},
                     .window_s = options.window_s,
                     .max_windows = options.max_windows,
-                    .priors = options.priors};
+                    .priors = options.priors,
+                    .known = options.known,
+                    .values = options.values};
     bench.sample_s = kInfinity;
     for (const auto* logs : {&fine.train, &fine.held_out}) {
       for (const auto& recording : *logs) bench.sample_s = std::min(bench.sample_s, recording.timeline.median_step_s);

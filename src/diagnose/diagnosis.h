@@ -141,6 +141,7 @@ struct Diagnosis {
   bool uneven = false;                 // train and held-out logs show the gap very differently
   std::shared_ptr<const Model> model;  // with the effects found
   std::vector<double> values;
+  std::vector<double> nominal_values;        // of refit_model: where its fit started
   std::shared_ptr<const Model> refit_model;  // the base model, refitted
   std::vector<double> refit_values;
 };
@@ -159,6 +160,9 @@ struct DiagnoseOptions {
   std::size_t max_windows = 90;  // of the training logs
   // What is known of effects beforehand: probabilities by "EFFECT" or "EFFECT@PLACE", which goes first. Others: 0.5.
   std::map<std::string, double> priors;
+  // What the base model has beside the experiment's own: effects, and values to start from by the parameters' names.
+  std::vector<EffectUse> known;
+  std::map<std::string, double> values;
   std::function<void(const std::string&)> progress;
   // Folder of a DiagnosisJournal, empty: none; whether the run recorded there goes on. It stays when the run has ended:
   // what it led to is to be written first (DiagnosisJournal::Remove).

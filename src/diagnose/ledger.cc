@@ -114,7 +114,7 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
   }
   if (!place->problem) return nullptr;
   Candidate& candidate = *place;
-  std::vector<double> all = candidate.model->Nominal();
+  std::vector<double> all = bench_.Nominal(*candidate.model);
   for (std::size_t i = 0; i < all.size(); ++i) {
     const std::string& name = candidate.model->parameters()[i].name;
     if (const int index = from.model->IndexOf(name); index >= 0) all[i] = from.values[index];
@@ -186,7 +186,7 @@ const Candidate* Ledger::BestSubset(const Candidate& candidate) const {
 
 // What the subset lacks begins small.
 Ledger::Start Ledger::StartFromSubset(const Candidate& candidate, const Candidate& part) const {
-  std::vector<double> values = candidate.model->Nominal();
+  std::vector<double> values = bench_.Nominal(*candidate.model);
   for (const auto& use : candidate.effects) {
     if (std::find(part.effects.begin(), part.effects.end(), use) != part.effects.end()) continue;
     for (const auto& p : PlacedParameters(use, *bench_.rig, bench_.scales)) {

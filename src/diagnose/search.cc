@@ -42,21 +42,22 @@ class Searcher {
                    .where = bench_.rig->experiment().path,
                    .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
     }
-    nominal.values = nominal.model->Nominal();
     ScoreCandidate(bench_, &nominal);
     result_.nominal = std::make_unique<Candidate>(std::move(nominal));
-    result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kFinish);
+    result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kTry);
     for (std::size_t round = 0; round < kPolicy.widenings && WidenBounds(*result_.base); ++round) {
       GS_ASSIGN(Candidate wider, MakeCandidate(bench_, {}));
       wider.values = result_.base->values;
       wider.point = CarryOver(*result_.base->problem, result_.base->point, *wider.problem, wider.values);
       result_.ledger.Clear();
-      result_.base = result_.ledger.Refit({}, wider, {}, {}, Effort::kFinish);
+      result_.base = result_.ledger.Refit({}, wider, {}, {}, Effort::kTry);
     }
+    result_.ledger.Continue(result_.base, Effort::kFinish);
     ScoreCandidate(bench_, result_.base);
     result_.chosen = result_.base;
     for (const auto& use : AllUses(*bench_.rig)) {
-      if (IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
+      const bool known = std::find(bench_.known.begin(), bench_.known.end(), use) != bench_.known.end();
+      if (!known && IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
     }
     return Ok();
   }
@@ -65,6 +66,7 @@ class Searcher {
     say_("columns of all effects");
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
+    begin_ = bench_.WorkDone();
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
     Grow(Leaders());
     Lead();
@@ -89,9 +91,11 @@ class Searcher {
     }
   }
 
-  // Of the work, `share` may be spent when `what` begins.
+  // Of the work beyond the base model's, `share` is spent.
+  bool IsOver(double share) const { return bench_.Late(begin_ + share * std::max(0.0, 1 - begin_)); }
+  // The same, noted when it keeps `what` from being begun.
   bool Late(double share, const char* what) {
-    if (!bench_.Late(share)) return false;
+    if (!IsOver(share)) return false;
     if (result_.cut.empty() || result_.cut.back() != what) result_.cut.emplace_back(what);
     return true;
   }
@@ -196,7 +200,7 @@ class Searcher {
         ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
         if (!table.valid) continue;
         RefitSets(*leader, table, {kPolicy.additions, 1});
-        if (bench_.Late(until_)) grown_.erase(leader->effects);
+        if (IsOver(until_)) grown_.erase(leader->effects);
         again = true;
       }
       if (!again) return;
@@ -319,7 +323,8 @@ class Searcher {
   const Workbench& bench_;
   const Say& say_;
   SearchResult& result_;
-  double until_ = kPolicy.until_grown;                // of the work, until which sets are begun
+  double begin_ = 0;                                  // share of the work that was spent before any set
+  double until_ = kPolicy.until_grown;                // of the rest, until which sets are begun
   std::set<EffectSet> grown_ = {{}};                  // what was added to
   std::set<std::pair<EffectSet, EffectUse>> looked_;  // members taken out from a leader's optimum
 };

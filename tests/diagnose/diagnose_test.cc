@@ -53,9 +53,9 @@ Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect
   return logs;
 }
 
-Diagnosis DiagnoseLogs(const Logs& logs) {
+Diagnosis DiagnoseLogs(const Logs& logs, const DiagnoseOptions& options = {}) {
   ThreadPool pool(2);
-  auto result = Diagnose(logs.experiment, SplitData(logs.recordings, {}), {.budget_s = 0}, pool);
+  auto result = Diagnose(logs.experiment, SplitData(logs.recordings, {}), options, pool);
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().Text());
   return std::move(result).value();
 }
@@ -75,6 +75,19 @@ TEST(DiagnoseTest, NamesATorqueBias) {
   double sum = 0;
   for (const auto& c : d.candidates) sum += c.probability;
   EXPECT_NEAR(sum, 1, 1e-9);
+}
+
+TEST(DiagnoseTest, WhatIsKnownIsInTheBaseModel) {
+  const Logs logs = MakeLogs("flexlink", twin::Kind::kSingle, "torque_bias@hub", 31);
+  const EffectUse known{"torque_bias", "hub"};
+  const Diagnosis d = DiagnoseLogs(logs, {.effort = SearchEffort::kQuick, .known = {known}});
+  EXPECT_TRUE(d.effects.empty()) << d.explanation;
+  EXPECT_TRUE(std::none_of(d.statements.begin(), d.statements.end(), [&](const auto& s) { return s.use == known; }));
+  const int size = d.refit_model->IndexOf("torque_bias@hub.torque_n_m");
+  ASSERT_GE(size, 0);
+  const double truth = logs.effects[0].parameters.front().second;
+  EXPECT_NEAR(d.refit_values[static_cast<std::size_t>(size)] / truth, 1, 0.25);
+  EXPECT_LT(d.refit, 0.3 * d.nominal);
 }
 
 TEST(DiagnoseTest, NamesATorqueSpeedCurve) {

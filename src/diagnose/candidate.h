@@ -72,12 +72,11 @@ struct Workbench {
   FitOptions Options(const Model& model, bool train) const;
   // Where fits start: nominal values, and those that are known better; known effects where an effect's trial starts.
   std::vector<double> Nominal(const Model& model) const;
-  // Share of the work that may be done.
-  double WorkDone() const {
-    return most_steps > 0 ? static_cast<double>(work->steps) / static_cast<double>(most_steps) : 0;
+  // `share` of the work is spent, or the time where one was asked for.
+  bool Late(double share) const {
+    return (most_steps > 0 && static_cast<double>(work->steps) > share * static_cast<double>(most_steps)) ||
+           TimeIsOver();
   }
-  // `share` of it is done, or the time is over where one was asked for.
-  bool Late(double share) const { return WorkDone() > share || TimeIsOver(); }
   // What was done in time before an interruption is not cut afterwards.
   bool TimeIsOver() const { return !(journal && journal->replaying()) && IsLate(deadline); }
 };

@@ -44,15 +44,14 @@ class Searcher {
     }
     ScoreCandidate(bench_, &nominal);
     result_.nominal = std::make_unique<Candidate>(std::move(nominal));
-    result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kTry);
+    result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kFinish);
     for (std::size_t round = 0; round < kPolicy.widenings && WidenBounds(*result_.base); ++round) {
       GS_ASSIGN(Candidate wider, MakeCandidate(bench_, {}));
       wider.values = result_.base->values;
       wider.point = CarryOver(*result_.base->problem, result_.base->point, *wider.problem, wider.values);
       result_.ledger.Clear();
-      result_.base = result_.ledger.Refit({}, wider, {}, {}, Effort::kTry);
+      result_.base = result_.ledger.Refit({}, wider, {}, {}, Effort::kFinish);
     }
-    result_.ledger.Continue(result_.base, Effort::kFinish);
     ScoreCandidate(bench_, result_.base);
     result_.chosen = result_.base;
     for (const auto& use : AllUses(*bench_.rig)) {
@@ -66,8 +65,9 @@ class Searcher {
     say_("columns of all effects");
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
-    begin_ = bench_.WorkDone();
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
+    // However little may be done, the first sets are looked at.
+    until_ = kPolicy.until_grown;
     Grow(Leaders());
     Lead();
     Settle();
@@ -91,11 +91,9 @@ class Searcher {
     }
   }
 
-  // Of the work beyond the base model's, `share` is spent.
-  bool IsOver(double share) const { return bench_.Late(begin_ + share * std::max(0.0, 1 - begin_)); }
-  // The same, noted when it keeps `what` from being begun.
+  // Of the work, `share` may be spent when `what` begins.
   bool Late(double share, const char* what) {
-    if (!IsOver(share)) return false;
+    if (!bench_.Late(share)) return false;
     if (result_.cut.empty() || result_.cut.back() != what) result_.cut.emplace_back(what);
     return true;
   }
@@ -200,7 +198,7 @@ class Searcher {
         ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
         if (!table.valid) continue;
         RefitSets(*leader, table, {kPolicy.additions, 1});
-        if (IsOver(until_)) grown_.erase(leader->effects);
+        if (bench_.Late(until_)) grown_.erase(leader->effects);
         again = true;
       }
       if (!again) return;
@@ -323,8 +321,7 @@ class Searcher {
   const Workbench& bench_;
   const Say& say_;
   SearchResult& result_;
-  double begin_ = 0;                                  // share of the work that was spent before any set
-  double until_ = kPolicy.until_grown;                // of the rest, until which sets are begun
+  double until_ = kInfinity;                          // of the work, until which sets are begun
   std::set<EffectSet> grown_ = {{}};                  // what was added to
   std::set<std::pair<EffectSet, EffectUse>> looked_;  // members taken out from a leader's optimum
 };

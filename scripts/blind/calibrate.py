@@ -2,7 +2,7 @@
 """What a probability should be, from banks of twin cases: logistic fits of "right" on the evidence.
 
     scripts/blind/calibrate.py out/blind/902 [out/blind/...]
-    scripts/blind/calibrate.py --features middle_gain:-1:3,log_discrepancy:-1:6,clear:-3:2,smooth,dry out/blind/rough_1
+    scripts/blind/calibrate.py --features largest_gain:-1:3,log_discrepancy:-1:6,smooth,clear:-3:2,dry out/blind/rough_1
 
 Without --features: of verdicts, one fit for each kind. With: of statements, on the named members of each one's
 `numbers` (missing: 0; NAME:LOW:HIGH clips; those of DERIVED are made of them): `ProbabilityPolicy` of
@@ -10,7 +10,7 @@ src/diagnose/policy.h. Prints weights, the AUC of every number alone, and the ca
 each rig, is judged by weights from the others. Judge either on banks of other seeds. Plain Newton steps with a Gaussian
 prior on each weight, banks being small: around 0 with deviation 2, or where KNOWN says, from an earlier bank of 234
 statements."""
-import argparse, json, math, statistics as stats, sys
+import argparse, json, math, sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -18,11 +18,10 @@ import score  # noqa: E402
 import statements  # noqa: E402
 
 PRIOR = (0.0, 2.0)
-KNOWN = {"constant": (-3.65, 0.5), "middle_gain": (1.42, 0.5), "log_discrepancy": (1.11, 0.5), "smooth": (-2.21, 0.5),
+KNOWN = {"constant": (-3.65, 0.5), "log_discrepancy": (1.11, 0.5), "smooth": (-2.21, 0.5),
          "clear": (0.0, 1.0), "dry": (0.0, 1.5)}  # weights by mean and deviation; the constant where mimicry is 0
 DERIVED = {  # as ProbabilityOf in src/diagnose/judge.cc has them
-    "middle_gain": lambda n: stats.median(
-        n[k] for k in ("gain", "gain_held_out", "gain_free") if n[k] is not None),
+    "largest_gain": lambda n: max(n[k] for k in ("gain", "gain_held_out", "gain_free") if n[k] is not None),
     "log_discrepancy": lambda n: math.copysign(math.log1p(abs(n["discrepancy"])), n["discrepancy"]),
 }
 

@@ -315,12 +315,11 @@ class Judging {
 
 double ProbabilityOf(const StatementNumbers& n) {
   const ProbabilityPolicy& w = kDiagnosePolicy.probability;
-  // The middle one: a single kind of log that happens not to show the effect, or to show it alone, does not decide.
-  std::vector<double> gains;
-  for (const double gain : {n.gain, n.gain_held_out, n.gain_free}) {
-    if (std::isfinite(gain)) gains.push_back(gain);
+  // The largest: an effect that is there shows most where its absence adds up.
+  double gain = -kInfinity;
+  for (const double one : {n.gain, n.gain_held_out, n.gain_free}) {
+    if (std::isfinite(one)) gain = std::max(gain, one);
   }
-  const double gain = gains.empty() ? 0 : Median(gains);
   const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0,
                                      w.most_discrepancy),
                clear = std::clamp(n.clear, w.least_clear, w.most_clear),

@@ -51,7 +51,7 @@ struct EvidencePolicy {
 
 // P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).
 struct ProbabilityPolicy {
-  double constant = -3.84, gain = 1.19, discrepancy = 0.74, clear = 0.33, smooth = -1.96, dry = 1.87;
+  double constant = -3.51, gain = 0.88, discrepancy = 0.68, clear = 0.27, smooth = -1.84, dry = 0.86;
   double most_discrepancy = 6, most_clear = 2, least_clear = -3;  // beyond them they say nothing more
   double present = 0.5;                                           // least probability of an effect that is listed
 };

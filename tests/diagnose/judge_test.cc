@@ -15,7 +15,7 @@ TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
   const double clear = ProbabilityOf(kClear);
   EXPECT_GT(clear, 0.9);
   StatementNumbers weaker = kClear;
-  weaker.gain_held_out = weaker.gain_free = 0;
+  weaker.gain = weaker.gain_held_out = weaker.gain_free = 0;
   EXPECT_LT(ProbabilityOf(weaker), clear);
   weaker = kClear, weaker.discrepancy = -3;
   EXPECT_LT(ProbabilityOf(weaker), clear);
@@ -29,10 +29,10 @@ TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
   EXPECT_LT(ProbabilityOf({}), 0.05);
 }
 
-// A training log that does not reach the effect does not speak against what the others show.
-TEST(ProbabilityTest, OneKindOfLogDoesNotDecide) {
+// Logs that do not reach the effect, and windows too short for it to add up, do not speak against what others show.
+TEST(ProbabilityTest, TheLargestGainCounts) {
   StatementNumbers numbers = kClear;
-  numbers.gain = 0.1;
+  numbers.gain = numbers.gain_held_out = 0.1;
   EXPECT_EQ(ProbabilityOf(numbers), ProbabilityOf(kClear));
 }
 

@@ -86,16 +86,17 @@ std::string FlatText(const FlatDirection& flat, const Model& model) {
                          flat.parts[1].second > 0 ? "/" : "*", b.name);
   }
   std::string names;
-  for (const auto& [index, weight] : flat.parts)
-    names += fmt::format("{}{}{}",
+  for (const auto& [index, weight] : flat.parts) {
+    const Parameter& p = model.parameters()[index];
+    names += fmt::format("{}{}{}{}",
                          names.empty() ? ""
                          : weight > 0  ? " + "
                                        : " - ",
                          std::abs(std::abs(weight) - 1) < 0.05 ? "" : fmt::format("{:.2f} ", std::abs(weight)),
-                         model.parameters()[index].name);
+                         flat.parts.size() > 1 && p.low > 0 ? "ln " : "", p.name);
+  }
   return flat.parts.size() == 1 ? names + " is not known from these logs"
-                                : "only together: these logs leave the direction " + names +
-                                      " (logarithms where the bounds are positive) open";
+                                : "these logs leave the direction " + names + " open";
 }
 
 std::vector<std::string> ParameterNotes(const TuneRun& run) {

@@ -220,10 +220,9 @@ class Judging {
         if (tried.use == use) behind = std::min(behind, tried.behind);
       }
       const bool same = Contains(use, member.use, *bench_.rig, true) || Contains(member.use, use, *bench_.rig, true);
-      for (const EffectSet& set : {EffectSet(found_.chosen->effects), present}) {
-        if (same || std::find(set.begin(), set.end(), member.use) == set.end() || StandsIn(use, set)) continue;
-        behind = std::min(behind, BehindIn(set, member.use, use));
-      }
+      if (!same) behind = std::min(behind, BehindIn(found_.chosen->effects, member.use, use));
+      const bool is_sure = std::find(present.begin(), present.end(), member.use) != present.end();
+      if (!same && is_sure && !StandsIn(use, present)) behind = std::min(behind, BehindIn(present, member.use, use));
       if (std::isfinite(behind)) rivals.push_back({.use = use, .behind = behind});
     }
     return rivals;

@@ -24,6 +24,7 @@ class Judging {
     std::vector<Statement> dropped = Simplify();
     JudgeMembers(&result, &dropped);
     Couple(&result);
+    JudgeComplements(&result);
     AddRivals(&result);
     result.statements.insert(result.statements.end(), dropped.begin(), dropped.end());
     for (Statement& s : result.statements)
@@ -174,6 +175,29 @@ class Judging {
       for (Statement* s : {x, y}) {
         together.use = s->use;
         *s = together;
+      }
+    }
+  }
+
+  // Members that are seen only beside each other are there both or neither: what the one that seems sure gains rests
+  // on the other one.
+  void JudgeComplements(Judgement* result) {
+    const double present = kDiagnosePolicy.probability.present;
+    for (Statement& x : result->statements) {
+      for (Statement& y : result->statements) {
+        if (&x >= &y || x.group >= 0 || y.group >= 0 || std::min(x.probability, y.probability) >= present) continue;
+        if (std::min(x.numbers.gain, y.numbers.gain) < kDiagnosePolicy.search.tie) continue;
+        say_("judging " + NameOfSet({x.use, y.use}) + ": both or neither");
+        Statement both{.numbers = evidence_.Of({x.use, y.use})};
+        both.numbers.dry = x.numbers.dry || y.numbers.dry;  // no smooth torque takes the place of both
+        Weigh({x.use, y.use}, &both);
+        both.prior = std::min(PriorOf(x.use), PriorOf(y.use));
+        both.probability = AtPrior(both.evidence, both.prior);
+        if (both.probability < present || !AreComplements(x.numbers.gain, y.numbers.gain, both.numbers.gain)) continue;
+        const EffectUse of_x = x.use, of_y = y.use;
+        x = y = both;
+        x.use = of_x, x.rule = "both or neither: seen only beside " + of_y.Text();
+        y.use = of_y, y.rule = "both or neither: seen only beside " + of_x.Text();
       }
     }
   }
@@ -330,6 +354,13 @@ double ProbabilityOf(const StatementNumbers& n) {
 bool AreOneFinding(double gain_a, double gain_b, double together) {
   const auto [less, more] = std::minmax({std::max(gain_a, 0.0), std::max(gain_b, 0.0)});
   return less >= kDiagnosePolicy.evidence.alike * more || less + more <= kDiagnosePolicy.evidence.alone * together;
+}
+
+bool AreComplements(double gain_a, double gain_b, double together) {
+  // Of costs, not of their logarithms: what effects of different things gain adds up in costs.
+  const double a = std::expm1(gain_a), b = std::expm1(gain_b), both = std::expm1(together);
+  const double alone = kDiagnosePolicy.evidence.alone;
+  return a > 0 && b > 0 && both - b <= alone * a && both - a <= alone * b;
 }
 
 double AtPrior(double evidence, double prior) {

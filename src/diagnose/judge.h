@@ -16,6 +16,10 @@ double AtPrior(double evidence, double prior);
 // shows only where both are taken out (`together`). Else the stronger one would lend the weaker one its evidence.
 bool AreOneFinding(double gain_a, double gain_b, double together);
 
+// Whether two members are seen only beside each other: either one, where the other one is missing, gains at most half
+// of what it gains beside it. Gains are ln(cost without / cost with); what distinct effects gain adds up in costs.
+bool AreComplements(double gain_a, double gain_b, double together);
+
 struct Judgement {
   std::vector<Statement> statements;           // the surest first; sizes are left to whoever describes them
   std::vector<std::vector<EffectUse>> groups;  // by Statement::group

@@ -45,7 +45,8 @@ struct EvidencePolicy {
   std::size_t draws = 200;                      // of held-out half seconds, for the intervals of shares
   double most_gain = 3;                         // above it a gain says nothing more
   // For two to be told as one: most of their gain that shows when one of them is taken out, or least share of the
-  // larger gain that the lesser one is.
+  // larger gain that the lesser one is. For two to be there both or neither: most of what one gains that it also gains
+  // without the other.
   double alone = 0.5, alike = 0.5;
 };
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "src/core/statistics.h"
 
 namespace gapscope {
@@ -48,6 +50,16 @@ TEST(OneFindingTest, TwoThatGainAlikeOrOnlyTogether) {
   EXPECT_TRUE(AreOneFinding(0.3, 0.05, 2.5));  // each does the other's work
   EXPECT_FALSE(AreOneFinding(2.4, 0.3, 2.5));  // one carries both
   EXPECT_FALSE(AreOneFinding(2.4, -0.1, 2.3));
+}
+
+// Costs 1 with both, 1.3 without either one, 1.4 without both: one alone brings 0.1 of the 0.3 that it brings beside
+// the other. Distinct effects: what they gain adds up, however large it is.
+TEST(ComplementsTest, TwoThatAreSeenOnlyBesideEachOther) {
+  EXPECT_TRUE(AreComplements(std::log(1.3), std::log(1.3), std::log(1.4)));
+  EXPECT_FALSE(AreComplements(std::log(1.3), std::log(1.3), std::log(1.6)));
+  EXPECT_FALSE(AreComplements(std::log(11), std::log(11), std::log(21)));
+  EXPECT_FALSE(AreComplements(std::log(11), std::log(1.1), std::log(11)));  // one is seen alone
+  EXPECT_FALSE(AreComplements(std::log(1.3), -0.1, std::log(1.3)));
 }
 
 // Odds multiply: 1 to 3 at nine to one are 3 to 1.

@@ -31,7 +31,8 @@ std::string Candidate::Name() const {
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s,
-                     .max_windows = train ? max_windows : max_windows / 2,
+                     .max_windows = train ? max_windows : (max_windows + 1) / 2,
+                     .choice = train ? WindowChoice::kTelling : WindowChoice::kEven,
                      .time_step_s = time_step_s,
                      .shift_range_s = sample_s,
                      .weights = weights,

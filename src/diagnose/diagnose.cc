@@ -129,8 +129,8 @@ Result<std::uint64_t> JobKey(const Model& model, const DataSplit& data, const Di
     for (const auto& recording : *part) AddRecording(recording, &hasher);
   }
   const double numbers[] = {
-      static_cast<double>(data.asked),   static_cast<double>(options.effort),     options.window_s, options.sample_s,
-      static_cast<double>(options.seed), static_cast<double>(options.max_windows)};
+      static_cast<double>(data.asked),   static_cast<double>(options.effort),      options.window_s, options.sample_s,
+      static_cast<double>(options.seed), static_cast<double>(options.replay_steps)};
   hasher.Numbers(numbers);
   for (const auto& [name, prior] : options.priors) hasher.Text(name).Number(prior);
   for (const EffectUse& use : options.known) hasher.Text(use.Text());
@@ -157,6 +157,12 @@ Result<std::unique_ptr<DiagnosisJournal>> OpenJournal(const Model& model, const 
   GS_ASSIGN(const std::uint64_t key, JobKey(model, data, options));
   return DiagnosisJournal::Open(
       {.folder = options.journal, .key = key, .resume = options.resume, .deadline = deadline, .warn = options.warn});
+}
+
+// So many windows take so many steps of the simulator.
+std::size_t WindowsIn(std::size_t steps, const Workbench& bench) {
+  return std::max<std::size_t>(
+      1, static_cast<std::size_t>(static_cast<double>(steps) * bench.time_step_s / bench.window_s));
 }
 
 // Steps of one replay of the training windows.
@@ -189,7 +195,6 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .pool = pool,
                     .weights = {},
                     .window_s = options.window_s,
-                    .max_windows = options.max_windows,
                     .priors = options.priors,
                     .known = options.known,
                     .values = options.values};
@@ -202,6 +207,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     bench.time_step_s =
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
+    bench.max_windows = WindowsIn(options.replay_steps, bench);
     bench.deadline = deadline;
     bench.journal = journal.get();
     bench.most_steps =

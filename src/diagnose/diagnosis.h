@@ -157,7 +157,7 @@ struct DiagnoseOptions {
   double window_s = 1.0;
   double sample_s = 0.004;  // logs are searched on stamps at least this far apart
   unsigned long seed = 0;
-  std::size_t max_windows = 90;  // of the training logs
+  std::size_t replay_steps = 20000;  // of the training windows: of longer logs those that say most are taken
   // What is known of effects beforehand: probabilities by "EFFECT" or "EFFECT@PLACE", which goes first. Others: 0.5.
   std::map<std::string, double> priors;
   // What the base model has beside the experiment's own: effects, and values to start from by the parameters' names.

@@ -24,6 +24,10 @@ enum class ObjectiveKind { kWindows, kFreeRun, kBoth };
 // Where a window starts: where the log says, which zero offsets move, or at rest at the model's initial pose.
 enum class WindowStart { kLog, kRest };
 
+// Which windows are taken where there are more than enough: evenly over the logs, which stand for all of them, or those
+// that say most (ChooseWindows).
+enum class WindowChoice { kEven, kTelling };
+
 struct FitOptions {
   std::vector<int> free;  // indices of tuned parameters
   ObjectiveKind objective = ObjectiveKind::kWindows;
@@ -31,13 +35,14 @@ struct FitOptions {
   double window_s = 1.0;
   double lead_in_s = 0.05;  // start of a window that is not scored
   Fold fold = Fold::kAll;
-  std::size_t max_windows = 0;  // 0: all; else evenly chosen ones
-  double time_step_s = 0;       // 0: the model's
-  bool fit_offsets = true;      // zero offsets of measured positions, per log
-  bool fit_shift = true;        // command shift within +-1 sample, common to all logs
-  bool fit_states = true;       // initial state of each window
-  double shift_range_s = 0;     // the shift lies within +- this; 0: one sample
-  double shift_s = 0;           // where no shift is fitted: this one
+  std::size_t max_windows = 0;  // 0: all; free runs are never left out
+  WindowChoice choice = WindowChoice::kEven;
+  double time_step_s = 0;    // 0: the model's
+  bool fit_offsets = true;   // zero offsets of measured positions, per log
+  bool fit_shift = true;     // command shift within +-1 sample, common to all logs
+  bool fit_states = true;    // initial state of each window
+  double shift_range_s = 0;  // the shift lies within +- this; 0: one sample
+  double shift_s = 0;        // where no shift is fitted: this one
   // Per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation.
   std::vector<double> weights;
   Normalization normalization = Normalization::kDeviation;

@@ -5,6 +5,7 @@
 
 #include "src/compare/noise.h"
 #include "src/core/collect.h"
+#include "src/fit/choose_windows.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -16,6 +17,25 @@ std::size_t FirstScored(const Recording& recording, const Window& rows, double l
   std::size_t first = 1;
   while (first + 2 < rows.rows() && recording.time_s[rows.begin + first] - begin < lead_in_s) ++first;
   return first;
+}
+
+// The windows of all logs that the fold takes, at most as many as are asked for.
+std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, const FitOptions& options) {
+  std::vector<LogWindow> windows;
+  for (std::size_t l = 0; l < recordings.size(); ++l) {
+    const auto all = MakeWindows(recordings[l], ReplayMode::kWindows, options.window_s);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      // Another third in each log: repeats of one command are not all held out at the same time.
+      if (options.fold == Fold::kAll || ((i + l) % 3 == 1) == (options.fold == Fold::kHeldOut))
+        windows.push_back({l, all[i]});
+    }
+  }
+  const std::size_t most = options.max_windows;
+  if (most == 0 || windows.size() <= most) return windows;
+  if (options.choice == WindowChoice::kTelling) return ChooseWindows(recordings, windows, most);
+  std::vector<LogWindow> even;
+  for (std::size_t i = 0; i < most; ++i) even.push_back(windows[i * windows.size() / most]);
+  return even;
 }
 
 // Root mean square of each signal's residuals over a log; 0 where there are none.
@@ -40,32 +60,25 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
                                       const FitOptions& options, const FitLayout& layout,
                                       const std::vector<double>& values) {
   std::vector<FitWindow> windows;
-  for (std::size_t l = 0; l < recordings.size(); ++l) {
-    const Recording& recording = recordings[l];
-    const auto add = [&](ReplayMode mode) {
-      const auto all = MakeWindows(recording, mode, options.window_s);
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        // Another third in each log: repeats of one command are not all held out at the same time.
-        if (options.fold != Fold::kAll && ((i + l) % 3 == 1) != (options.fold == Fold::kHeldOut)) continue;
-        const double lead_in_s = mode == ReplayMode::kWindows ? options.lead_in_s : 0;
-        windows.push_back({.log = l,
-                           .rows = all[i],
-                           .first_scored = FirstScored(recording, all[i], lead_in_s),
-                           .start = options.start == WindowStart::kRest
-                                        ? AtRest(model)
-                                        : InitialStateAt(model, recording, all[i].begin, values),
-                           .prior = layout.state_priors[l]});
-      }
-    };
-    if (options.objective != ObjectiveKind::kFreeRun) add(ReplayMode::kWindows);
-    if (options.objective != ObjectiveKind::kWindows) add(ReplayMode::kFreeRun);
+  const auto add = [&](const LogWindow& taken, double lead_in_s) {
+    const Recording& recording = recordings[taken.log];
+    windows.push_back({.log = taken.log,
+                       .rows = taken.rows,
+                       .first_scored = FirstScored(recording, taken.rows, lead_in_s),
+                       .start = options.start == WindowStart::kRest
+                                    ? AtRest(model)
+                                    : InitialStateAt(model, recording, taken.rows.begin, values),
+                       .prior = layout.state_priors[taken.log]});
+  };
+  if (options.objective != ObjectiveKind::kFreeRun) {
+    for (const LogWindow& taken : TakenWindows(recordings, options)) add(taken, options.lead_in_s);
   }
-  if (options.max_windows == 0 || windows.size() <= options.max_windows) return windows;
-  std::vector<FitWindow> kept;
-  kept.reserve(options.max_windows);
-  for (std::size_t i = 0; i < options.max_windows; ++i)
-    kept.push_back(std::move(windows[i * windows.size() / options.max_windows]));
-  return kept;
+  for (std::size_t l = 0; l < recordings.size() && options.objective != ObjectiveKind::kWindows; ++l) {
+    for (const Window& rows : MakeWindows(recordings[l], ReplayMode::kFreeRun, options.window_s)) add({l, rows}, 0);
+  }
+  std::stable_sort(windows.begin(), windows.end(),
+                   [](const FitWindow& a, const FitWindow& b) { return a.log < b.log; });
+  return windows;
 }
 
 std::vector<Eigen::VectorXd> StatePriorsByNoise(const Model& model, const std::vector<Recording>& recordings,

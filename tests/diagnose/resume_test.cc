@@ -39,7 +39,7 @@ class ResumeTest : public ::testing::Test {
     ThreadPool pool(2);
     options.effort = SearchEffort::kQuick;
     options.window_s = 0.3;
-    options.max_windows = 2;
+    options.replay_steps = 60;  // two windows
     options.sample_s = 0.01;
     options.warn = [this](const std::string& text) { warnings_ += text + "\n"; };
     return Diagnose(experiment_, SplitData({log_}, {}), options, pool);

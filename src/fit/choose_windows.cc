@@ -66,7 +66,8 @@ class Cells {
   Cells(const std::vector<Recording>& recordings, const std::vector<LogWindow>& windows)
       : recordings_(recordings), windows_(windows), visits_(windows.size()) {
     for (const Recording& recording : recordings) {
-      const double step_s = recording.duration_s() / static_cast<double>(std::max<std::size_t>(1, recording.rows() - 1));
+      const double step_s =
+          recording.duration_s() / static_cast<double>(std::max<std::size_t>(1, recording.rows() - 1));
       strides_.push_back(std::max<std::size_t>(1, static_cast<std::size_t>(kSpacing_s / step_s)));
     }
     std::vector<std::size_t> signals;
@@ -114,7 +115,8 @@ class Cells {
       std::fill(rows.begin(), rows.end(), 0);
       double total = 0;
       const std::size_t stride = strides_[log];
-      for (std::size_t i = (window.begin + stride - 1) / stride; i * stride < window.end && i < series.values.size(); ++i) {
+      for (std::size_t i = (window.begin + stride - 1) / stride; i * stride < window.end && i < series.values.size();
+           ++i) {
         rows[of_value.Cell(series.values[i]) * kCells + of_rate.Cell(series.rates[i])] += 1;
         total += 1;
       }
@@ -158,9 +160,7 @@ std::vector<LogWindow> ChooseWindows(const std::vector<Recording>& recordings, c
   struct Offer {
     double gain = 0;
     std::size_t window = 0, taken = 0;
-    bool operator<(const Offer& other) const {
-      return gain != other.gain ? gain < other.gain : window > other.window;
-    }
+    bool operator<(const Offer& other) const { return gain != other.gain ? gain < other.gain : window > other.window; }
   };
   std::priority_queue<Offer> offers;
   for (std::size_t w = 0; w < windows.size(); ++w) offers.push({gain(w), w, 0});

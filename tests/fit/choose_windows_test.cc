@@ -80,7 +80,8 @@ TEST(ChooseWindowsTest, LogsNeedNotBeAlike) {
     windows.insert(windows.end(), more.begin(), more.end());
   const auto chosen = ChooseWindows({moving, resting, other}, windows, 20);
   ASSERT_EQ(chosen.size(), 20u);
-  EXPECT_TRUE(std::any_of(chosen.begin(), chosen.end(), [](const auto& w) { return w.log == 0 && w.rows.begin == 400; }));
+  EXPECT_TRUE(
+      std::any_of(chosen.begin(), chosen.end(), [](const auto& w) { return w.log == 0 && w.rows.begin == 400; }));
 }
 
 }  // namespace

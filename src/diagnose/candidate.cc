@@ -146,14 +146,17 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
 
 namespace {
 
-// The candidate on the held-out logs as `options` score them: its parameters held, initial states and zero offsets
-// fitted. Null where it cannot be simulated there.
-std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& candidate, FitOptions options,
-                                      FitPoint* point) {
+// The held-out logs with the candidate's parameters held: left are initial states and zero offsets.
+std::unique_ptr<FitProblem> HeldOutProblem(const Workbench& bench, const Candidate& candidate, FitOptions options) {
   options.fit_shift = false;
   options.shift_s = candidate.shift_s;
-  auto problem =
-      std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
+  return std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
+}
+
+// That problem fitted, as `options` score it. Null where the candidate cannot be simulated there.
+std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& candidate, const FitOptions& options,
+                                      FitPoint* point) {
+  auto problem = HeldOutProblem(bench, candidate, options);
   *point = problem->Start();
   const auto solve = [&] {
     if (!std::isfinite(problem->Evaluate(*point, Keep::kCost).cost)) return SolveResult{.cost = kInfinity};
@@ -170,6 +173,7 @@ std::unique_ptr<FitProblem> OnHeldOut(const Workbench& bench, const Candidate& c
 
 void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
   if (std::exchange(candidate->scored, true)) return;
+  candidate->held_out.clear();
   candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors = kInfinity;
   FitPoint point;
   const auto problem = OnHeldOut(bench, *candidate, bench.Options(*candidate->model, false), &point);
@@ -177,8 +181,15 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
   candidate->held_out_cost = problem->Evaluate(point, Keep::kCost).cost;
   const double rows = static_cast<double>(std::max<std::size_t>(1, problem->residuals()));
   candidate->held_out_floors = std::sqrt(2 * candidate->held_out_cost / rows);
-  candidate->held_out = problem->Predict(point);
-  candidate->held_out_error = ReplayError(candidate->held_out);
+  const std::vector<LogReplay> predicted = problem->Predict(point);
+  candidate->held_out = ErrorsByBlock(predicted);
+  candidate->held_out_error = ReplayError(predicted);
+  candidate->held_out_point = std::move(point);
+}
+
+std::vector<LogReplay> PredictHeldOut(const Workbench& bench, const Candidate& candidate) {
+  if (candidate.held_out.empty()) return {};
+  return HeldOutProblem(bench, candidate, bench.Options(*candidate.model, false))->Predict(candidate.held_out_point);
 }
 
 double FreeRunError(const Workbench& bench, const Candidate& candidate) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "src/diagnose/block_errors.h"
 #include "src/diagnose/diagnosis_journal.h"
 #include "src/tune/tune.h"
 
@@ -27,10 +28,11 @@ struct Candidate {
   std::vector<double> values;
   double shift_s = 0;
   double held_out_cost = 0;
-  double held_out_floors = 0;       // root mean square of residual over noise
-  double held_out_error = 0;        // normalised: see ReplayError; in windows
-  std::vector<LogReplay> held_out;  // predictions there
-  std::size_t parameters = 0;       // of the effects
+  double held_out_floors = 0;  // root mean square of residual over noise
+  double held_out_error = 0;   // normalised: see ReplayError; in windows
+  BlockErrors held_out;
+  FitPoint held_out_point;     // of the problem there: initial states and offsets
+  std::size_t parameters = 0;  // of the effects
   std::string Name() const;
   // Costs on the training and the held-out logs, none below the sensors' noise: what lies under that says nothing.
   double TrainAboveNoise() const { return std::max(train_cost, 0.5 * static_cast<double>(problem->residuals())); }
@@ -98,6 +100,8 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
 void PolishCandidate(const Workbench& bench, Candidate* candidate);
 // Fills the held-out fields, once.
 void ScoreCandidate(const Workbench& bench, Candidate* candidate);
+// What a candidate that was scored predicts of the held-out logs; empty: it cannot be simulated there.
+std::vector<LogReplay> PredictHeldOut(const Workbench& bench, const Candidate& candidate);
 
 // Error on the held-out logs when each is one free run (see ReplayError), with zero offsets and the initial state
 // fitted; infinity where that diverges.

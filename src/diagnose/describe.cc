@@ -38,11 +38,11 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
 }
 
 // Where a model's error lies, on the first held-out log, which stands for all (shares of several logs do not add up).
-std::vector<ConditionShare> Locate(const Candidate& candidate, const std::vector<Recording>& held_out,
+std::vector<ConditionShare> Locate(const std::vector<LogReplay>& predicted, const std::vector<Recording>& held_out,
                                    std::uint64_t seed) {
   std::vector<ConditionShare> where;
-  if (candidate.held_out.empty()) return where;
-  const LogReplay& log = candidate.held_out.front();
+  if (predicted.empty()) return where;
+  const LogReplay& log = predicted.front();
   const Recording& recording = held_out.front();
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
     const SignalTrace& trace = log.signals[s];
@@ -232,11 +232,12 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   }
   result.candidates = DescribeCandidates(bench, found, judgement);
   result.statements = judgement.statements;
-  result.remainder = Divide(bench, base, chosen, result.floor, beside);
+  const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
+  result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(chosen, *base.model);
   SuggestNext(found, judgement, bench.rig->experiment().path, &result);
-  result.where = Locate(base, bench.data.held_out, seed);
-  result.remains = &chosen == &base ? result.where : Locate(chosen, bench.data.held_out, seed);
+  result.where = Locate(PredictHeldOut(bench, base), bench.data.held_out, seed);
+  result.remains = &chosen == &base ? result.where : Locate(predicted, bench.data.held_out, seed);
   result.cut = found.cut;
   result.work = *bench.work;
   for (const auto* part : {&bench.data.train, bench.by_windows ? nullptr : &bench.data.held_out}) {

@@ -5,7 +5,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
-#include "src/diagnose/block_squares.h"
+#include "src/diagnose/block_errors.h"
 #include "src/diagnose/discrepancy.h"
 #include "src/diagnose/policy.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
-#include "src/diagnose/block_squares.h"
+#include "src/diagnose/block_errors.h"
 #include "src/diagnose/policy.h"
 
 namespace gapscope {

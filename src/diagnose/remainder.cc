@@ -75,15 +75,15 @@ double SquareBetweenRepeats(const std::vector<Recording>& recordings, const std:
   return count > 0 ? sum / count : kNaN;
 }
 
-Remainder Divide(const Workbench& bench, const Candidate& base, const Candidate& final, double floor,
-                 const BesideTorques& beside) {
+Remainder Divide(const Workbench& bench, const Candidate& base, const Candidate& final,
+                 const std::vector<LogReplay>& held_out, double floor, const BesideTorques& beside) {
   Remainder remainder;
   const double before = base.held_out_error * base.held_out_error;
   if (!(before > 0) || !std::isfinite(before)) return remainder;
   std::vector<Recording> logs;
   std::vector<LogReplay> predicted;
   Gather(bench.data.train, final.problem->Predict(final.point), &logs, &predicted);
-  Gather(bench.data.held_out, final.held_out, &logs, &predicted);
+  Gather(bench.data.held_out, held_out, &logs, &predicted);
   const double left = std::min(1.0, final.held_out_error * final.held_out_error / before);
   remainder.explained = 1 - left;
   remainder.sensors = std::min(left, floor * floor / before);

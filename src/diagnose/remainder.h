@@ -6,9 +6,9 @@
 
 namespace gapscope {
 
-// `floor`: the sensors' noise as a normalised error. Both sets are scored.
-Remainder Divide(const Workbench& bench, const Candidate& base, const Candidate& final, double floor,
-                 const BesideTorques& beside);
+// Both sets are scored. `held_out`: the final one's predictions. `floor`: the sensors' noise as a normalised error.
+Remainder Divide(const Workbench& bench, const Candidate& base, const Candidate& final,
+                 const std::vector<LogReplay>& held_out, double floor, const BesideTorques& beside);
 
 // Mean square by which logs of the same commands differ from each other where one model predicts them, half of it (each
 // has its part), in units of their signals' deviations; NaN: no two logs have the same commands.

@@ -1,4 +1,4 @@
-#include "src/diagnose/block_squares.h"
+#include "src/diagnose/block_errors.h"
 
 #include <gtest/gtest.h>
 
@@ -24,19 +24,20 @@ LogReplay Log(std::size_t rows, double off, bool scored_too) {
   return log;
 }
 
-TEST(BlockSquaresTest, NormalisedOnesAddUpToTheReplaysError) {
+TEST(BlockErrorsTest, NormalisedOnesAddUpToTheReplaysError) {
   const std::vector<LogReplay> logs = {Log(40, 0.3, true), Log(25, 0.1, false)};
-  const BlockSquares squares = NormalisedSquares(logs);
+  const BlockSquares squares = NormalisedSquares(ErrorsByBlock(logs));
   double sum = 0;
   for (const auto& [block, square] : squares) sum += square;
   EXPECT_NEAR(std::sqrt(sum), ReplayError(logs), 1e-12);
   EXPECT_EQ(squares.size(), 8U + 5U);  // 4 s and 2.5 s
 }
 
-TEST(BlockSquaresTest, HalfSecondsHoldWhatWasMissedInThem) {
+TEST(BlockErrorsTest, HalfSecondsHoldWhatWasMissedInThem) {
   LogReplay log = Log(20, 0, true);
   log.signals[0].predicted[7] += 2;  // at 0.75 s
-  const BlockSquares squares = SquaresByBlock({log}, [](std::size_t, std::size_t s) { return s == 0 ? 3 : 1; });
+  const BlockSquares squares =
+      SquaresByBlock(ErrorsByBlock({log}), [](std::size_t, std::size_t s) { return s == 0 ? 3 : 1; });
   for (const auto& [block, square] : squares) EXPECT_NEAR(square, block.second == 1 ? 12 : 0, 1e-12);
 }
 

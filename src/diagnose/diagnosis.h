@@ -87,7 +87,8 @@ struct Statement {
   std::vector<EffectEstimate> parameters;
   std::vector<EffectEstimate> bounds;  // absent: the value is the size below (of a limit: above) which it stays
   ShareOfGap share_of_gap;
-  int group = -1;  // statements of one group are told together
+  int group = -1;                        // statements of one group are told together
+  std::optional<EffectUse> beside = {};  // the other one of two that are there both or neither
   StatementNumbers numbers;
   std::string rule;
 };

@@ -14,9 +14,15 @@ namespace {
 // What was accepted and how far it goes, without the last full stop.
 std::string ExplainEffects(const Diagnosis& d) {
   std::string text;
-  for (const auto& found : d.effects) {
-    text += fmt::format("{}{} explains {:.0f} % of the gap that closes ({}; signature: {}). ", found.use.Text(),
-                        TogetherWith(found), 100 * found.share_of_gap, found.meaning, found.signature);
+  for (auto found = d.effects.begin(); found != d.effects.end(); ++found) {
+    // A group is told once, by its first member.
+    const bool told = std::any_of(d.effects.begin(), found, [&](const FoundEffect& earlier) {
+      return std::count(found->together.begin(), found->together.end(), earlier.use) > 0;
+    });
+    if (told) continue;
+    text += fmt::format("{} explains {:.0f} % of the gap that closes ({}; signature: {}). ",
+                        found->use.Text() + TogetherWith(*found), 100 * found->share_of_gap, found->meaning,
+                        found->signature);
   }
   return text + fmt::format("With {} the held-out error is {:.3g}, {:.1f} times the noise",
                             d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);

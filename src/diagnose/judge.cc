@@ -188,7 +188,7 @@ class Judging {
         if (&x >= &y || x.group >= 0 || y.group >= 0 || std::min(x.probability, y.probability) >= present) continue;
         if (std::min(x.numbers.gain, y.numbers.gain) < kDiagnosePolicy.search.tie) continue;
         say_("judging " + NameOfSet({x.use, y.use}) + ": both or neither");
-        Statement both{.numbers = evidence_.Of({x.use, y.use})};
+        Statement both{.numbers = evidence_.Of({x.use, y.use}), .rule = "both or neither"};
         both.numbers.dry = x.numbers.dry || y.numbers.dry;  // no smooth torque takes the place of both
         Weigh({x.use, y.use}, &both);
         both.prior = std::min(PriorOf(x.use), PriorOf(y.use));
@@ -196,8 +196,8 @@ class Judging {
         if (both.probability < present || !AreComplements(x.numbers.gain, y.numbers.gain, both.numbers.gain)) continue;
         const EffectUse of_x = x.use, of_y = y.use;
         x = y = both;
-        x.use = of_x, x.rule = "both or neither: seen only beside " + of_y.Text();
-        y.use = of_y, y.rule = "both or neither: seen only beside " + of_x.Text();
+        x.use = of_x, x.beside = of_y;
+        y.use = of_y, y.beside = of_x;
       }
     }
   }
@@ -277,6 +277,7 @@ class Judging {
                         .prior = PriorOf(rival.use),
                         .evidence = own.evidence,
                         .group = own.group,
+                        .beside = own.beside,
                         .numbers = own.numbers,
                         .rule = "costs as little in its place"};
         result->statements.push_back(std::move(other));

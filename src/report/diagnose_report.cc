@@ -2,9 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "src/diagnose/policy.h"
+#include "src/report/sentences.h"
 
 namespace gapscope {
 
@@ -12,15 +14,19 @@ using nlohmann::ordered_json;
 
 namespace {
 
-// Words on lines of at most `width` characters.
-std::string Wrap(const std::string& text, std::size_t width) {
+// Words on lines of at most `width` characters, all but the first one behind `indent`.
+std::string Wrap(const std::string& text, std::size_t width, const std::string& indent = "") {
   std::string wrapped;
   std::size_t column = 0;
   for (std::size_t begin = 0; begin < text.size();) {
     std::size_t end = text.find(' ', begin);
     if (end == std::string::npos) end = text.size();
-    if (column > 0 && column + 1 + end - begin > width) wrapped += '\n', column = 0;
-    if (column > 0) wrapped += ' ', ++column;
+    if (column > 0 && column + 1 + end - begin > width) {
+      wrapped += '\n' + indent;
+      column = indent.size();
+    } else if (column > 0) {
+      wrapped += ' ', ++column;
+    }
     wrapped.append(text, begin, end - begin);
     column += end - begin;
     begin = end + 1;
@@ -98,6 +104,7 @@ ordered_json Json(const Statement& s) {
                           {"high", JsonNumber(s.share_of_gap.high)}}},
                         {"group", s.group < 0 ? ordered_json() : ordered_json(s.group)},
                         {"rule", s.rule}};
+  if (s.beside) entry["seen_beside"] = s.beside->Text();
   for (const auto& bound : s.bounds) entry["bound"][bound.key] = JsonNumber(bound.value);
   const StatementNumbers& n = s.numbers;
   if (n.gain != 0)
@@ -168,6 +175,34 @@ ordered_json PolicyJson() {
           {"verdict.retuned", policy.verdict.retuned}};
 }
 
+// All parameters of what was found: a sentence has the first of each.
+std::string SizeTable(const Diagnosis& d) {
+  std::string text = fmt::format("\n{:<20} {:<28} {:>11}   {}\n", "size of", "", "value", "95 % interval");
+  for (const auto& found : d.effects) {
+    std::string name = found.use.Text();
+    for (const auto& p : found.parameters) {
+      text += fmt::format("{:<20} {:<28} {:>11.4g}   {:.4g} .. {:.4g}{}\n", name, p.key, p.value, p.low, p.high,
+                          p.unit == "1" ? "" : " " + p.unit);
+      if (!p.ratio.to.empty())
+        text += fmt::format("{:<20} {:<28} {:>11.4g}   {:.4g} .. {:.4g}\n", "", "  over " + p.ratio.to, p.ratio.value,
+                            p.ratio.low, p.ratio.high);
+      name.clear();
+    }
+  }
+  return text;
+}
+
+std::string RemainderText(const Remainder& remainder) {
+  std::string text;
+  for (const Part& part : PartsOf(remainder))
+    text += fmt::format("{}{} {:.0f} %", text.empty() ? "" : ", ", part.name, 100 * part.share);
+  if (text.empty()) return "";
+  text = "- of the retuned model's squared misfit: " + text;
+  if (std::isfinite(remainder.reachable))
+    text += fmt::format("; a free-form torque would explain {:.0f} %", 100 * remainder.reachable);
+  return Wrap(text, 120, "  ") + "\n";
+}
+
 // What is there, what was considered and is not, and how many more.
 std::string StatementTable(const Diagnosis& d) {
   std::string text = fmt::format("\n{:<34} {:<8} {:>11}  {}\n", "effect", "answer", "probability", "rests on");
@@ -235,24 +270,11 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
 std::string ToTable(const DiagnoseRun& run) {
   const Diagnosis& d = run.diagnosis;
   std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
-  for (const auto& found : d.effects) {
-    text += fmt::format("\n  {} on {}, probability {:.2f}, {:.0f} % of the gap{}\n", found.use.effect, found.use.on,
-                        found.probability, 100 * found.share_of_gap, TogetherWith(found));
-    for (const auto& p : found.parameters) {
-      text += fmt::format("    {:<28} {:>11.4g}   {:.4g} .. {:.4g} {}\n", p.key, p.value, p.low, p.high, p.unit);
-      if (!p.ratio.to.empty())
-        text += fmt::format("      over {:<23} {:>11.4g}   {:.4g} .. {:.4g}\n", p.ratio.to, p.ratio.value, p.ratio.low,
-                            p.ratio.high);
-    }
-  }
-  for (const auto& group : d.ambiguous) {
-    std::string names;
-    for (const auto& use : group) names += (names.empty() ? "" : ", ") + use.Text();
-    text += "  cannot be told apart on these logs: " + names + "\n";
-  }
-  text += fmt::format(
-      "\nheld-out error: nominal {:.4g} -> refit {:.4g} -> final {:.4g} -> floor {:.4g}; {:.0f} % of the gap closed\n",
-      d.nominal, d.refit, d.final, d.floor, 100 * d.closed);
+  for (const Sentence& sentence : SentencesOf(d)) text += Wrap("- " + sentence.Text(), 120, "  ") + "\n";
+  if (!d.effects.empty()) text += SizeTable(d);
+  text += "\nheld-out error, a share of the signals' standard deviation\n";
+  for (const std::string& sentence : GapSentences(d)) text += Wrap("- " + sentence, 120, "  ") + "\n";
+  text += RemainderText(d.remainder);
   text += "\n" + Wrap(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);

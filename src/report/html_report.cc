@@ -209,6 +209,36 @@ ordered_json Parameters(const ReportSource& source) {
   return rows;
 }
 
+// What a diagnosis states.
+void AddFindings(const PageContent& content, ordered_json* data) {
+  ordered_json& json = *data;
+  json["findings"] = ordered_json::array();
+  for (const Sentence& s : content.findings) {
+    json["findings"].push_back({{"what", s.what},
+                                {"size", s.size},
+                                {"caveat", s.caveat},
+                                {"share", JsonNumber(s.share_of_gap)},
+                                {"probability", s.probability}});
+  }
+  json["gap"] = content.gap;
+  json["remainder"] = ordered_json::array();
+  for (const Part& part : content.remainder)
+    json["remainder"].push_back({{"name", part.name}, {"share", JsonNumber(part.share)}});
+  json["reachable"] = JsonNumber(content.reachable);
+  json["statements"] = ordered_json::array();
+  for (const PageContent::Looked& s : content.statements) {
+    ordered_json entry = {{"title", s.title},       {"answer", s.answer}, {"why", s.why},
+                          {"bound", s.bound},       {"prior", s.prior},   {"probability", JsonNumber(s.probability)},
+                          {"gains", ordered_json()}};
+    if (s.numbers.gain != 0) {
+      entry["gains"] = {JsonNumber(s.numbers.gain), JsonNumber(s.numbers.gain_held_out),
+                        JsonNumber(s.numbers.gain_free)};
+    }
+    json["statements"].push_back(std::move(entry));
+  }
+  json["more_statements"] = content.more_statements;
+}
+
 // Words and tables, as they are shown.
 void AddContent(const ReportSource& source, ordered_json* data) {
   const PageContent& content = source.content;
@@ -218,14 +248,7 @@ void AddContent(const ReportSource& source, ordered_json* data) {
   for (const auto& [title, shares] : content.where) {
     if (!shares.empty()) json["where"].push_back({{"title", title}, {"shares", JsonConditions(shares)}});
   }
-  json["candidates"] = ordered_json::array();
-  for (const auto& c : content.candidates) {
-    json["candidates"].push_back({{"title", c.title},
-                                  {"probability", JsonNumber(c.probability)},
-                                  {"held_out_error", JsonNumber(c.held_out_error)},
-                                  {"reason", c.reason}});
-  }
-  json["more_candidates"] = content.more_candidates;
+  AddFindings(content, data);
   json["parameters"] = Parameters(source);
   json["next"] = {{"text", content.next_text}, {"command", content.next_command}};
   json["map_of"] = content.mapped;

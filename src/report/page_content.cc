@@ -7,25 +7,28 @@
 namespace gapscope {
 namespace {
 
-constexpr std::size_t kMostConditions = 10, kMostCandidates = 24;
+constexpr std::size_t kMostConditions = 10, kMostStatements = 40;
 
 std::vector<ConditionShare> First(std::vector<ConditionShare> shares) {
   shares.resize(std::min(shares.size(), kMostConditions));
   return shares;
 }
 
-// The explanations that were tried, the most probable first.
-void AddCandidates(const Diagnosis& d, PageContent* page) {
-  for (const auto& c : d.candidates) {
-    page->candidates.push_back({.title = Words(c.effect),
-                                .reason = c.reason,
-                                .probability = c.probability,
-                                .held_out_error = c.held_out_error});
+// Every effect that was looked at, the most probable first.
+void AddStatements(const Diagnosis& d, PageContent* page) {
+  for (const Statement& s : d.statements) {
+    page->statements.push_back({.title = Words(s.use),
+                                .answer = AnswerName(s.answer),
+                                .why = s.rule,
+                                .bound = BoundText(s),
+                                .probability = s.probability,
+                                .prior = s.prior,
+                                .numbers = s.numbers});
   }
-  std::ranges::stable_sort(page->candidates, std::ranges::greater{}, &PageContent::Candidate::probability);
-  const std::size_t shown = std::min(page->candidates.size(), kMostCandidates);
-  page->more_candidates = page->candidates.size() - shown;
-  page->candidates.resize(shown);
+  std::ranges::stable_sort(page->statements, std::ranges::greater{}, &PageContent::Looked::probability);
+  const std::size_t shown = std::min(page->statements.size(), kMostStatements);
+  page->more_statements = page->statements.size() - shown;
+  page->statements.resize(shown);
 }
 
 }  // namespace
@@ -55,7 +58,12 @@ PageContent PageOf(const DiagnoseRun& run) {
     page.where.push_back(
         {.title = "Of what " + Listed(found) + (found.size() > 1 ? " leave" : " leaves"), .shares = First(d.remains)});
   }
-  AddCandidates(d, &page);
+  page.findings = SentencesOf(d);
+  page.gap = GapSentences(d);
+  page.gap.erase(page.gap.begin());  // which the headline says
+  page.remainder = PartsOf(d.remainder);
+  page.reachable = d.remainder.reachable;
+  AddStatements(d, &page);
   for (const auto& effect : d.effects) {
     for (const auto& p : effect.parameters)
       page.fitted.push_back({.name = effect.use.Text() + "." + p.key, .value = p.value, .low = p.low, .high = p.high});

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "src/report/sentences.h"
 #include "src/report/words.h"
 
 namespace gapscope {
@@ -17,10 +18,11 @@ struct PageContent {
     std::string title;  // empty: of the result as a whole
     std::vector<ConditionShare> shares;
   };
-  struct Candidate {
-    std::string title, reason;
-    double probability = 0;
-    double held_out_error = 0;  // NaN: not refitted
+  struct Looked {
+    std::string title, answer, why;
+    std::string bound;  // that its size stays below; empty: none is known
+    double probability = 0, prior = 0;
+    StatementNumbers numbers;  // gain 0: it was not refitted
   };
   struct Fitted {
     std::string name;  // of the model's parameter
@@ -32,8 +34,12 @@ struct PageContent {
   Headline headline;
   std::string mapped;  // whose missing torque is mapped: "model", "nominal model"
   std::vector<Conditions> where;
-  std::vector<Candidate> candidates;  // the most probable first, as many as are shown
-  std::size_t more_candidates = 0;    // that are not
+  std::vector<Sentence> findings;   // what is present, the largest share of the gap first
+  std::vector<std::string> gap;     // how it went beyond what the headline says, a sentence each
+  std::vector<Part> remainder;      // of the misfit that retuning leaves
+  double reachable = kNaN;          // by a free-form torque, of the same
+  std::vector<Looked> statements;   // the most probable first, as many as are shown
+  std::size_t more_statements = 0;  // that are not
   std::vector<Fitted> fitted;
   std::vector<std::pair<std::string, double>> values;  // of the result's model; what is not fitted is shown with these
   std::string next_text, next_command;                 // the next experiment; empty: none

@@ -8,6 +8,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
+#include "src/report/sentences.h"
 
 namespace gapscope {
 namespace {
@@ -72,22 +73,9 @@ std::string TitleOf(const Diagnosis& d, const std::string& found) {
       return "No effect is missing: other parameter values close the gap.";
     case Verdict::kEffects:
       return "The model lacks " + found + ".";
-    case Verdict::kAmbiguous: {
-      std::vector<std::string> lacks;
-      for (const auto& effect : d.effects) {
-        const auto group = std::find_if(d.ambiguous.begin(), d.ambiguous.end(), [&](const auto& g) {
-          return std::find(g.begin(), g.end(), effect.use) != g.end();
-        });
-        if (group == d.ambiguous.end()) {
-          lacks.push_back(Words(effect.use));
-        } else if (group->front() == effect.use) {
-          std::vector<std::string> names;
-          for (const auto& use : *group) names.push_back(EffectTitle(use.effect));
-          lacks.push_back(Listed(names, "or"));
-        }
-      }
-      return "The model lacks " + Listed(lacks) + ": these logs cannot tell which.";
-    }
+    case Verdict::kAmbiguous:
+      return "The model lacks " + Listed(Collect(SentencesOf(d), [](const Sentence& s) { return s.what; })) +
+             ". These logs cannot tell which, where it says or.";
     case Verdict::kUnknown:
       return d.effects.empty() ? "Something is missing that no known effect explains."
                                : "The model lacks " + found + ", and something that no known effect explains.";

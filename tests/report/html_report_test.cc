@@ -44,7 +44,7 @@ TEST(HtmlReportTest, TextFromOutsideCannotEndTheScript) {
   EXPECT_EQ(page.find("</script><b>"), std::string::npos);
   const auto data = DataOf(page);
   ASSERT_FALSE(data.is_discarded());
-  EXPECT_EQ(data["candidates"][0]["reason"], "accepted: </script><b>held out</b>");
+  EXPECT_EQ(data["statements"][0]["why"], "its own evidence: </script><b>bold</b>");
 }
 
 TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
@@ -67,7 +67,10 @@ TEST(HtmlReportTest, SaysWhatTheProgramSays) {
   EXPECT_EQ(data["subject"], "Diagnosis of qube.csv with qube.xml");
   EXPECT_EQ(data["headline"]["title"], page->source.content.headline.title);
   EXPECT_EQ(data["headline"]["stages"].size(), 5u);
-  EXPECT_EQ(data["candidates"][0]["title"], "cable spring on arm");
+  EXPECT_EQ(data["findings"][0]["what"], "cable spring on arm");
+  EXPECT_EQ(data["statements"][2]["bound"], "0.0002 N m");
+  EXPECT_EQ(data["statements"][2]["gains"], nullptr) << "it was not refitted";
+  EXPECT_EQ(data["remainder"].size(), 3u) << "what cannot be said is left out";
   EXPECT_EQ(data["next"]["command"], "gapscope design triangle --seconds 20");
   EXPECT_EQ(data["map_of"], "nominal model");
   EXPECT_EQ(DataOf(ReportHtml(ReplayPage()->result, ReplayPage()->source))["map_of"], "model");

@@ -56,7 +56,26 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
     d.effects = {Found(kSpring, {"stiffness_n_m_per_rad", "N m/rad", 0.0012, 0.0011, 0.0013}, 0.97, 0.9, 0.01, 0.8),
                  Found(kFriction, {"friction_n_m", "N m", 0.0006, 0.0005, 0.0007}, 0.93, 0.3, 0.01, 0.2)};
   }
-  if (verdict == Verdict::kAmbiguous) d.ambiguous = {{kSpring, kGravity}};
+  for (const FoundEffect& found : d.effects) {
+    d.statements.push_back({.use = found.use,
+                            .answer = Answer::kPresent,
+                            .probability = found.probability,
+                            .parameters = found.parameters,
+                            .share_of_gap = {.value = found.share_of_gap},
+                            .rule = "its own evidence: </script><b>bold</b>"});
+    d.statements.back().numbers.gain = 1.5;
+  }
+  if (verdict == Verdict::kAmbiguous) {
+    d.ambiguous = {{kSpring, kGravity}};
+    d.statements.front().group = 0;
+    d.statements.push_back({.use = kGravity, .answer = Answer::kPresent, .probability = 0.97, .group = 0});
+  }
+  d.statements.push_back({.use = {"torque_bias", "arm"},
+                          .answer = Answer::kAbsent,
+                          .probability = 0.03,
+                          .bounds = {{"torque_n_m", "N m", 0.0002, 0.0002, 0.0002}},
+                          .rule = "gains too little"});
+  d.remainder = {.explained = 0.9, .systematic = 0.07, .sensors = 0.03, .not_repeatable = NAN, .reachable = 0.95};
   d.where = {{.signal = "arm_rad",
               .condition = "angle -0.8..-0.4 rad",
               .share_of_error = 0.6,

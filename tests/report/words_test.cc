@@ -47,7 +47,8 @@ TEST(HeadlineTest, OneTitleForEachVerdict) {
       {Verdict::kParameters, "No effect is missing: other parameter values close the gap."},
       {Verdict::kEffects, "The model lacks cable spring on arm and Coulomb friction on arm."},
       {Verdict::kAmbiguous,
-       "The model lacks cable spring or gravity offset and Coulomb friction on arm: these logs cannot tell which."},
+       "The model lacks cable spring or gravity offset on arm and Coulomb friction on arm. These logs cannot tell "
+       "which, where it says or."},
       {Verdict::kUnknown,
        "The model lacks cable spring on arm and Coulomb friction on arm, and something that no known effect "
        "explains."}};
@@ -145,14 +146,16 @@ TEST(PageContentTest, UnknownSaysWhatIsLeftAfterWhatWasFound) {
   EXPECT_EQ(PageOf(MadeDiagnosis(Verdict::kEffects)).where.size(), 1u);
 }
 
-TEST(PageContentTest, CandidatesByProbabilityAndTheNextExperiment) {
+TEST(PageContentTest, StatementsByProbabilityAndTheNextExperiment) {
   DiagnoseRun run = MadeDiagnosis(Verdict::kEffects);
-  for (int i = 0; i < 30; ++i) run.diagnosis.candidates.push_back({.effect = {}, .probability = 0.5, .reason = "base"});
+  for (int i = 0; i < 50; ++i)
+    run.diagnosis.statements.push_back({.use = {"backlash", "arm"}, .probability = 0.01, .rule = "gains too little"});
   const PageContent page = PageOf(run);
-  EXPECT_EQ(page.candidates[0].title, "cable spring on arm");
-  EXPECT_EQ(page.candidates[1].title, "none");
-  EXPECT_EQ(page.candidates.size(), 24u);
-  EXPECT_EQ(page.more_candidates, 8u);
+  EXPECT_EQ(page.statements[0].title, "cable spring on arm");
+  EXPECT_EQ(page.statements[0].answer, "present");
+  EXPECT_EQ(page.statements[2].title, "torque bias on arm");
+  EXPECT_EQ(page.statements.size(), 40u);
+  EXPECT_EQ(page.more_statements, 13u);
   EXPECT_EQ(page.next_text, "It tells cable spring on arm from gravity offset on arm apart.");
   EXPECT_EQ(page.fitted[0].name, "cable_spring@arm.stiffness_n_m_per_rad");
   EXPECT_EQ(page.fitted[0].high, 0.0013);

@@ -62,7 +62,7 @@ function contents() {
     video: "Video",
     traces: "Traces",
     where: "Where",
-    candidates: "Explanations",
+    statements: "Effects",
     parameters: "Parameters",
     response: "Frequency",
     next: "Next",
@@ -78,6 +78,8 @@ function contents() {
 setTheme(window.matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
 document.getElementById("subject").textContent = data.subject;
 writeVerdict(data.headline);
+writeFindings(data.findings, data.gap);
+writeRemainder(data.remainder, data.reachable);
 const video = document.getElementById("video");
 if (video.dataset.video) {
   document.getElementById("player").src = video.dataset.video;
@@ -87,7 +89,7 @@ if (data.logs.some((log) => log.traces)) show("traces");
 writeConditions(data.where);
 choosers();
 drawLog();
-writeCandidates(data.candidates, data.more_candidates);
+writeStatements(data.statements, data.more_statements);
 writeParameters(data.parameters, data.headline.notes);
 writeNext(data.next);
 writeQuality(data.logs);

@@ -1,5 +1,5 @@
 "use strict";
-// Conditions, candidates, parameters, data quality, provenance.
+// Conditions, statements, parameters, data quality, provenance.
 
 const shareBar = (share, mark, kind = "") =>
   element(
@@ -37,28 +37,44 @@ function writeConditions(where) {
   if (where.length) show("where");
 }
 
-function writeCandidates(candidates, more) {
-  if (!candidates.length) return;
-  const cells = candidates.map((c) => [
-    c.title,
-    {number: percent(c.probability)},
-    shareBar(c.probability ?? 0),
-    {number: number(c.held_out_error, 3)},
-    c.reason,
+const answerTag = (answer) =>
+  element("span", {class: `tag ${answer === "present" ? "good" : answer === "unseen" ? "warn" : ""}`}, answer);
+
+function writeStatements(statements, more) {
+  if (!statements.length) return;
+  const cells = statements.map((s) => [
+    s.title,
+    answerTag(s.answer),
+    {number: percent(s.probability)},
+    shareBar(s.probability ?? 0, s.prior),
+    ...[0, 1, 2].map((i) => ({number: s.gains ? number(s.gains[i], 2) : "–"})),
+    {number: s.bound || "–"},
+    s.why,
   ]);
-  document
-    .getElementById("candidate-table")
-    .append(
-      table(
-        "Candidates",
-        ["explanation", {number: "probability"}, "", {number: "held-out error"}, "why, or why not"],
-        cells,
-      ),
-    );
-  if (more) document
-    .getElementById("candidate-table")
-    .append(element("p", {class: "note"}, `${more} more, less likely ones are in result.json.`));
-  show("candidates");
+  const heads = [
+    "effect",
+    "answer",
+    {number: "probability"},
+    "mark: prior",
+    {number: "gain"},
+    {number: "held out"},
+    {number: "free run"},
+    {number: "size, at most"},
+    "why, or why not",
+  ];
+  const place = document.getElementById("statement-table");
+  place.append(table("Statements", heads, cells));
+  place.append(
+    element(
+      "p",
+      {class: "note"},
+      "Gain: logarithm of the cost without the effect over the cost with it, all else refitted; on the fitted logs, on "
+        + "logs held out, and over whole logs. Size, at most: with 95 % probability, of what is absent (of a limit: at "
+        + `least). Unseen: the base model's parameters do all that it would do.${
+          more ? ` ${more} more, less likely ones are in result.json.` : ""}`,
+    ),
+  );
+  show("statements");
 }
 
 // Bounds as a line, the nominal value as a mark, the value with its interval as a dot on a bar.

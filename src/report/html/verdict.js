@@ -46,3 +46,42 @@ function writeVerdict(headline) {
   document.getElementById("explanation").textContent = headline.explanation;
   if (headline.stages.length > 1) document.getElementById("chain").append(chainPicture(headline.stages));
 }
+
+// A line a finding: what, how large, how sure.
+function writeFindings(findings, gap) {
+  const line = (f) => {
+    const rest = [f.size, `${percent(f.share)} of the gap`, f.caveat].filter(Boolean).join(", ");
+    return element(
+      "li",
+      {},
+      element("b", {class: "number sure", title: "probability that it is there"}, percent(f.probability)),
+      element("span", {}, element("strong", {}, f.what), element("br"), rest),
+    );
+  };
+  document.getElementById("findings").append(...findings.map(line));
+  document.getElementById("gap").append(...gap.map((sentence) => element("li", {}, sentence)));
+  document.getElementById("findings").hidden = !findings.length;
+  document.getElementById("gap").hidden = !gap.length;
+}
+
+// Whose the misfit is that the retuned model leaves, as one bar; the mark is what a free-form torque would explain.
+function writeRemainder(parts, reachable) {
+  if (!parts.length) return;
+  const kind = (part) => part.name.replace(" ", "-");
+  const wide = (share) => `${Math.max(0, 100 * share)}%`;
+  const bar = element(
+    "div",
+    {class: "parts", "aria-hidden": "true"},
+    ...parts.map((part) => element("span", {class: kind(part), style: {width: wide(part.share)}})),
+    known(reachable) ? element("i", {style: {left: wide(Math.min(0.995, reachable))}}) : null,
+  );
+  const keys = parts.map((part) => element("li", {class: kind(part)}, `${part.name} ${percent(part.share)}`));
+  if (known(reachable)) keys.push(element("li", {class: "mark"}, `a free-form torque: ${percent(reachable)}`));
+  document
+    .getElementById("remainder")
+    .append(
+      element("h2", {}, "Whose the retuned model's misfit is"),
+      bar,
+      element("ul", {class: "parts-key", "aria-label": "Shares of the squared misfit"}, ...keys),
+    );
+}

@@ -1,0 +1,108 @@
+#include "src/report/sentences.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/collect.h"
+#include "src/report/words.h"
+
+namespace gapscope {
+namespace {
+
+// Seconds that are short are read as milliseconds; a share has no unit.
+std::string SizeText(const EffectEstimate& size) {
+  constexpr double kShort = 0.5;
+  const bool is_short = size.unit == "s" && std::abs(size.value) < kShort;
+  const double factor = is_short ? 1000 : 1;
+  const std::string unit = is_short ? "ms" : size.unit == "1" ? "" : size.unit;
+  const auto number = [&](double value) { return ShortNumber(factor * value, 3); };
+  return fmt::format("{} ({} .. {}){}{}", number(size.value), number(size.low), number(size.high),
+                     unit.empty() ? "" : " ", unit);
+}
+
+std::string NamesOf(const std::vector<EffectUse>& uses) {
+  const bool one_place =
+      std::all_of(uses.begin(), uses.end(), [&](const EffectUse& use) { return use.on == uses.front().on; });
+  if (!one_place || uses.size() == 1) return Listed(Collect(uses, [](const auto& use) { return Words(use); }), "or");
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i + 1 < uses.size(); ++i) names.push_back(EffectTitle(uses[i].effect));
+  names.push_back(Words(uses.back()));
+  return Listed(names, "or");
+}
+
+Sentence SentenceOf(const std::vector<const Statement*>& members) {
+  const Statement& first = *members.front();
+  Sentence sentence{.what = NamesOf(Collect(members, [](const Statement* s) { return s->use; }))};
+  for (const Statement* s : members) {
+    sentence.share_of_gap = std::max(sentence.share_of_gap, s->share_of_gap.value);
+    sentence.probability = std::max(sentence.probability, s->probability);
+    if (s->parameters.empty()) continue;
+    const std::string name = members.size() > 1 ? EffectTitle(s->use.effect) + " " : "";
+    sentence.size += (sentence.size.empty() ? "" : "; ") + name + SizeText(s->parameters.front());
+  }
+  if (first.beside) sentence.caveat = "seen only beside " + Words(*first.beside);
+  return sentence;
+}
+
+}  // namespace
+
+std::string Sentence::Text() const {
+  std::string text = what;
+  if (!size.empty()) text += ", " + size;
+  text += fmt::format(", {:.0f} % of the gap, P {:.2f}", 100 * share_of_gap, probability);
+  return caveat.empty() ? text : text + ", " + caveat;
+}
+
+std::vector<Sentence> SentencesOf(const Diagnosis& d) {
+  std::vector<Sentence> sentences;
+  std::vector<int> told;
+  for (const Statement& s : d.statements) {
+    if (s.answer != Answer::kPresent || std::find(told.begin(), told.end(), s.group) != told.end()) continue;
+    std::vector<const Statement*> members = {&s};
+    if (s.group >= 0) {
+      told.push_back(s.group);
+      for (const Statement& other : d.statements) {
+        if (&other != &s && other.group == s.group && other.answer == Answer::kPresent) members.push_back(&other);
+      }
+    }
+    sentences.push_back(SentenceOf(members));
+  }
+  std::stable_sort(sentences.begin(), sentences.end(),
+                   [](const auto& a, const auto& b) { return a.share_of_gap > b.share_of_gap; });
+  return sentences;
+}
+
+std::vector<std::string> GapSentences(const Diagnosis& d) {
+  std::vector<std::string> sentences = {
+      fmt::format("in windows: nominal {} -> retuned {} -> with what was found {}, the sensors' floor {}; {:.0f} % closed",
+                  ShortNumber(d.nominal, 3), ShortNumber(d.refit, 3), ShortNumber(d.final, 3), ShortNumber(d.floor, 3),
+                  100 * d.closed)};
+  const VerdictEvidence& e = d.evidence;
+  if (!d.effects.empty() && std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left)) {
+    sentences.push_back(fmt::format("over whole logs in one run: retuned {} -> with what was found {}; {:.0f} % closed",
+                                    ShortNumber(e.free_run_before, 3), ShortNumber(e.free_run_left, 3),
+                                    100 * e.free_run_removed));
+  }
+  return sentences;
+}
+
+std::vector<Part> PartsOf(const Remainder& remainder) {
+  std::vector<Part> parts;
+  for (const auto& [name, share] : {std::pair("explained", remainder.explained),
+                                    std::pair("systematic", remainder.systematic),
+                                    std::pair("not repeatable", remainder.not_repeatable),
+                                    std::pair("sensors", remainder.sensors)}) {
+    if (std::isfinite(share)) parts.push_back({name, share});
+  }
+  return parts;
+}
+
+std::string BoundText(const Statement& statement) {
+  if (statement.bounds.empty()) return "";
+  const EffectEstimate& bound = statement.bounds.front();
+  return fmt::format("{} {}", ShortNumber(bound.value, 2), bound.unit == "1" ? "" : bound.unit);
+}
+
+}  // namespace gapscope

@@ -1,0 +1,39 @@
+// What a diagnosis states, a sentence each: for console and page alike.
+#ifndef GAPSCOPE_REPORT_SENTENCES_H_
+#define GAPSCOPE_REPORT_SENTENCES_H_
+
+#include <string>
+#include <vector>
+
+#include "src/diagnose/diagnosis.h"
+
+namespace gapscope {
+
+// A finding that is present: an effect, or a group of which the logs cannot tell which one it is.
+struct Sentence {
+  std::string what;            // "cable spring or gravity offset on arm"
+  std::string size;            // of those that are in the final model, with their intervals; may be empty
+  std::string caveat;          // "seen only beside command delay on motor"; may be empty
+  double share_of_gap = 0;     // of the gap that closes
+  double probability = 0;
+  std::string Text() const;    // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of the gap, P 0.94"
+};
+// The largest share first.
+std::vector<Sentence> SentencesOf(const Diagnosis& d);
+
+// How the gap went on held-out logs, in windows and in free runs: a sentence each.
+std::vector<std::string> GapSentences(const Diagnosis& d);
+
+// Parts of the refitted base model's misfit, those that are known, in the order of a bar.
+struct Part {
+  std::string name;
+  double share = 0;
+};
+std::vector<Part> PartsOf(const Remainder& remainder);
+
+// What stays below a size, and what cannot be seen.
+std::string BoundText(const Statement& statement);  // "below 0.012 N m"; empty: no bound is known
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_REPORT_SENTENCES_H_

@@ -1,0 +1,72 @@
+// What a diagnosis states, a sentence each.
+#include "src/report/sentences.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace gapscope {
+namespace {
+
+const EffectUse kCable{"cable_spring", "arm"}, kGravity{"gravity_offset", "arm"}, kFriction{"load_friction", "arm"},
+    kDelay{"command_delay", "motor"};
+
+// As a Qube's chirps give it: a group, and two that are there both or neither.
+Diagnosis Made() {
+  Diagnosis d;
+  d.effects.resize(1);
+  d.nominal = 0.15194, d.refit = 0.0507, d.final = 0.01317, d.floor = 0.00291, d.closed = 0.79;
+  d.evidence.free_run_before = 0.267, d.evidence.free_run_left = 0.063, d.evidence.free_run_removed = 0.764;
+  const auto add = [&](const EffectUse& use, double probability, double share, int group) -> Statement& {
+    d.statements.push_back({.use = use,
+                            .answer = probability >= 0.5 ? Answer::kPresent : Answer::kAbsent,
+                            .probability = probability,
+                            .share_of_gap = {.value = share},
+                            .group = group});
+    return d.statements.back();
+  };
+  add(kDelay, 0.68, 0.02, -1).beside = kFriction;
+  d.statements.back().parameters = {{"delay_s", "s", 0.0057312, 0.0045, 0.0069}};
+  add(kCable, 0.85, 0.95, 0).parameters = {{"stiffness_n_m_per_rad", "N m/rad", 0.0012, 0.0003, 0.0047}};
+  add(kGravity, 0.85, 0.95, 0);
+  add({"backlash", "arm"}, 0.2, 0, -1);
+  return d;
+}
+
+TEST(SentencesTest, OneForEachFindingTheLargestShareFirst) {
+  const auto sentences = SentencesOf(Made());
+  ASSERT_EQ(sentences.size(), 2u) << "what is absent has none, a group one";
+  EXPECT_EQ(sentences[0].Text(),
+            "cable spring or gravity offset on arm, cable spring 0.0012 (0.0003 .. 0.0047) N m/rad, 95 % of the gap, "
+            "P 0.85");
+  EXPECT_EQ(sentences[1].Text(),
+            "command delay on motor, 5.73 (4.5 .. 6.9) ms, 2 % of the gap, P 0.68, seen only beside load friction on "
+            "arm");
+}
+
+TEST(SentencesTest, PlacesThatDifferAreEachNamed) {
+  Diagnosis d = Made();
+  d.statements[2].use.on = "pendulum";
+  EXPECT_EQ(SentencesOf(d)[0].what, "cable spring on arm or gravity offset on pendulum");
+}
+
+TEST(SentencesTest, TheGapInWindowsAndInFreeRuns) {
+  Diagnosis d = Made();
+  const auto gap = GapSentences(d);
+  ASSERT_EQ(gap.size(), 2u);
+  EXPECT_EQ(gap[0],
+            "in windows: nominal 0.152 -> retuned 0.0507 -> with what was found 0.0132, the sensors' floor 0.00291; 79 "
+            "% closed");
+  EXPECT_EQ(gap[1], "over whole logs in one run: retuned 0.267 -> with what was found 0.063; 76 % closed");
+  d.evidence.free_run_left = INFINITY;
+  EXPECT_EQ(GapSentences(d).size(), 1u);
+}
+
+TEST(SentencesTest, WhatIsNotKnownOfTheRemainderIsLeftOut) {
+  const auto parts = PartsOf({.explained = 0.9, .systematic = 0.06, .sensors = 0.04, .not_repeatable = NAN});
+  ASSERT_EQ(parts.size(), 3u);
+  EXPECT_EQ(parts[2].name, "sensors");
+}
+
+}  // namespace
+}  // namespace gapscope

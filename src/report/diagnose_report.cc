@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -177,15 +178,17 @@ ordered_json PolicyJson() {
 
 // All parameters of what was found: a sentence has the first of each.
 std::string SizeTable(const Diagnosis& d) {
-  std::string text = fmt::format("\n{:<20} {:<28} {:>11}   {}\n", "size of", "", "value", "95 % interval");
+  std::size_t width = 0;
+  for (const auto& found : d.effects) width = std::max(width, found.use.Text().size());
+  std::string text = fmt::format("\n{:<{}} {:<28} {:>11}   {}\n", "size of", width, "", "value", "95 % interval");
   for (const auto& found : d.effects) {
     std::string name = found.use.Text();
     for (const auto& p : found.parameters) {
-      text += fmt::format("{:<20} {:<28} {:>11.4g}   {:.4g} .. {:.4g}{}\n", name, p.key, p.value, p.low, p.high,
+      text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}{}\n", name, width, p.key, p.value, p.low, p.high,
                           p.unit == "1" ? "" : " " + p.unit);
       if (!p.ratio.to.empty())
-        text += fmt::format("{:<20} {:<28} {:>11.4g}   {:.4g} .. {:.4g}\n", "", "  over " + p.ratio.to, p.ratio.value,
-                            p.ratio.low, p.ratio.high);
+        text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}\n", "", width, "  over " + p.ratio.to,
+                            p.ratio.value, p.ratio.low, p.ratio.high);
       name.clear();
     }
   }

@@ -75,10 +75,10 @@ std::vector<Sentence> SentencesOf(const Diagnosis& d) {
 }
 
 std::vector<std::string> GapSentences(const Diagnosis& d) {
-  std::vector<std::string> sentences = {
-      fmt::format("in windows: nominal {} -> retuned {} -> with what was found {}, the sensors' floor {}; {:.0f} % closed",
-                  ShortNumber(d.nominal, 3), ShortNumber(d.refit, 3), ShortNumber(d.final, 3), ShortNumber(d.floor, 3),
-                  100 * d.closed)};
+  std::vector<std::string> sentences = {fmt::format(
+      "in windows: nominal {} -> retuned {} -> with what was found {}, the sensors' floor {}; {:.0f} % closed",
+      ShortNumber(d.nominal, 3), ShortNumber(d.refit, 3), ShortNumber(d.final, 3), ShortNumber(d.floor, 3),
+      100 * d.closed)};
   const VerdictEvidence& e = d.evidence;
   if (!d.effects.empty() && std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left)) {
     sentences.push_back(fmt::format("over whole logs in one run: retuned {} -> with what was found {}; {:.0f} % closed",
@@ -90,10 +90,9 @@ std::vector<std::string> GapSentences(const Diagnosis& d) {
 
 std::vector<Part> PartsOf(const Remainder& remainder) {
   std::vector<Part> parts;
-  for (const auto& [name, share] : {std::pair("explained", remainder.explained),
-                                    std::pair("systematic", remainder.systematic),
-                                    std::pair("not repeatable", remainder.not_repeatable),
-                                    std::pair("sensors", remainder.sensors)}) {
+  for (const auto& [name, share] :
+       {std::pair("explained", remainder.explained), std::pair("systematic", remainder.systematic),
+        std::pair("not repeatable", remainder.not_repeatable), std::pair("sensors", remainder.sensors)}) {
     if (std::isfinite(share)) parts.push_back({name, share});
   }
   return parts;

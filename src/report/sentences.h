@@ -11,12 +11,12 @@ namespace gapscope {
 
 // A finding that is present: an effect, or a group of which the logs cannot tell which one it is.
 struct Sentence {
-  std::string what;            // "cable spring or gravity offset on arm"
-  std::string size;            // of those that are in the final model, with their intervals; may be empty
-  std::string caveat;          // "seen only beside command delay on motor"; may be empty
-  double share_of_gap = 0;     // of the gap that closes
+  std::string what;         // "cable spring or gravity offset on arm"
+  std::string size;         // of those that are in the final model, with their intervals; may be empty
+  std::string caveat;       // "seen only beside command delay on motor"; may be empty
+  double share_of_gap = 0;  // of the gap that closes
   double probability = 0;
-  std::string Text() const;    // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of the gap, P 0.94"
+  std::string Text() const;  // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of the gap, P 0.94"
 };
 // The largest share first.
 std::vector<Sentence> SentencesOf(const Diagnosis& d);

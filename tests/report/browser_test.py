@@ -147,7 +147,9 @@ def linked_zoom(driver, path):
     same = lambda ranges: all(abs(r[0] - ranges[0][0]) < 1e-9 and abs(r[1] - ranges[0][1]) < 1e-9 for r in ranges)
     narrower = lambda ranges, than: ranges[0][1] - ranges[0][0] < 0.8 * (than[0][1] - than[0][0])
     check(len(all_of_it) >= 4, f"only {len(all_of_it)} charts")
-    driver.find_element(By.CSS_SELECTOR, "[data-zoom=in]").click()
+    closer = driver.find_element(By.CSS_SELECTOR, "[data-zoom=in]")
+    driver.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'});", closer)
+    closer.click()
     ranges = driver.execute_script(RANGES)
     check(same(ranges) and narrower(ranges, all_of_it), f"button: {ranges}")
     driver.find_element(By.CSS_SELECTOR, "[data-zoom=all]").click()
@@ -185,8 +187,8 @@ def main():
             verdicts = {"replay": "hardly follows", "long": "hardly follows", "none": "Nothing is missing",
                         "parameters": "other parameter values close the gap",
                         "effects": "The model lacks cable spring on arm and Coulomb friction on arm.",
-                        "ambiguous": "lacks cable spring or gravity offset and Coulomb friction on arm: "
-                                     "these logs cannot tell which",
+                        "ambiguous": "lacks cable spring or gravity offset on arm and Coulomb friction on arm. "
+                                     "These logs cannot tell which",
                         "unknown": "and something that no known effect explains"}
             for name, verdict in verdicts.items():
                 for width in (390, 1440):
@@ -196,7 +198,7 @@ def main():
                   "unknown: what the effects leave")
             linked_zoom(driver, Path(folder) / "effects.html")
             text = driver.find_element(By.ID, "main").text
-            for part in ["91 %", "does not bend with the angle", "</script><b>held out</b>",
+            for part in ["91 %", "gains too little", "0.0002 N m", "</script><b>bold</b>",
                          "gapscope design triangle --seconds 20", "cable_spring@arm.stiffness_n_m_per_rad", "sha256"]:
                 check(part in text, f"the diagnosis does not say '{part}'")
             check(driver.execute_script("return document.querySelectorAll('.map canvas').length") == 2,

@@ -33,6 +33,7 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s,
                      .max_windows = train ? max_windows : (max_windows + 1) / 2,
                      .choice = train ? WindowChoice::kTelling : WindowChoice::kEven,
+                     .windows = train ? windows : nullptr,
                      .time_step_s = time_step_s,
                      .shift_range_s = sample_s,
                      .weights = weights,

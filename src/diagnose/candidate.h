@@ -57,8 +57,9 @@ struct Workbench {
   std::vector<double> weights;  // per experiment signal: 1 / noise
   double window_s = 1;
   double time_step_s = 0;
-  double sample_s = 0;          // of the logs as they are: what a delay must exceed
-  std::size_t max_windows = 0;  // to fit; of held-out logs half as many
+  double sample_s = 0;                                    // of the logs as they are: what a delay must exceed
+  std::size_t max_windows = 0;                            // to fit; of held-out logs half as many
+  std::shared_ptr<const std::vector<LogWindow>> windows;  // of the training logs: the same for all candidates
   Deadline deadline;
   std::shared_ptr<Work> work = std::make_shared<Work>();  // done so far
   std::size_t most_steps = 0;                             // of the simulator; 0: no limit

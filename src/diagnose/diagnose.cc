@@ -165,6 +165,15 @@ std::size_t WindowsIn(std::size_t steps, const Workbench& bench) {
       1, static_cast<std::size_t>(static_cast<double>(steps) * bench.time_step_s / bench.window_s));
 }
 
+// The windows to fit are chosen once, not by every candidate: of long logs that is a look at every row.
+void ChooseFitted(const Model& model, std::size_t steps, bool by_windows, Workbench* bench) {
+  bench->by_windows = by_windows;
+  bench->max_windows = WindowsIn(steps, *bench);
+  bench->windows.reset();
+  bench->windows =
+      std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
+}
+
 // Steps of one replay of the training windows.
 std::size_t StepsOfReplay(const Workbench& bench) {
   auto made = MakeCandidate(bench, {});
@@ -207,7 +216,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     bench.time_step_s =
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
-    bench.max_windows = WindowsIn(options.replay_steps, bench);
+    ChooseFitted(*model, options.replay_steps, false, &bench);
     bench.deadline = deadline;
     bench.journal = journal.get();
     bench.most_steps =
@@ -222,7 +231,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
     const DataSplit blocks = InWindows(data);
     Workbench again = make_bench(blocks);
-    again.by_windows = true;
+    ChooseFitted(*model, options.replay_steps, true, &again);
     GS_ASSIGN(const auto second, Search(again, false, say));
     GS_ASSIGN(result, Describe(*second, again, noise, options.seed, say));
     for (const auto& recording : blocks.train) result.train_logs.push_back(recording.log_path);

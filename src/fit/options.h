@@ -4,11 +4,14 @@
 
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace gapscope {
+
+struct LogWindow;
 
 // Which windows of each log a problem takes: with kTrain and kHeldOut every third one is held out, from
 // another one on in each log.
@@ -37,6 +40,8 @@ struct FitOptions {
   Fold fold = Fold::kAll;
   std::size_t max_windows = 0;  // 0: all; free runs are never left out
   WindowChoice choice = WindowChoice::kEven;
+  // TakenWindows of these options, where many problems on the same logs share them; null: chosen anew.
+  std::shared_ptr<const std::vector<LogWindow>> windows;
   double time_step_s = 0;    // 0: the model's
   bool fit_offsets = true;   // zero offsets of measured positions, per log
   bool fit_shift = true;     // command shift within +-1 sample, common to all logs

@@ -5,7 +5,6 @@
 
 #include "src/compare/noise.h"
 #include "src/core/collect.h"
-#include "src/fit/choose_windows.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -17,25 +16,6 @@ std::size_t FirstScored(const Recording& recording, const Window& rows, double l
   std::size_t first = 1;
   while (first + 2 < rows.rows() && recording.time_s[rows.begin + first] - begin < lead_in_s) ++first;
   return first;
-}
-
-// The windows of all logs that the fold takes, at most as many as are asked for.
-std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, const FitOptions& options) {
-  std::vector<LogWindow> windows;
-  for (std::size_t l = 0; l < recordings.size(); ++l) {
-    const auto all = MakeWindows(recordings[l], ReplayMode::kWindows, options.window_s);
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      // Another third in each log: repeats of one command are not all held out at the same time.
-      if (options.fold == Fold::kAll || ((i + l) % 3 == 1) == (options.fold == Fold::kHeldOut))
-        windows.push_back({l, all[i]});
-    }
-  }
-  const std::size_t most = options.max_windows;
-  if (most == 0 || windows.size() <= most) return windows;
-  if (options.choice == WindowChoice::kTelling) return ChooseWindows(recordings, windows, most);
-  std::vector<LogWindow> even;
-  for (std::size_t i = 0; i < most; ++i) even.push_back(windows[i * windows.size() / most]);
-  return even;
 }
 
 // Root mean square of each signal's residuals over a log; 0 where there are none.
@@ -55,6 +35,25 @@ std::vector<double> MismatchOf(std::size_t log, std::size_t signals, const std::
 }
 
 }  // namespace
+
+std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, const FitOptions& options) {
+  if (options.windows) return *options.windows;
+  std::vector<LogWindow> windows;
+  for (std::size_t l = 0; l < recordings.size(); ++l) {
+    const auto all = MakeWindows(recordings[l], ReplayMode::kWindows, options.window_s);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      // Another third in each log: repeats of one command are not all held out at the same time.
+      if (options.fold == Fold::kAll || ((i + l) % 3 == 1) == (options.fold == Fold::kHeldOut))
+        windows.push_back({l, all[i]});
+    }
+  }
+  const std::size_t most = options.max_windows;
+  if (most == 0 || windows.size() <= most) return windows;
+  if (options.choice == WindowChoice::kTelling) return ChooseWindows(recordings, windows, most);
+  std::vector<LogWindow> even;
+  for (std::size_t i = 0; i < most; ++i) even.push_back(windows[i * windows.size() / most]);
+  return even;
+}
 
 std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Recording>& recordings,
                                       const FitOptions& options, const FitLayout& layout,

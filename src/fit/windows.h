@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "replay/replay.h"
+#include "src/fit/choose_windows.h"
 #include "src/fit/layout.h"
 
 namespace gapscope {
@@ -24,6 +25,9 @@ struct FitWindow {
   Eigen::VectorXd prior;         // weight of each number of the state
   Eigen::Index scored() const { return static_cast<Eigen::Index>(rows.rows() - first_scored); }
 };
+
+// The windows of all logs that the fold takes, at most as many as are asked for. Free runs are not among them.
+std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, const FitOptions& options);
 
 // `values`: parameters that the starts are read with.
 std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Recording>& recordings,

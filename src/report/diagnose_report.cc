@@ -8,6 +8,7 @@
 
 #include "src/diagnose/policy.h"
 #include "src/report/sentences.h"
+#include "src/report/words.h"
 
 namespace gapscope {
 
@@ -185,7 +186,7 @@ std::string SizeTable(const Diagnosis& d) {
     std::string name = found.use.Text();
     for (const auto& p : found.parameters) {
       text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}{}\n", name, width, p.key, p.value, p.low, p.high,
-                          p.unit == "1" ? "" : " " + p.unit);
+                          UnitAfter(p.unit));
       if (!p.ratio.to.empty())
         text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}\n", "", width, "  over " + p.ratio.to,
                             p.ratio.value, p.ratio.low, p.ratio.high);

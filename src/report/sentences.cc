@@ -16,10 +16,9 @@ std::string SizeText(const EffectEstimate& size) {
   constexpr double kShort = 0.5;
   const bool is_short = size.unit == "s" && std::abs(size.value) < kShort;
   const double factor = is_short ? 1000 : 1;
-  const std::string unit = is_short ? "ms" : size.unit == "1" ? "" : size.unit;
   const auto number = [&](double value) { return ShortNumber(factor * value, 3); };
-  return fmt::format("{} ({} .. {}){}{}", number(size.value), number(size.low), number(size.high),
-                     unit.empty() ? "" : " ", unit);
+  return fmt::format("{} ({} .. {}){}", number(size.value), number(size.low), number(size.high),
+                     UnitAfter(is_short ? "ms" : size.unit));
 }
 
 std::string NamesOf(const std::vector<EffectUse>& uses) {
@@ -101,7 +100,7 @@ std::vector<Part> PartsOf(const Remainder& remainder) {
 std::string BoundText(const Statement& statement) {
   if (statement.bounds.empty()) return "";
   const EffectEstimate& bound = statement.bounds.front();
-  return fmt::format("{} {}", ShortNumber(bound.value, 2), bound.unit == "1" ? "" : bound.unit);
+  return ShortNumber(bound.value, 2) + UnitAfter(bound.unit);
 }
 
 }  // namespace gapscope

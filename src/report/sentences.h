@@ -31,8 +31,8 @@ struct Part {
 };
 std::vector<Part> PartsOf(const Remainder& remainder);
 
-// What stays below a size, and what cannot be seen.
-std::string BoundText(const Statement& statement);  // "below 0.012 N m"; empty: no bound is known
+// The size that an absent effect stays below (of a limit: above), "0.012 N m"; empty: no bound is known.
+std::string BoundText(const Statement& statement);
 
 }  // namespace gapscope
 

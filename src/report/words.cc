@@ -115,6 +115,8 @@ std::string Listed(const std::vector<std::string>& parts, const std::string& joi
   return text;
 }
 
+std::string UnitAfter(const std::string& unit) { return unit.empty() || unit == "1" ? "" : " " + unit; }
+
 Headline HeadlineOf(const ReplayRun& run) {
   const double error = run.comparison.error;
   const std::string effects = Listed(WordsOf(run.model.effects));

@@ -45,6 +45,8 @@ std::string Words(const Explanation& explanation);  // or "none"
 std::string Listed(const std::vector<std::string>& parts, const std::string& joiner = "and");
 // Rounded to `digits` significant ones, without an exponent where people write none: 1230, 0.00004. "–": not finite.
 std::string ShortNumber(double value, int digits);
+// " N m", after a number; nothing for a share, whose unit is 1.
+std::string UnitAfter(const std::string& unit);
 
 }  // namespace gapscope
 

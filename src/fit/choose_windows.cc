@@ -176,6 +176,7 @@ std::vector<LogWindow> ChooseWindows(const std::vector<Recording>& recordings, c
   }
   std::sort(taken.begin(), taken.end());
   std::vector<LogWindow> chosen;
+  chosen.reserve(taken.size());
   for (const std::size_t w : taken) chosen.push_back(windows[w]);
   return chosen;
 }

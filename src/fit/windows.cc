@@ -51,6 +51,7 @@ std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, co
   if (most == 0 || windows.size() <= most) return windows;
   if (options.choice == WindowChoice::kTelling) return ChooseWindows(recordings, windows, most);
   std::vector<LogWindow> even;
+  even.reserve(most);
   for (std::size_t i = 0; i < most; ++i) even.push_back(windows[i * windows.size() / most]);
   return even;
 }

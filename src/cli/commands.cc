@@ -3,8 +3,8 @@
 namespace gapscope::cli {
 
 std::vector<Command> AllCommands() {
-  return {InitCommand(),   InspectCommand(), ReplayCommand(), TuneCommand(), DiagnoseCommand(), IdentifyCommand(),
-          DesignCommand(), RenderCommand(),  PlanCommand(),   RunCommand(),  MergeCommand()};
+  return {InitCommand(),     InspectCommand(), ReplayCommand(), TuneCommand(), DiagnoseCommand(), ExplainCommand(),
+          IdentifyCommand(), DesignCommand(),  RenderCommand(), PlanCommand(), RunCommand(),      MergeCommand()};
 }
 
 }  // namespace gapscope::cli

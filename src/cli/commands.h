@@ -25,6 +25,7 @@ Command InspectCommand();
 Command ReplayCommand();
 Command TuneCommand();
 Command DiagnoseCommand();
+Command ExplainCommand();
 Command IdentifyCommand();  // one command below it for each method
 Command DesignCommand();    // these below it:
 Command ChirpCommand();

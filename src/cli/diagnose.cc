@@ -2,15 +2,21 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
 #include "src/cli/session.h"
+#include "src/core/collect.h"
+#include "src/core/names.h"
 #include "src/diagnose/diagnosis_journal.h"
 #include "src/diagnose/policy.h"
 #include "src/report/diagnose_report.h"
+#include "src/report/read_diagnosis.h"
+#include "src/report/read_run.h"
 #include "src/report/write_run.h"
 
 namespace gapscope::cli {
@@ -19,11 +25,31 @@ namespace {
 struct DiagnoseFlags {
   CommonFlags common;
   ModelFlags model;
-  std::vector<std::string> hold_out, prior;
+  std::vector<std::string> hold_out, prior, accept;
+  std::string from;
   SearchEffort effort = SearchEffort::kNormal;
   double budget_s = 0, window_s = 0;
   bool resume = false;
 };
+
+// What each effect of the final model does along a log, beside what is missing without it.
+Result<std::vector<EffectCurves>> CurvesOf(const Diagnosis& diagnosis, const Recording& recording,
+                                           const ScaleTable& scales) {
+  constexpr std::size_t kBins = 40;
+  std::vector<EffectCurves> all;
+  const Model& model = *diagnosis.model;
+  const auto with = EstimateResidualTorque(model, diagnosis.values, recording);
+  for (const FoundEffect& found : diagnosis.effects) {
+    std::vector<EffectUse> rest = model.effects();
+    std::erase(rest, found.use);
+    GS_ASSIGN(const auto without, Model::Build(model.rig(), rest, scales));
+    const auto values = Collect(without->parameters(), [&](const Parameter& p) {
+      return diagnosis.values[static_cast<std::size_t>(model.IndexOf(p.name))];
+    });
+    all.push_back({Words(found.use), CompareTorques(EstimateResidualTorque(*without, values, recording), with, kBins)});
+  }
+  return all;
+}
 
 // `log_values`: of the first log, for the MJCF.
 Status WriteDiagnosis(const std::string& out, const Experiment& experiment, const DataSplit& data,
@@ -31,7 +57,8 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
   const Diagnosis& diagnosis = run.diagnosis;
   GS_ASSIGN(const auto bare, Model::Build(diagnosis.model->rig()));
   RunFiles files;
-  GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, EstimateScales(*bare, data.train)));
+  const ScaleTable scales = EstimateScales(*bare, data.train);
+  GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, scales));
   const ReportLogs logs{data.train, data.held_out};
   ReportSource source = SourceOf(experiment, logs);
   source.content = PageOf(run);
@@ -40,6 +67,7 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
                                 {"refitted", diagnosis.refit_model, diagnosis.refit_values},
                                 {"diagnosed", diagnosis.model, diagnosis.values}},
                                pool);
+  GS_ASSIGN(source.curves, CurvesOf(diagnosis, data.held_out.front(), scales));
   source.model = diagnosis.refit_model.get();
   source.values = diagnosis.nominal_values;
   source.parameters = diagnosis.model->parameters();
@@ -47,15 +75,85 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
   return WriteRun(out, ToJson(run), files);
 }
 
-// What --with, --set and --params say of the base model.
-Status AddKnown(const ModelFlags& flags, const Experiment& experiment, const DataSplit& data,
+// What is known of the base model before the search.
+struct Known {
+  std::vector<std::string> with;  // EFFECT@PLACE
+  std::map<std::string, double> values;
+};
+
+std::set<std::filesystem::path> FilesOf(const std::vector<std::string>& paths) {
+  std::set<std::filesystem::path> files;
+  std::error_code failure;
+  for (const auto& path : paths) files.insert(std::filesystem::weakly_canonical(path, failure));
+  return files;
+}
+
+// An earlier diagnosis must be of this experiment and these logs: sizes that other data gave are --set's.
+Status CheckSameData(const EarlierDiagnosis& earlier, const DiagnoseFlags& flags) {
+  if (FilesOf({earlier.experiment}) != FilesOf({flags.model.experiment}))
+    return Error{.what = "a diagnosis of another experiment",
+                 .where = "--from " + flags.from,
+                 .actual = earlier.experiment,
+                 .allowed = flags.model.experiment};
+  std::vector<std::string> given = flags.model.logs, then = earlier.train_logs;
+  given.insert(given.end(), flags.hold_out.begin(), flags.hold_out.end());
+  then.insert(then.end(), earlier.held_out_logs.begin(), earlier.held_out_logs.end());
+  if (FilesOf(given) != FilesOf(then))
+    return Error{.what = "a diagnosis of other logs",
+                 .where = "--from " + flags.from,
+                 .actual = Join(then),
+                 .allowed = Join(given),
+                 .cure = "give the same logs, or state what is known with --with and --set"};
+  return Ok();
+}
+
+// The accepted statements of an earlier diagnosis; without --accept all that its final model has.
+Result<Known> AcceptEarlier(const DiagnoseFlags& flags) {
+  Known known;
+  if (flags.from.empty()) {
+    if (flags.accept.empty()) return known;
+    return Error{
+        .what = "nothing to accept from", .where = "--accept", .cure = "name the earlier diagnosis with --from"};
+  }
+  GS_ASSIGN(const auto json, ReadJson(flags.from));
+  GS_ASSIGN(const EarlierDiagnosis earlier, ReadDiagnosis(json, flags.from));
+  GS_RETURN_IF_ERROR(CheckSameData(earlier, flags));
+  std::vector<std::size_t> accepted;
+  for (const auto& word : flags.accept) {
+    GS_ASSIGN(const std::size_t place, FindStatement(earlier, word, "--accept"));
+    if (earlier.statements[place].parameters.empty())
+      return Error{.what = "no size was found for " + earlier.statements[place].use.Text(),
+                   .where = "--accept " + word,
+                   .allowed = "a statement whose effect is in the final model",
+                   .cure = "add it with --with, and --set its size"};
+    accepted.push_back(place);
+  }
+  for (std::size_t i = 0; i < earlier.statements.size() && flags.accept.empty(); ++i) {
+    if (!earlier.statements[i].parameters.empty()) accepted.push_back(i);
+  }
+  for (const std::size_t place : accepted) {
+    const std::string name = earlier.statements[place].use.Text();
+    known.with.push_back(name);
+    for (const auto& [parameter, value] : earlier.model.values) {
+      if (parameter.starts_with(name + ".")) known.values[parameter] = value;
+    }
+  }
+  return known;
+}
+
+// What --from, --with, --set and --params say of the base model, the later ones over the earlier.
+Status AddKnown(const DiagnoseFlags& flags, const Experiment& experiment, const DataSplit& data,
                 DiagnoseOptions* options) {
-  if (flags.with.empty() && flags.set.empty() && flags.params.empty()) return Ok();
+  GS_ASSIGN(Known known, AcceptEarlier(flags));
+  const ModelFlags& model = flags.model;
+  known.with.insert(known.with.end(), model.with.begin(), model.with.end());
+  if (known.with.empty() && model.set.empty() && model.params.empty()) return Ok();
   GS_ASSIGN(const auto bare, Model::Load(experiment));
-  GS_ASSIGN(options->known, ParseEffects(flags.with, *bare->rig()));
+  GS_ASSIGN(options->known, ParseEffects(known.with, *bare->rig()));
   GS_ASSIGN(const auto base, Model::Build(bare->rig(), options->known, EstimateScales(*bare, data.train)));
   std::vector<double> given(base->parameters().size(), kNaN);
-  GS_RETURN_IF_ERROR(OverrideValues(*base, flags.params, flags.set, &given));
+  GS_RETURN_IF_ERROR(OverrideValues(*base, model.params, model.set, &given));
+  options->values = std::move(known.values);
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (std::isfinite(given[i])) options->values[base->parameters()[i].name] = given[i];
   }
@@ -90,7 +188,7 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   const auto log_values = recordings.front().values;
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);
   GS_ASSIGN(DiagnoseOptions options, OptionsOf(flags, experiment));
-  GS_RETURN_IF_ERROR(AddKnown(flags.model, experiment, data, &options));
+  GS_RETURN_IF_ERROR(AddKnown(flags, experiment, data, &options));
   const bool live = !flags.common.quiet && isatty(2);
   if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
   auto diagnosed = Diagnose(experiment, data, options, pool);
@@ -121,6 +219,16 @@ Command DiagnoseCommand() {
        .more =
            "Multiplies the odds that the logs give: 0.9 says nine to one before the logs are seen, 0.5 (every other "
            "effect's) nothing. The result has both, `prior` and `evidence`"},
+      {.flag = "--from",
+       .value = &flags->from,
+       .help = "Go on from an earlier diagnosis of the same experiment and logs: its folder",
+       .more =
+           "The effects that it found become known, as with --with and --set; what is missing beside them is looked "
+           "for. --accept takes some of them"},
+      {.flag = "--accept",
+       .value = &flags->accept,
+       .unset = "all effects of its final model",
+       .help = "A statement of --from, by number or EFFECT@PLACE, more than once"},
       {.flag = "--budget",
        .value = &flags->budget_s,
        .unit = "s",

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "src/model/model.h"
+#include "src/model/run_model.h"
 
 namespace gapscope::cli {
 
@@ -15,8 +15,12 @@ struct ResultModel {
   std::vector<double> values;
 };
 
-// `path`: the folder or its result.json. Errors: not such a file; an effect or a parameter that this rig does not
+// A model by names, of this rig. `where` they come from, for errors: an effect or a parameter that the rig does not
 // have.
+Result<ResultModel> BuildRunModel(std::shared_ptr<const Rig> rig, const RunModel& named, const std::string& where,
+                                  const ScaleTable& scales);
+
+// `path`: the folder or its result.json. Errors: not such a file; as BuildRunModel.
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales);
 
 }  // namespace gapscope::cli

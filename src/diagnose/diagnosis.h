@@ -4,6 +4,7 @@
 #define GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "src/compare/conditions.h"
 #include "src/core/enum_names.h"
+#include "src/model/run_model.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {
@@ -72,6 +74,25 @@ struct StatementNumbers {
   bool dry = false;          // dry friction: of these the one with a jump
 };
 
+// Part of a held-out log, and its part of what an effect gains there: negative where the motion is told worse with it.
+struct BlockGain {
+  std::string log;
+  double from_s = 0, to_s = 0;
+  double share = 0;  // of the squared error that the effect takes from all held-out logs
+};
+
+// Two sets that differ by an effect or a group, both refitted: what a statement's numbers were taken from.
+struct ComparedSets {
+  RunModel with, without;
+  std::vector<BlockGain> blocks;  // the largest first; empty: the effect takes nothing away
+};
+
+// Something that was tried in an effect's place.
+struct Rival {
+  EffectUse use;
+  double behind = 0;  // ln(cost with it / cost of the set)
+};
+
 // Share of the gap that closes, with the interval that 95 of 100 draws of the held-out logs' half seconds are in.
 struct ShareOfGap {
   double value = 0, low = 0, high = 0;
@@ -90,6 +111,8 @@ struct Statement {
   int group = -1;                        // statements of one group are told together
   std::optional<EffectUse> beside = {};  // the other one of two that are there both or neither
   StatementNumbers numbers;
+  std::shared_ptr<const ComparedSets> sets = {};  // null: it was not refitted
+  std::vector<Rival> rivals = {};                 // the nearest first
   std::string rule;
 };
 

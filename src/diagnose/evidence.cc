@@ -8,6 +8,7 @@
 #include "src/diagnose/block_errors.h"
 #include "src/diagnose/discrepancy.h"
 #include "src/diagnose/policy.h"
+#include "src/fit/policy.h"
 
 namespace gapscope {
 namespace {
@@ -24,17 +25,40 @@ double FreeGain(double before, double after) {
   return std::min(before, after) > kLost ? kNaN : 2 * LogRatio(before, after);
 }
 
-// What the held-out logs gain, over its standard error: half seconds are independent.
-double ClearBy(const Workbench& bench, const Candidate& without, const Candidate& with) {
+// What each half second of the held-out logs gains.
+BlockSquares GainsByBlock(const Workbench& bench, const Candidate& without, const Candidate& with) {
   const auto weight = [&](std::size_t log, std::size_t signal) {
     const double w = bench.weights[bench.data.held_out[log].measured[signal].index];
     return w * w;
   };
   BlockSquares gains = SquaresByBlock(without.held_out, weight);
   for (const auto& [block, square] : SquaresByBlock(with.held_out, weight)) gains[block] -= square;
+  return gains;
+}
+
+// Their sum over its standard error: half seconds are independent.
+double ClearBy(const BlockSquares& gains) {
   const auto values = Collect(gains, [](const auto& entry) { return entry.second; });
   const Moments moments = MomentsOf(values);
   return moments.deviation > 0 ? std::sqrt(static_cast<double>(values.size())) * moments.mean / moments.deviation : 0;
+}
+
+// The half seconds that gain most, and the one that gains least.
+std::vector<BlockGain> Carriers(const Workbench& bench, const BlockSquares& gains) {
+  constexpr std::size_t kMost = 12;
+  double total = 0;
+  for (const auto& [block, gain] : gains) total += gain;
+  if (!(total > 0)) return {};
+  std::vector<BlockGain> blocks;
+  for (const auto& [block, gain] : gains) {
+    const Recording& log = bench.data.held_out[block.first];
+    const double from_s = log.start_s + static_cast<double>(block.second) * kFitPolicy.block_s;
+    blocks.push_back(
+        {.log = log.log_path, .from_s = from_s, .to_s = from_s + kFitPolicy.block_s, .share = gain / total});
+  }
+  std::stable_sort(blocks.begin(), blocks.end(), [](const auto& a, const auto& b) { return a.share > b.share; });
+  if (blocks.size() > kMost) blocks.erase(blocks.begin() + (kMost - 1), blocks.end() - 1);
+  return blocks;
 }
 
 }  // namespace
@@ -65,28 +89,32 @@ void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers
   numbers->smooth = all([](const Effect& effect) { return effect.of_motion; });
 }
 
-StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses) {
+void Evidence::Of(const std::vector<EffectUse>& uses, Statement* statement) {
   const EffectSet rest = Without(found_.chosen->effects, uses);
   Candidate* without = found_.ledger.Find(rest);
   if (!without || uses.size() > 1) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
-  return Of(uses, without ? without : found_.base);
+  Of(uses, without ? without : found_.base, statement);
 }
 
-StatementNumbers Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without) {
+void Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without, Statement* statement) {
   Compare(without);
   ScoreCandidate(bench_, without);
-  StatementNumbers numbers;
+  StatementNumbers& numbers = statement->numbers;
+  const BlockSquares gains = GainsByBlock(bench_, *without, *found_.chosen);
+  statement->sets = std::make_shared<const ComparedSets>(
+      ComparedSets{.with = RunModelOf(*found_.chosen->model, found_.chosen->values),
+                   .without = RunModelOf(*without->model, without->values),
+                   .blocks = Carriers(bench_, gains)});
   numbers.gain = LogRatio(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
   numbers.gain_held_out = LogRatio(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
   numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
-  numbers.clear = ClearBy(bench_, *without, *found_.chosen);
+  numbers.clear = ClearBy(gains);
   SetCharacter(uses, &numbers);
-  if (torques_.empty()) return numbers;
+  if (torques_.empty()) return;
   const ColumnTable table = MakeColumns(bench_, *without, {}, torques_);
-  if (!table.valid || !Left().valid) return numbers;
+  if (!table.valid || !Left().valid) return;
   const std::size_t residuals = without->problem->residuals();
   numbers.discrepancy = TorquesBeside(Left(), residuals).likelihood - TorquesBeside(table, residuals).likelihood;
-  return numbers;
 }
 
 const ColumnTable& Evidence::Left() {

@@ -17,10 +17,10 @@ class Evidence {
   // Both must outlive this.
   Evidence(const Workbench& bench, SearchResult& found);
 
-  // Of members of the chosen set, taken out as a whole.
-  StatementNumbers Of(const std::vector<EffectUse>& uses);
+  // A statement's numbers, and the sets that they were taken from: of members of the chosen set, taken out as a whole.
+  void Of(const std::vector<EffectUse>& uses, Statement* statement);
   // Of what the chosen set has more than another one, `uses` for it.
-  StatementNumbers Of(const std::vector<EffectUse>& uses, Candidate* without);
+  void Of(const std::vector<EffectUse>& uses, Candidate* without, Statement* statement);
   // Another set becomes the chosen one.
   void Choose(Candidate* candidate);
   double free_left() const { return free_left_; }  // FreeRunError of the chosen set

@@ -10,6 +10,7 @@
 #include "src/diagnose/evidence.h"
 #include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
+#include "src/diagnose/probability.h"
 
 namespace gapscope {
 namespace {
@@ -39,7 +40,8 @@ class Judging {
  private:
   Statement Of(const EffectUse& use) {
     say_("judging " + use.Text());
-    Statement statement{.use = use, .numbers = evidence_.Of({use}), .rule = "its own evidence"};
+    Statement statement{.use = use, .rule = "its own evidence"};
+    evidence_.Of({use}, &statement);
     Weigh({use}, &statement);
     return statement;
   }
@@ -76,8 +78,8 @@ class Judging {
     Candidate* simpler = members.empty() ? nullptr : RefitInPlace(bench_, found_, members, simple, Effort::kTry);
     if (!simpler) return;
     say_("judging " + NameOfSet(members) + " beyond " + simple.Text());
-    Statement beyond{.numbers = evidence_.Of(members, simpler),
-                     .rule = "what it does beyond " + simple.Text() + " is not sure"};
+    Statement beyond{.rule = "what it does beyond " + simple.Text() + " is not sure"};
+    evidence_.Of(members, simpler, &beyond);
     Weigh(members, &beyond);
     if (beyond.probability >= kDiagnosePolicy.probability.present) return;
     const double rise = std::log(simpler->train_cost / found_.chosen->train_cost);
@@ -166,7 +168,8 @@ class Judging {
     for (const auto& [imitated, x, y] : pairs) {
       if (std::min(x->probability, y->probability) >= present || x->group >= 0 || y->group >= 0) continue;
       say_("judging " + NameOfSet({x->use, y->use}));
-      Statement together{.numbers = evidence_.Of({x->use, y->use}), .rule = "taken out together"};
+      Statement together{.rule = "taken out together"};
+      evidence_.Of({x->use, y->use}, &together);
       Weigh({x->use, y->use}, &together);
       if (together.probability < present || !AreOneFinding(x->numbers.gain, y->numbers.gain, together.numbers.gain))
         continue;
@@ -188,7 +191,8 @@ class Judging {
         if (&x >= &y || x.group >= 0 || y.group >= 0 || std::min(x.probability, y.probability) >= present) continue;
         if (std::min(x.numbers.gain, y.numbers.gain) < kDiagnosePolicy.search.tie) continue;
         say_("judging " + NameOfSet({x.use, y.use}) + ": both or neither");
-        Statement both{.numbers = evidence_.Of({x.use, y.use}), .rule = "both or neither"};
+        Statement both{.rule = "both or neither"};
+        evidence_.Of({x.use, y.use}, &both);
         both.numbers.dry = x.numbers.dry || y.numbers.dry;  // no smooth torque takes the place of both
         Weigh({x.use, y.use}, &both);
         both.prior = std::min(PriorOf(x.use), PriorOf(y.use));
@@ -249,6 +253,7 @@ class Judging {
       if (!same && is_sure && !StandsIn(use, present)) behind = std::min(behind, BehindIn(present, member.use, use));
       if (std::isfinite(behind)) rivals.push_back({.use = use, .behind = behind});
     }
+    std::stable_sort(rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.behind < b.behind; });
     return rivals;
   }
 
@@ -261,7 +266,9 @@ class Judging {
     }
     for (std::size_t m = 0; m < found_.members.size(); ++m) {
       const Member& member = found_.members[m];
-      for (const Rival& rival : RivalsOf(member, present)) {
+      const std::vector<Rival> rivals = RivalsOf(member, present);
+      result->statements[m].rivals = rivals;
+      for (const Rival& rival : rivals) {
         const Model& base = *found_.base->model;
         const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
         if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;
@@ -279,6 +286,7 @@ class Judging {
                         .group = own.group,
                         .beside = own.beside,
                         .numbers = own.numbers,
+                        .sets = own.sets,
                         .rule = "costs as little in its place"};
         result->statements.push_back(std::move(other));
       }
@@ -337,21 +345,6 @@ class Judging {
 
 }  // namespace
 
-double ProbabilityOf(const StatementNumbers& n) {
-  const ProbabilityPolicy& w = kDiagnosePolicy.probability;
-  // The largest: an effect that is there shows most where its absence adds up.
-  double gain = -kInfinity;
-  for (const double one : {n.gain, n.gain_held_out, n.gain_free}) {
-    if (std::isfinite(one)) gain = std::max(gain, one);
-  }
-  const double evidence = std::clamp(std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy), -1.0,
-                                     w.most_discrepancy),
-               clear = std::clamp(n.clear, w.least_clear, w.most_clear),
-               x = w.constant + w.gain * std::clamp(gain, -1.0, kDiagnosePolicy.evidence.most_gain) +
-                   w.discrepancy * evidence + w.clear * clear + (n.smooth ? w.smooth : 0) + (n.dry ? w.dry : 0);
-  return 1 / (1 + std::exp(-x));
-}
-
 bool AreOneFinding(double gain_a, double gain_b, double together) {
   const auto [less, more] = std::minmax({std::max(gain_a, 0.0), std::max(gain_b, 0.0)});
   return less >= kDiagnosePolicy.evidence.alike * more || less + more <= kDiagnosePolicy.evidence.alone * together;
@@ -362,11 +355,6 @@ bool AreComplements(double gain_a, double gain_b, double together) {
   const double a = std::expm1(gain_a), b = std::expm1(gain_b), both = std::expm1(together);
   const double alone = kDiagnosePolicy.evidence.alone;
   return a > 0 && b > 0 && both - b <= alone * a && both - a <= alone * b;
-}
-
-double AtPrior(double evidence, double prior) {
-  const double yes = evidence * prior, no = (1 - evidence) * (1 - prior);
-  return yes + no > 0 ? yes / (yes + no) : prior;
 }
 
 Verdict VerdictOf(const VerdictFacts& facts) {

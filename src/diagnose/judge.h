@@ -7,11 +7,6 @@
 
 namespace gapscope {
 
-// Probability that an effect with these numbers is there (ProbabilityPolicy).
-double ProbabilityOf(const StatementNumbers& numbers);
-// The same evidence at other prior odds than even ones: Bayes' rule. Both 0 .. 1.
-double AtPrior(double evidence, double prior);
-
 // Whether two members that stand in for each other may be judged as one: both gain alike, or most of what they gain
 // shows only where both are taken out (`together`). Else the stronger one would lend the weaker one its evidence.
 bool AreOneFinding(double gain_a, double gain_b, double together);

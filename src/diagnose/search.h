@@ -6,16 +6,11 @@
 #include <string>
 
 #include "src/diagnose/columns.h"
+#include "src/diagnose/diagnosis.h"
 #include "src/diagnose/ledger.h"
 #include "src/diagnose/rules.h"
 
 namespace gapscope {
-
-// Something that was tried in a member's place.
-struct Rival {
-  EffectUse use;
-  double behind = 0;  // ln(cost with it / cost of the set)
-};
 
 // What the search knows of an effect of the final set.
 struct Member {

@@ -27,6 +27,7 @@ struct Recording {
   std::string log_path;
   std::string rig;             // that the log says it is of; empty: it does not say
   std::vector<double> time_s;  // from zero, strictly increasing
+  double start_s = 0;          // of a part of a log: how much later than the log it begins
   std::vector<Command> commands;
   std::vector<Measured> measured;  // only those that the log has
   std::map<std::string, double> values;

@@ -54,4 +54,23 @@ std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<cons
   return sums;
 }
 
+std::string Wrapped(const std::string& text, std::size_t width, const std::string& indent) {
+  std::string wrapped;
+  std::size_t column = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    std::size_t end = text.find(' ', begin);
+    if (end == std::string::npos) end = text.size();
+    if (column > 0 && column + 1 + end - begin > width) {
+      wrapped += '\n' + indent;
+      column = indent.size();
+    } else if (column > 0) {
+      wrapped += ' ', ++column;
+    }
+    wrapped.append(text, begin, end - begin);
+    column += end - begin;
+    begin = end + 1;
+  }
+  return wrapped;
+}
+
 }  // namespace gapscope

@@ -1,7 +1,8 @@
-// Colour and small pictures for a terminal.
+// Colour, lines and small pictures for a terminal.
 #ifndef GAPSCOPE_REPORT_CONSOLE_H_
 #define GAPSCOPE_REPORT_CONSOLE_H_
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,6 +34,9 @@ std::string Sparkline(std::span<const double> values);
 // Root mean square of measured less predicted in `parts` equal stretches of time; NaN where a stretch has no rows.
 std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<const double> measured,
                                   std::span<const double> predicted, std::size_t parts);
+
+// Words on lines of at most `width` characters, all but the first one behind `indent`.
+std::string Wrapped(const std::string& text, std::size_t width, const std::string& indent = "");
 
 }  // namespace gapscope
 

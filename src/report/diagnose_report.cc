@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/diagnose/policy.h"
+#include "src/report/console.h"
 #include "src/report/sentences.h"
 #include "src/report/words.h"
 
@@ -15,26 +16,6 @@ namespace gapscope {
 using nlohmann::ordered_json;
 
 namespace {
-
-// Words on lines of at most `width` characters, all but the first one behind `indent`.
-std::string Wrap(const std::string& text, std::size_t width, const std::string& indent = "") {
-  std::string wrapped;
-  std::size_t column = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    std::size_t end = text.find(' ', begin);
-    if (end == std::string::npos) end = text.size();
-    if (column > 0 && column + 1 + end - begin > width) {
-      wrapped += '\n' + indent;
-      column = indent.size();
-    } else if (column > 0) {
-      wrapped += ' ', ++column;
-    }
-    wrapped.append(text, begin, end - begin);
-    column += end - begin;
-    begin = end + 1;
-  }
-  return wrapped;
-}
 
 std::string ConditionTable(const char* title, const std::vector<ConditionShare>& shares) {
   if (shares.empty()) return "";
@@ -91,6 +72,23 @@ ordered_json Json(const CandidateReport& c) {
   return entry;
 }
 
+// What the statement rests on: the numbers, and what they were taken from.
+void AddComparison(const Statement& s, ordered_json* entry) {
+  const StatementNumbers& n = s.numbers;
+  if (!s.sets) return;
+  (*entry)["numbers"] = {{"gain", JsonNumber(n.gain)},
+                         {"gain_held_out", JsonNumber(n.gain_held_out)},
+                         {"gain_free", JsonNumber(n.gain_free)},
+                         {"discrepancy", JsonNumber(n.discrepancy)},
+                         {"clear", JsonNumber(n.clear)},
+                         {"smooth", n.smooth ? 1 : 0},
+                         {"dry", n.dry ? 1 : 0}};
+  (*entry)["with"] = JsonModel(s.sets->with);
+  (*entry)["without"] = JsonModel(s.sets->without);
+  (*entry)["blocks"] = JsonBlocks(s.sets->blocks);
+  (*entry)["rivals"] = JsonRivals(s.rivals);
+}
+
 ordered_json Json(const Statement& s) {
   const ordered_json parameters = JsonSizes(s.parameters);
   ordered_json entry = {{"name", s.use.effect},
@@ -108,20 +106,77 @@ ordered_json Json(const Statement& s) {
                         {"rule", s.rule}};
   if (s.beside) entry["seen_beside"] = s.beside->Text();
   for (const auto& bound : s.bounds) entry["bound"][bound.key] = JsonNumber(bound.value);
-  const StatementNumbers& n = s.numbers;
-  if (n.gain != 0)
-    entry["numbers"] = {{"gain", JsonNumber(n.gain)},
-                        {"gain_held_out", JsonNumber(n.gain_held_out)},
-                        {"gain_free", JsonNumber(n.gain_free)},
-                        {"discrepancy", JsonNumber(n.discrepancy)},
-                        {"clear", JsonNumber(n.clear)},
-                        {"smooth", n.smooth ? 1 : 0},
-                        {"dry", n.dry ? 1 : 0}};
+  AddComparison(s, &entry);
   return entry;
 }
 
-// Every threshold, so that a result says by which rules it was made.
-ordered_json PolicyJson() {
+// All parameters of what was found: a sentence has the first of each.
+std::string SizeTable(const Diagnosis& d) {
+  std::size_t width = 0;
+  for (const auto& found : d.effects) width = std::max(width, found.use.Text().size());
+  std::string text = fmt::format("\n{:<{}} {:<28} {:>11}   {}\n", "size of", width, "", "value", "95 % interval");
+  for (const auto& found : d.effects) {
+    std::string name = found.use.Text();
+    for (const auto& p : found.parameters) {
+      text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}{}\n", name, width, p.key, p.value, p.low, p.high,
+                          UnitAfter(p.unit));
+      if (!p.ratio.to.empty())
+        text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}\n", "", width, "  over " + p.ratio.to,
+                            p.ratio.value, p.ratio.low, p.ratio.high);
+      name.clear();
+    }
+  }
+  return text;
+}
+
+std::string RemainderText(const Remainder& remainder) {
+  std::string text;
+  for (const Part& part : PartsOf(remainder))
+    text += fmt::format("{}{} {:.0f} %", text.empty() ? "" : ", ", part.name, 100 * part.share);
+  if (text.empty()) return "";
+  text = "- of the retuned model's squared misfit: " + text;
+  if (std::isfinite(remainder.reachable))
+    text += fmt::format("; a free-form torque would explain {:.0f} %", 100 * remainder.reachable);
+  return Wrapped(text, 120, "  ") + "\n";
+}
+
+// What is there, what was considered and is not, and how many more.
+std::string StatementTable(const Diagnosis& d) {
+  std::string text =
+      fmt::format("\n{:>2} {:<34} {:<8} {:>11}  {}\n", "", "effect", "answer", "probability", "rests on");
+  std::size_t absent = 0, unseen = 0;
+  for (std::size_t i = 0; i < d.statements.size(); ++i) {
+    const Statement& s = d.statements[i];
+    const StatementNumbers& n = s.numbers;
+    if (!s.sets) {
+      ++(s.answer == Answer::kUnseen ? unseen : absent);
+      continue;
+    }
+    text += fmt::format("{:>2} {:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", i + 1, s.use.Text(),
+                        AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
+  }
+  text += fmt::format("{} more gain too little (--json: below which size they stay), {} cannot be seen in these logs\n",
+                      absent, unseen);
+  return text;
+}
+
+}  // namespace
+
+ordered_json JsonBlocks(const std::vector<BlockGain>& blocks) {
+  ordered_json json = ordered_json::array();
+  for (const BlockGain& block : blocks)
+    json.push_back({{"log", block.log}, {"from_s", block.from_s}, {"to_s", block.to_s}, {"share", block.share}});
+  return json;
+}
+
+ordered_json JsonRivals(const std::vector<Rival>& rivals) {
+  ordered_json json = ordered_json::array();
+  for (const Rival& rival : rivals)
+    json.push_back({{"name", rival.use.effect}, {"on", rival.use.on}, {"behind", rival.behind}});
+  return json;
+}
+
+ordered_json JsonPolicy() {
   constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
   return {{"search.widenings", policy.search.widenings},
           {"search.beam", policy.search.beam},
@@ -177,59 +232,9 @@ ordered_json PolicyJson() {
           {"verdict.retuned", policy.verdict.retuned}};
 }
 
-// All parameters of what was found: a sentence has the first of each.
-std::string SizeTable(const Diagnosis& d) {
-  std::size_t width = 0;
-  for (const auto& found : d.effects) width = std::max(width, found.use.Text().size());
-  std::string text = fmt::format("\n{:<{}} {:<28} {:>11}   {}\n", "size of", width, "", "value", "95 % interval");
-  for (const auto& found : d.effects) {
-    std::string name = found.use.Text();
-    for (const auto& p : found.parameters) {
-      text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}{}\n", name, width, p.key, p.value, p.low, p.high,
-                          UnitAfter(p.unit));
-      if (!p.ratio.to.empty())
-        text += fmt::format("{:<{}} {:<28} {:>11.4g}   {:.4g} .. {:.4g}\n", "", width, "  over " + p.ratio.to,
-                            p.ratio.value, p.ratio.low, p.ratio.high);
-      name.clear();
-    }
-  }
-  return text;
-}
-
-std::string RemainderText(const Remainder& remainder) {
-  std::string text;
-  for (const Part& part : PartsOf(remainder))
-    text += fmt::format("{}{} {:.0f} %", text.empty() ? "" : ", ", part.name, 100 * part.share);
-  if (text.empty()) return "";
-  text = "- of the retuned model's squared misfit: " + text;
-  if (std::isfinite(remainder.reachable))
-    text += fmt::format("; a free-form torque would explain {:.0f} %", 100 * remainder.reachable);
-  return Wrap(text, 120, "  ") + "\n";
-}
-
-// What is there, what was considered and is not, and how many more.
-std::string StatementTable(const Diagnosis& d) {
-  std::string text = fmt::format("\n{:<34} {:<8} {:>11}  {}\n", "effect", "answer", "probability", "rests on");
-  std::size_t absent = 0, unseen = 0;
-  for (const auto& s : d.statements) {
-    const StatementNumbers& n = s.numbers;
-    if (n.gain == 0) {
-      ++(s.answer == Answer::kUnseen ? unseen : absent);
-      continue;
-    }
-    text += fmt::format("{:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", s.use.Text(),
-                        AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
-  }
-  text += fmt::format("{} more gain too little (--json: below which size they stay), {} cannot be seen in these logs\n",
-                      absent, unseen);
-  return text;
-}
-
-}  // namespace
-
 ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   const Diagnosis& d = run.diagnosis;
-  ordered_json json = {{"schema", "gapscope.diagnosis/1"},
+  ordered_json json = {{"schema", kDiagnosisSchema},
                        {"verdict", VerdictName(d.verdict)},
                        {"probability", d.probability},
                        {"effects", ordered_json::array()}};
@@ -260,12 +265,17 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   for (const auto& explanation : d.next_separates) separates.push_back(NameOf(explanation));
   json["next_experiment"] = {{"command", d.next_command}, {"separates", separates}};
   json["explanation"] = d.explanation;
+  if (d.refit_model) {
+    const Experiment& experiment = d.refit_model->experiment();
+    json["experiment"] = experiment.path;
+    if (!experiment.replay.while_column.empty()) json["while"] = experiment.replay.while_column;
+  }
   json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
   if (d.model) json["model"] = JsonModel(RunModelOf(*d.model, d.values));
   if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
   if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
   json["budget"] = {{"work", d.most_steps}, {"spent", d.work.steps}, {"unit", "steps"}, {"cut", d.cut}};
-  json["policy"] = PolicyJson();
+  json["policy"] = JsonPolicy();
   json["seed"] = run.info.seed;
   json["versions"] = JsonVersions(run.info);
   return json;
@@ -274,12 +284,12 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
 std::string ToTable(const DiagnoseRun& run) {
   const Diagnosis& d = run.diagnosis;
   std::string text = fmt::format("verdict: {} (probability {:.2f})\n", VerdictName(d.verdict), d.probability);
-  for (const Sentence& sentence : SentencesOf(d)) text += Wrap("- " + sentence.Text(), 120, "  ") + "\n";
+  for (const Sentence& sentence : SentencesOf(d)) text += Wrapped("- " + sentence.Text(), 120, "  ") + "\n";
   if (!d.effects.empty()) text += SizeTable(d);
   text += "\nheld-out error, a share of the signals' standard deviation\n";
-  for (const std::string& sentence : GapSentences(d)) text += Wrap("- " + sentence, 120, "  ") + "\n";
+  for (const std::string& sentence : GapSentences(d)) text += Wrapped("- " + sentence, 120, "  ") + "\n";
   text += RemainderText(d.remainder);
-  text += "\n" + Wrap(d.explanation, 120) + "\n";
+  text += "\n" + Wrapped(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);
   text += StatementTable(d);

@@ -16,6 +16,13 @@ struct DiagnoseRun {
   Diagnosis diagnosis;
 };
 
+inline constexpr const char* kDiagnosisSchema = "gapscope.diagnosis/1";
+
+// Every threshold, so that a result says by which rules it was made.
+nlohmann::ordered_json JsonPolicy();
+nlohmann::ordered_json JsonBlocks(const std::vector<BlockGain>& blocks);
+nlohmann::ordered_json JsonRivals(const std::vector<Rival>& rivals);
+
 nlohmann::ordered_json ToJson(const DiagnoseRun& run, Timing timing = Timing::kInclude);
 std::string ToTable(const DiagnoseRun& run);
 

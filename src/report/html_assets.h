@@ -1,4 +1,4 @@
-// The files of src/report/html/ and dygraphs, as src/report/embed.cmake puts them into the library.
+// The files of src/report/html/, dygraphs and the glossary, as src/report/embed.cmake puts them into the library.
 #ifndef GAPSCOPE_REPORT_HTML_ASSETS_H_
 #define GAPSCOPE_REPORT_HTML_ASSETS_H_
 
@@ -9,6 +9,7 @@ extern const char* const kStyle;
 extern const char* const kScript;
 extern const char* const kDygraphs;  // with its synchronizer; MIT licence
 extern const char* const kDygraphsStyle;
+extern const char* const kGlossary;  // docs/glossary.md
 
 }  // namespace gapscope::assets
 

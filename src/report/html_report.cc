@@ -12,6 +12,7 @@
 #include "src/compare/residual_torque.h"
 #include "src/core/digest.h"
 #include "src/core/file.h"
+#include "src/report/glossary.h"
 #include "src/report/html_assets.h"
 #include "src/report/json.h"
 
@@ -72,6 +73,24 @@ ordered_json Maps(const ReportSource& source, const Recording& recording) {
                     {"rows", map.rows}});
   }
   return maps;
+}
+
+ordered_json Curves(const std::vector<EffectCurves>& effects) {
+  ordered_json json = ordered_json::array();
+  for (const EffectCurves& effect : effects) {
+    for (const TorqueCurve& curve : effect.curves) {
+      const bool is_angle = curve.over == TorqueCurve::Over::kAngle;
+      json.push_back({{"title", effect.title},
+                      {"over", curve.joint + (is_angle ? " angle" : " speed")},
+                      {"unit", is_angle ? "rad" : "rad/s"},
+                      {"at", Numbers(curve.at)},
+                      {"missing", Numbers(curve.missing_n_m)},
+                      {"low", Numbers(curve.low_n_m)},
+                      {"high", Numbers(curve.high_n_m)},
+                      {"effect", Numbers(curve.effect_n_m)}});
+    }
+  }
+  return json;
 }
 
 ordered_json Responses(const Recording& recording, const LogReplay& replay) {
@@ -167,6 +186,7 @@ ordered_json HeadlineJson(const Headline& headline) {
                        {"sentences", headline.sentences},
                        {"stages", ordered_json::array()},
                        {"confidence", JsonNumber(headline.confidence)},
+                       {"confidence_in", headline.confidence_in},
                        {"explanation", headline.explanation},
                        {"notes", headline.notes}};
   for (const Stage& stage : headline.stages) {
@@ -249,6 +269,9 @@ void AddContent(const ReportSource& source, ordered_json* data) {
     if (!shares.empty()) json["where"].push_back({{"title", title}, {"shares", JsonConditions(shares)}});
   }
   AddFindings(content, data);
+  json["tables"] = ordered_json::array();
+  for (const PageContent::Table& t : content.tables)
+    json["tables"].push_back({{"title", t.title}, {"heads", t.heads}, {"rows", t.rows}, {"note", t.note}});
   json["parameters"] = Parameters(source);
   json["next"] = {{"text", content.next_text}, {"command", content.next_command}};
   json["map_of"] = content.mapped;
@@ -259,6 +282,9 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   data["experiment"] = FileStamp(source.experiment->path);
   data["model"] = FileStamp(source.experiment->model_path);
   AddContent(source, &data);
+  data["curves"] = Curves(source.curves);
+  data["glossary"] = ordered_json::array();
+  for (const Term& term : Glossary()) data["glossary"].push_back({{"word", term.word}, {"means", term.means}});
   data["logs"] = ordered_json::array();
   const std::size_t shown = std::min(kMostLogs, source.recordings.size());
   // Held-out logs first: they are what counts.

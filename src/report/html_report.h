@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "replay/replay.h"
+#include "src/compare/torque_curve.h"
 #include "src/report/page_content.h"
 
 namespace gapscope {
@@ -18,6 +19,12 @@ struct ReportPrediction {
   std::vector<LogReplay> logs;  // by recording; one without signals was not predicted
 };
 
+// What one effect does, beside what is missing without it.
+struct EffectCurves {
+  std::string title;  // "Coulomb friction on arm"
+  std::vector<TorqueCurve> curves;
+};
+
 // What a page shows beside the result.
 struct ReportSource {
   PageContent content;       // of the same result
@@ -26,6 +33,7 @@ struct ReportSource {
   std::vector<const Recording*> recordings;
   std::vector<bool> held_out;  // by recording; empty: none
   std::vector<ReportPrediction> predictions;
+  std::vector<EffectCurves> curves;
   // Its missing torque is mapped. Null: no map.
   const Model* model = nullptr;
   std::vector<double> values;

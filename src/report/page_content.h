@@ -31,7 +31,16 @@ struct PageContent {
     bool at_bound = false, identifiable = true;
   };
 
+  // Numbers of their own, drawn below the headline.
+  struct Table {
+    std::string title;
+    std::vector<std::string> heads;
+    std::vector<std::vector<std::string>> rows;  // a cell a head
+    std::string note;                            // what the heads mean; may be empty
+  };
+
   Headline headline;
+  std::vector<Table> tables;
   std::string mapped;  // whose missing torque is mapped: "model", "nominal model"
   std::vector<Conditions> where;
   std::vector<Sentence> findings;   // what is present, the largest share of the gap first

@@ -4,23 +4,14 @@
 #include <nlohmann/json.hpp>
 
 #include "src/core/file.h"
-#include "src/core/statistics.h"
+#include "src/report/read_json.h"
 
 namespace gapscope {
 namespace {
 
 using nlohmann::ordered_json;
 
-// Null stands for a number that does not exist.
-double Number(const ordered_json& json) { return json.is_null() ? kNaN : json.get<double>(); }
-double NumberAt(const ordered_json& json, const char* key) { return Number(json.at(key)); }
-
-RunModel ModelFrom(const ordered_json& json) {
-  RunModel model;
-  for (const auto& effect : json.at("effects")) model.effects.push_back({effect.at("name"), effect.at("on")});
-  for (const auto& [name, value] : json.at("values").items()) model.values.emplace_back(name, Number(value));
-  return model;
-}
+double NumberAt(const ordered_json& json, const char* key) { return NumberFrom(json.at(key)); }
 
 SignalScore ScoreFrom(const std::string& signal, const ordered_json& json) {
   return {.signal = signal,
@@ -58,7 +49,8 @@ void ReadKnowledge(const ordered_json& json, TuneRun* run) {
   }
   for (const auto& entry : json.at("flat")) {
     TuneRun::Flat flat{.direction = {}, .text = entry.at("text")};
-    for (const auto& [name, weight] : entry.at("direction").items()) flat.direction.emplace_back(name, Number(weight));
+    for (const auto& [name, weight] : entry.at("direction").items())
+      flat.direction.emplace_back(name, NumberFrom(weight));
     run->flat.push_back(std::move(flat));
   }
   for (const auto& entry : json.at("correlated")) {
@@ -87,7 +79,7 @@ TuneRun TuneRunFrom(const ordered_json& json) {
       .held_out_by = json.at("held_out_by"),
       .train = LogsFrom(json.at("train")),
       .held_out = LogsFrom(json.at("held_out")),
-      .model = ModelFrom(json.at("model")),
+      .model = RunModelFrom(json.at("model")),
       .time_step_s = NumberAt(json, "time_step_s"),
       .command_shift_s = NumberAt(json, "command_shift_s"),
   };
@@ -95,17 +87,14 @@ TuneRun TuneRunFrom(const ordered_json& json) {
   return run;
 }
 
-// `read` may throw what nlohmann does at a missing key or a wrong kind of value.
-template <class Read>
-auto Guarded(const Read& read, const std::string& where, const char* allowed) -> Result<decltype(read())> {
-  try {
-    return read();
-  } catch (const ordered_json::exception& e) {
-    return Error{.what = "not a result that can be read", .where = where, .actual = e.what(), .allowed = allowed};
-  }
-}
-
 }  // namespace
+
+RunModel RunModelFrom(const ordered_json& json) {
+  RunModel model;
+  for (const auto& effect : json.at("effects")) model.effects.push_back({effect.at("name"), effect.at("on")});
+  for (const auto& [name, value] : json.at("values").items()) model.values.emplace_back(name, NumberFrom(value));
+  return model;
+}
 
 Result<ordered_json> ReadJson(const std::string& path) {
   std::error_code failure;
@@ -121,12 +110,12 @@ Result<RunModel> ReadRunModel(const ordered_json& json, const std::string& where
   constexpr char kAllowed[] = "a result of gapscope replay, tune or diagnose";
   if (!json.is_object() || !json.contains("model"))
     return Error{.what = "not a result of a model: it has no 'model'", .where = where, .allowed = kAllowed};
-  return Guarded([&] { return ModelFrom(json.at("model")); }, where, kAllowed);
+  return ReadGuarded([&] { return RunModelFrom(json.at("model")); }, where, kAllowed);
 }
 
 Result<TuneRun> ReadTuneRun(const ordered_json& json, const std::string& where) {
   const auto read = [&] { return TuneRunFrom(json); };
-  return Guarded(read, where, "gapscope.tune/1");
+  return ReadGuarded(read, where, "gapscope.tune/1");
 }
 
 }  // namespace gapscope

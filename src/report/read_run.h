@@ -1,4 +1,5 @@
-// The one reader of our own results: a result.json, whoever wrote it, becomes the value it was written from.
+// Readers of our own results: a result.json, whoever wrote it, becomes the value it was written from (a diagnosis:
+// read_diagnosis.h).
 #ifndef GAPSCOPE_REPORT_READ_RUN_H_
 #define GAPSCOPE_REPORT_READ_RUN_H_
 

@@ -30,9 +30,10 @@ struct Headline {
   std::string title;                   // the result in a sentence
   std::vector<std::string> sentences;  // the numbers that it rests on
   std::vector<Stage> stages;           // in order
-  double confidence = kNaN;            // in the verdict, 0..1; NaN: it claims none
-  std::string explanation;             // a paragraph; may be empty
-  std::vector<std::string> notes;      // on the parameters, a line each
+  double confidence = kNaN;            // 0..1; NaN: it claims none
+  std::string confidence_in = "Confidence in this verdict";
+  std::string explanation;         // a paragraph; may be empty
+  std::vector<std::string> notes;  // on the parameters, a line each
 };
 Headline HeadlineOf(const ReplayRun& run);
 Headline HeadlineOf(const TuneRun& run);

@@ -18,6 +18,7 @@ Recording Slice(const Recording& recording, std::size_t begin, std::size_t end) 
   cut(part.time_s);
   const double shift = part.time_s.front();
   for (double& t : part.time_s) t -= shift;
+  part.start_s += shift;
   for (auto& command : part.commands) cut(command.values);
   for (auto& measured : part.measured) cut(measured.values);
   return part;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
+#include "src/diagnose/probability.h"
 
 namespace gapscope {
 namespace {

@@ -134,6 +134,26 @@ function zoom(how) {
   chart.updateOptions({dateWindow: how === "all" ? [first, last] : [from, from + width]});
 }
 
+// Torque over a joint's angle and speed: what an effect adds, and what is missing without it.
+function drawCurves(curves) {
+  const parent = document.getElementById("curves");
+  parent.replaceChildren();
+  if (!curves.length) return;
+  show("why");
+  for (const curve of curves) {
+    const keys = [
+      {label: "missing", color: color("--measured"), width: 2.6},
+      {label: "what it adds", color: color("--model-1")},
+    ];
+    const box = chartBox(parent, `${curve.title}: torque over ${curve.over}`, "N m", keys, 160);
+    const rows = curve.at.map((x, i) => {
+      const missing = [curve.low[i], curve.missing[i], curve.high[i]];
+      return [x, missing, [curve.effect[i], curve.effect[i], curve.effect[i]]];
+    });
+    drawChart(box, rows, keys, {xName: curve.over, xUnit: ` ${curve.unit}`, dygraph: {customBars: true}});
+  }
+}
+
 function drawResponses(log) {
   const parent = document.getElementById("responses");
   parent.replaceChildren();

@@ -17,6 +17,7 @@ function drawLog() {
   if (!log?.traces) return;
   drawTraces(log);
   drawResponses(log);
+  drawCurves(data.curves);
   const maps = document.getElementById("maps");
   maps.replaceChildren();
   const figures = (log.maps ?? []).map(drawMap).filter(Boolean);
@@ -59,9 +60,11 @@ function choosers() {
 function contents() {
   const titles = {
     verdict: "Result",
+    tables: "Evidence",
     video: "Video",
     traces: "Traces",
     where: "Where",
+    why: "Why",
     statements: "Effects",
     parameters: "Parameters",
     response: "Frequency",
@@ -80,6 +83,7 @@ document.getElementById("subject").textContent = data.subject;
 writeVerdict(data.headline);
 writeFindings(data.findings, data.gap);
 writeRemainder(data.remainder, data.reachable);
+writeTables(data.tables);
 const video = document.getElementById("video");
 if (video.dataset.video) {
   document.getElementById("player").src = video.dataset.video;
@@ -94,4 +98,5 @@ writeParameters(data.parameters, data.headline.notes);
 writeNext(data.next);
 writeQuality(data.logs);
 writeProvenance(data);
+writeWords(data.glossary);
 contents();

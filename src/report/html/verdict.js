@@ -33,7 +33,7 @@ function writeVerdict(headline) {
         element(
           "div",
           {class: "meter"},
-          element("span", {}, "Confidence in this verdict"),
+          element("span", {}, headline.confidence_in),
           element(
             "div",
             {class: "bar", "aria-hidden": "true"},

@@ -1,4 +1,4 @@
-#include "src/report/run.h"
+#include "src/model/run_model.h"
 
 namespace gapscope {
 

@@ -1,0 +1,23 @@
+// A model by names: what a result says of it, and what it takes to build it again.
+#ifndef GAPSCOPE_MODEL_RUN_MODEL_H_
+#define GAPSCOPE_MODEL_RUN_MODEL_H_
+
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "src/model/model.h"
+
+namespace gapscope {
+
+// Values are of all its parameters, SI, in the model's order.
+struct RunModel {
+  std::vector<EffectUse> effects;
+  std::vector<std::pair<std::string, double>> values;
+};
+RunModel RunModelOf(const Model& model, std::span<const double> values);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_MODEL_RUN_MODEL_H_

@@ -25,7 +25,7 @@ namespace {
 struct DiagnoseFlags {
   CommonFlags common;
   ModelFlags model;
-  std::vector<std::string> hold_out, prior, accept;
+  std::vector<std::string> hold_out, prior, accept, freeze;
   std::string from;
   SearchEffort effort = SearchEffort::kNormal;
   double budget_s = 0, window_s = 0;
@@ -33,10 +33,10 @@ struct DiagnoseFlags {
 };
 
 // What each effect of the final model does along a log, beside what is missing without it.
-Result<std::vector<EffectCurves>> CurvesOf(const Diagnosis& diagnosis, const Recording& recording,
-                                           const ScaleTable& scales) {
+Result<std::vector<EffectCurve>> CurvesOf(const Diagnosis& diagnosis, const Recording& recording,
+                                          const ScaleTable& scales) {
   constexpr std::size_t kBins = 40;
-  std::vector<EffectCurves> all;
+  std::vector<EffectCurve> all;
   const Model& model = *diagnosis.model;
   const auto with = EstimateResidualTorque(model, diagnosis.values, recording);
   for (const FoundEffect& found : diagnosis.effects) {
@@ -46,7 +46,8 @@ Result<std::vector<EffectCurves>> CurvesOf(const Diagnosis& diagnosis, const Rec
     const auto values = Collect(without->parameters(), [&](const Parameter& p) {
       return diagnosis.values[static_cast<std::size_t>(model.IndexOf(p.name))];
     });
-    all.push_back({Words(found.use), CompareTorques(EstimateResidualTorque(*without, values, recording), with, kBins)});
+    auto curve = CompareTorques(EstimateResidualTorque(*without, values, recording), with, kBins);
+    if (curve) all.push_back({Words(found.use), *std::move(curve)});
   }
   return all;
 }
@@ -147,12 +148,16 @@ Status AddKnown(const DiagnoseFlags& flags, const Experiment& experiment, const 
   GS_ASSIGN(Known known, AcceptEarlier(flags));
   const ModelFlags& model = flags.model;
   known.with.insert(known.with.end(), model.with.begin(), model.with.end());
-  if (known.with.empty() && model.set.empty() && model.params.empty()) return Ok();
+  if (known.with.empty() && model.set.empty() && model.params.empty() && flags.freeze.empty()) return Ok();
   GS_ASSIGN(const auto bare, Model::Load(experiment));
   GS_ASSIGN(options->known, ParseEffects(known.with, *bare->rig()));
   GS_ASSIGN(const auto base, Model::Build(bare->rig(), options->known, EstimateScales(*bare, data.train)));
   std::vector<double> given(base->parameters().size(), kNaN);
   GS_RETURN_IF_ERROR(OverrideValues(*base, model.params, model.set, &given));
+  for (const auto& name : flags.freeze) {
+    GS_ASSIGN(const int index, base->Find(name, "--freeze"));
+    options->frozen.insert(base->parameters()[static_cast<std::size_t>(index)].name);
+  }
   options->values = std::move(known.values);
   for (std::size_t i = 0; i < given.size(); ++i) {
     if (std::isfinite(given[i])) options->values[base->parameters()[i].name] = given[i];
@@ -229,6 +234,12 @@ Command DiagnoseCommand() {
        .value = &flags->accept,
        .unset = "all effects of its final model",
        .help = "A statement of --from, by number or EFFECT@PLACE, more than once"},
+      {.flag = "--freeze",
+       .value = &flags->freeze,
+       .help = "Hold a parameter at its value, more than once",
+       .more =
+           "Of the base model, or of a known effect (--with, --from): what is measured better than logs can tell is "
+           "not fitted"},
       {.flag = "--budget",
        .value = &flags->budget_s,
        .unit = "s",

@@ -82,8 +82,9 @@ Command ExplainCommand() {
   return {.name = "explain",
           .what = "The evidence of one statement of a diagnosis in full: numbers, rivals, where it shows",
           .options = Join({own,
-                           {FolderOption(flags->common, "result.json and report.html, which draws the held-out windows "
-                                                        "with the effect and without it")},
+                           {FolderOption(flags->common,
+                                         "result.json and report.html, which draws the held-out windows "
+                                         "with the effect and without it")},
                            CommonOptions(flags->common)}),
           .example = "gapscope explain diagnosis coulomb_friction@arm --out why",
           .run = [flags] { return RunExplain(*flags); }};

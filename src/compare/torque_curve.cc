@@ -50,8 +50,8 @@ TorqueCurve CurveOver(TorqueCurve::Over over, const ResidualTorque& missing, con
 
 }  // namespace
 
-std::vector<TorqueCurve> CompareTorques(const std::vector<ResidualTorque>& without,
-                                        const std::vector<ResidualTorque>& with, std::size_t bins) {
+std::optional<TorqueCurve> CompareTorques(const std::vector<ResidualTorque>& without,
+                                          const std::vector<ResidualTorque>& with, std::size_t bins) {
   if (without.size() != with.size()) return {};
   const ResidualTorque* missing = nullptr;
   std::vector<double> effect;
@@ -63,8 +63,9 @@ std::vector<TorqueCurve> CompareTorques(const std::vector<ResidualTorque>& witho
     if (share > most) most = share, missing = &without[j], effect = std::move(adds);
   }
   if (!missing) return {};
-  return {CurveOver(TorqueCurve::Over::kAngle, *missing, effect, bins),
-          CurveOver(TorqueCurve::Over::kSpeed, *missing, effect, bins)};
+  TorqueCurve angle = CurveOver(TorqueCurve::Over::kAngle, *missing, effect, bins),
+              speed = CurveOver(TorqueCurve::Over::kSpeed, *missing, effect, bins);
+  return MomentsOf(angle.effect_n_m).deviation > MomentsOf(speed.effect_n_m).deviation ? angle : speed;
 }
 
 }  // namespace gapscope

@@ -45,8 +45,14 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
   // Two bodies on a stiff link ask for a finer step.
   if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
-  if (train) options.free = model.FreeParameters();
+  if (train) options.free = FreeParameters(model);
   return options;
+}
+
+std::vector<int> Workbench::FreeParameters(const Model& model) const {
+  std::vector<int> free = model.FreeParameters();
+  std::erase_if(free, [&](int i) { return frozen.contains(model.parameters()[static_cast<std::size_t>(i)].name); });
+  return free;
 }
 
 std::vector<double> Workbench::Nominal(const Model& model) const {

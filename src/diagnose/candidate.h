@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,7 @@ struct Workbench {
   std::map<std::string, double> priors;                   // DiagnoseOptions::priors
   std::vector<EffectUse> known;                           // in every model
   std::map<std::string, double> values;                   // DiagnoseOptions::values
+  std::set<std::string> frozen;                           // DiagnoseOptions::frozen
   // Of base parameters, where they were widened.
   std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
@@ -73,6 +75,8 @@ struct Workbench {
   DiagnosisJournal* journal = nullptr;  // null: none
 
   FitOptions Options(const Model& model, bool train) const;
+  // What fits move: indices of parameters.
+  std::vector<int> FreeParameters(const Model& model) const;
   // Where fits start: nominal values, and those that are known better; known effects where an effect's trial starts.
   std::vector<double> Nominal(const Model& model) const;
   // `share` of the work is spent, or the time where one was asked for.

@@ -63,9 +63,9 @@ std::vector<ConditionShare> Locate(const std::vector<LogReplay>& predicted, cons
 }
 
 // Base parameters that ended on a bound.
-std::vector<AtBound> FindAtBounds(const Candidate& candidate, const Model& base) {
+std::vector<AtBound> FindAtBounds(const Workbench& bench, const Candidate& candidate, const Model& base) {
   std::vector<AtBound> found;
-  for (const int i : base.FreeParameters()) {
+  for (const int i : bench.FreeParameters(base)) {
     const Parameter& p = base.parameters()[static_cast<std::size_t>(i)];
     const double value = candidate.values[static_cast<std::size_t>(candidate.model->IndexOf(p.name))];
     const OnBound bound = BoundOf(value, p.low, p.high);
@@ -234,7 +234,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   result.statements = judgement.statements;
   const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
-  result.at_bounds = FindAtBounds(chosen, *base.model);
+  result.at_bounds = FindAtBounds(bench, chosen, *base.model);
   SuggestNext(found, judgement, bench.rig->experiment().path, &result);
   result.where = Locate(PredictHeldOut(bench, base), bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(predicted, bench.data.held_out, seed);

@@ -135,6 +135,7 @@ Result<std::uint64_t> JobKey(const Model& model, const DataSplit& data, const Di
   for (const auto& [name, prior] : options.priors) hasher.Text(name).Number(prior);
   for (const EffectUse& use : options.known) hasher.Text(use.Text());
   for (const auto& [name, value] : options.values) hasher.Text(name).Number(value);
+  for (const std::string& name : options.frozen) hasher.Text("frozen").Text(name);
   return hasher.value();
 }
 
@@ -174,6 +175,14 @@ void ChooseFitted(const Model& model, std::size_t steps, bool by_windows, Workbe
       std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
 }
 
+double FinestStep(const DataSplit& data) {
+  double step_s = kInfinity;
+  for (const auto* logs : {&data.train, &data.held_out}) {
+    for (const auto& recording : *logs) step_s = std::min(step_s, recording.timeline.median_step_s);
+  }
+  return step_s;
+}
+
 // Steps of one replay of the training windows.
 std::size_t StepsOfReplay(const Workbench& bench) {
   auto made = MakeCandidate(bench, {});
@@ -206,11 +215,9 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .window_s = options.window_s,
                     .priors = options.priors,
                     .known = options.known,
-                    .values = options.values};
-    bench.sample_s = kInfinity;
-    for (const auto* logs : {&fine.train, &fine.held_out}) {
-      for (const auto& recording : *logs) bench.sample_s = std::min(bench.sample_s, recording.timeline.median_step_s);
-    }
+                    .values = options.values,
+                    .frozen = options.frozen};
+    bench.sample_s = FinestStep(fine);
     for (std::size_t i = 0; i < noise.size(); ++i)
       bench.weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
     bench.time_step_s =

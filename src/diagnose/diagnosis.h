@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -187,6 +188,7 @@ struct DiagnoseOptions {
   // What the base model has beside the experiment's own: effects, and values to start from by the parameters' names.
   std::vector<EffectUse> known;
   std::map<std::string, double> values;
+  std::set<std::string> frozen;  // names of parameters that are held at their value
   std::function<void(const std::string&)> progress;
   // Folder of a DiagnosisJournal, empty: none; whether the run recorded there goes on. It stays when the run has ended:
   // what it led to is to be written first (DiagnosisJournal::Remove).

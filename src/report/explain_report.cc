@@ -36,8 +36,9 @@ std::string TitleOf(const Statement& s) {
 Table EvidenceTable(const Statement& s) {
   Table table{.title = "What the probability is made of",
               .heads = {"number", "its value", "counted as", "weight", "adds"},
-              .note = "The sum is the logarithm of the odds at even prior odds. A positive number counts by its "
-                      "logarithm where it says \"evidence\"; none counts beyond where it says nothing more."};
+              .note =
+                  "The sum is the logarithm of the odds at even prior odds. A positive number counts by its "
+                  "logarithm where it says \"evidence\"; none counts beyond where it says nothing more."};
   double sum = 0;
   for (const EvidenceTerm& term : EvidenceTermsOf(s.numbers)) {
     table.rows.push_back({term.name, ShortNumber(term.value, 3), ShortNumber(term.counted, 3),
@@ -58,8 +59,9 @@ Table GainTable(const Statement& s) {
           .heads = {"on", "gain", "the squared error without it"},
           .rows = {row("fitted logs", s.numbers.gain), row("logs held out, in windows", s.numbers.gain_held_out),
                    row("logs held out, in free runs", s.numbers.gain_free)},
-          .note = "Both models are refitted. A gain is the logarithm of the ratio; squared errors count as at least "
-                  "the sensors' noise."};
+          .note =
+              "Both models are refitted. A gain is the logarithm of the ratio; squared errors count as at least "
+              "the sensors' noise."};
 }
 
 Table BlockTable(const Statement& s) {

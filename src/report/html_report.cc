@@ -75,20 +75,18 @@ ordered_json Maps(const ReportSource& source, const Recording& recording) {
   return maps;
 }
 
-ordered_json Curves(const std::vector<EffectCurves>& effects) {
+ordered_json Curves(const std::vector<EffectCurve>& curves) {
   ordered_json json = ordered_json::array();
-  for (const EffectCurves& effect : effects) {
-    for (const TorqueCurve& curve : effect.curves) {
-      const bool is_angle = curve.over == TorqueCurve::Over::kAngle;
-      json.push_back({{"title", effect.title},
-                      {"over", curve.joint + (is_angle ? " angle" : " speed")},
-                      {"unit", is_angle ? "rad" : "rad/s"},
-                      {"at", Numbers(curve.at)},
-                      {"missing", Numbers(curve.missing_n_m)},
-                      {"low", Numbers(curve.low_n_m)},
-                      {"high", Numbers(curve.high_n_m)},
-                      {"effect", Numbers(curve.effect_n_m)}});
-    }
+  for (const auto& [title, curve] : curves) {
+    const bool is_angle = curve.over == TorqueCurve::Over::kAngle;
+    json.push_back({{"title", title},
+                    {"over", curve.joint + (is_angle ? " angle" : " speed")},
+                    {"unit", is_angle ? "rad" : "rad/s"},
+                    {"at", Numbers(curve.at)},
+                    {"missing", Numbers(curve.missing_n_m)},
+                    {"low", Numbers(curve.low_n_m)},
+                    {"high", Numbers(curve.high_n_m)},
+                    {"effect", Numbers(curve.effect_n_m)}});
   }
   return json;
 }

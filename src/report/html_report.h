@@ -20,9 +20,9 @@ struct ReportPrediction {
 };
 
 // What one effect does, beside what is missing without it.
-struct EffectCurves {
+struct EffectCurve {
   std::string title;  // "Coulomb friction on arm"
-  std::vector<TorqueCurve> curves;
+  TorqueCurve curve;
 };
 
 // What a page shows beside the result.
@@ -33,7 +33,7 @@ struct ReportSource {
   std::vector<const Recording*> recordings;
   std::vector<bool> held_out;  // by recording; empty: none
   std::vector<ReportPrediction> predictions;
-  std::vector<EffectCurves> curves;
+  std::vector<EffectCurve> curves;
   // Its missing torque is mapped. Null: no map.
   const Model* model = nullptr;
   std::vector<double> values;

@@ -1,5 +1,5 @@
-// Parts of our own results, read back: what read_run.cc and read_diagnosis.cc share. All may throw what nlohmann does at
-// a missing key or a wrong kind of value: ReadGuarded turns that into an error.
+// Parts of our own results, read back: what read_run.cc and read_diagnosis.cc share. All may throw what nlohmann does
+// at a missing key or a wrong kind of value: ReadGuarded turns that into an error.
 #ifndef GAPSCOPE_REPORT_READ_JSON_H_
 #define GAPSCOPE_REPORT_READ_JSON_H_
 

@@ -24,9 +24,7 @@ class GoOnTest : public ::testing::Test {
     scratch_ = nullptr;
   }
   static std::string Folder() { return scratch_->Path("found"); }
-  static Answer Run(const std::string& arguments) {
-    return scratch_->Shell("'" GAPSCOPE_PROGRAM "' " + arguments);
-  }
+  static Answer Run(const std::string& arguments) { return scratch_->Shell("'" GAPSCOPE_PROGRAM "' " + arguments); }
   static nlohmann::json Found() { return nlohmann::json::parse(ReadAll(Folder() + "/result.json")); }
   void SetUp() override { ASSERT_EQ(found_.status, 0) << found_.err; }
   static void ExpectRefused(const std::string& arguments, const std::vector<std::string>& says) {
@@ -68,12 +66,15 @@ TEST_F(GoOnTest, AStatementIsDrawnWithItsEffectAndWithoutIt) {
 }
 
 TEST_F(GoOnTest, WhatIsAcceptedBecomesKnown) {
+  const std::string stiffness = "cable_spring@arm.stiffness_n_m_per_rad";
   const Answer answer = Run("diagnose " + kQube + " " + kLog + " --effort quick --quiet --json --from '" + Folder() +
-                            "' --accept cable_spring@arm");
+                            "' --accept cable_spring@arm --freeze " + stiffness);
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto result = nlohmann::json::parse(answer.out);
-  for (const auto& statement : result["statements"]) EXPECT_FALSE(statement["name"] == "cable_spring" && statement["on"] == "arm");
+  for (const auto& statement : result["statements"])
+    EXPECT_FALSE(statement["name"] == "cable_spring" && statement["on"] == "arm");
   EXPECT_EQ(result["refit_model"]["effects"], nlohmann::json::parse(R"([{"name": "cable_spring", "on": "arm"}])"));
+  EXPECT_EQ(result["model"]["values"][stiffness], Found()["model"]["values"][stiffness]);
   EXPECT_EQ(result["statements"][0]["name"], "coulomb_friction");
   EXPECT_EQ(result["statements"][0]["answer"], "present");
 }
@@ -84,6 +85,7 @@ TEST_F(GoOnTest, WhatDoesNotGoTogetherIsRefused) {
   ExpectRefused("explain '" + Folder() + "/nowhere' 1", {"nowhere"});
   const std::string diagnose = "diagnose " + kQube + " " + kLog + " --quiet --from '" + Folder() + "' ";
   ExpectRefused(diagnose + "--accept backlash@arm", {"--accept", "no size was found"});
+  ExpectRefused(diagnose + "--freeze arm.dampin", {"--freeze", "did you mean 'arm.damping'?"});
   ExpectRefused(diagnose + "--with cable_spring@arm", {"cable_spring@arm", "twice"});
   ExpectRefused("diagnose " + kQube + " " + kLog + " --accept 1", {"--accept", "nothing to accept from", "--from"});
   const std::string copy = scratch_->Write("copy.csv", ReadAll(kSource + "/demo/qube.csv"));

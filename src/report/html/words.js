@@ -4,7 +4,8 @@
 const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 
 // Text that people read: no code, no controls, nothing that is drawn.
-const isProse = (node) => !node.parentElement.closest("code, pre, abbr, select, button, svg, .plot, .brand, h1, dl");
+const notProse = "code, pre, abbr, select, button, svg, .plot, .brand, label, h1, h2, h3, dl";
+const isProse = (node) => !node.parentElement.closest(notProse);
 
 function markWords(section, pattern, meanings) {
   const seen = new Set(), texts = [];

@@ -189,6 +189,7 @@ def main():
                         "effects": "The model lacks cable spring on arm and Coulomb friction on arm.",
                         "ambiguous": "lacks cable spring or gravity offset on arm and Coulomb friction on arm. "
                                      "These logs cannot tell which",
+                        "explained": "Cable spring on arm is present.",
                         "unknown": "and something that no known effect explains"}
             for name, verdict in verdicts.items():
                 for width in (390, 1440):
@@ -203,6 +204,15 @@ def main():
                 check(part in text, f"the diagnosis does not say '{part}'")
             check(driver.execute_script("return document.querySelectorAll('.map canvas').length") == 2,
                   "two maps of the missing torque")
+            curves = driver.find_elements(By.CSS_SELECTOR, "#curves .plot")
+            check(len(curves) == 1 and "torque over arm angle" in text, "the curve of the effect that has one")
+            marked = driver.find_elements(By.CSS_SELECTOR, "#statements abbr")
+            words = {e.text: e.get_attribute("title") for e in marked}
+            check("before the logs were seen" in words.get("prior", ""), f"the glossary on hover, got {words}")
+            open_page(driver, Path(folder) / "explained.html", 1440, 900)
+            cells = driver.find_element(By.ID, "tables").text
+            for part in ["largest gain", "says nothing", "80.0 %", "gravity offset on arm", "it explains less"]:
+                check(part in cells, f"the evidence does not say '{part}'")
             open_page(driver, Path(folder) / "long.html", 1440, 900)
             opened = driver.execute_script("const t = performance.getEntriesByType('navigation')[0]; "
                                            "return t.loadEventEnd;")

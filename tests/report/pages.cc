@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "src/compare/comparison.h"
+#include "src/core/statistics.h"
+#include "src/report/explain_report.h"
 #include "src/report/replay_report.h"
 
 namespace gapscope::testing {
@@ -117,6 +119,27 @@ std::unique_ptr<Page> DiagnosisPage(Verdict verdict) {
   run.diagnosis.values[page->model->IndexOf("cable_spring@arm.stiffness_n_m_per_rad")] = 0.0012;
   page->source.predictions = {{"nominal", Replayed(*page, page->source.values).logs},
                               {"diagnosed", Replayed(*page, run.diagnosis.values).logs}};
+  page->source.curves = {{"cable spring on arm",
+                          {.joint = "arm",
+                           .at = {-0.5, 0, 0.5},
+                           .missing_n_m = {0.0006, 0.0001, -0.0005},
+                           .low_n_m = {0.0004, -0.0001, -0.0008},
+                           .high_n_m = {0.0008, 0.0002, -0.0003},
+                           .effect_n_m = {0.0006, 0, -0.0006}}}};
+  page->result = ToJson(run);
+  page->source.content = PageOf(run);
+  return page;
+}
+
+std::unique_ptr<Page> ExplanationPage() {
+  auto page = BarePage();
+  ExplainRun run{
+      .diagnosis = "out", .number = 1, .statement = MadeDiagnosis(Verdict::kEffects).diagnosis.statements[0]};
+  run.statement.numbers = {.gain = 1.5, .gain_held_out = 0.7, .gain_free = kNaN, .discrepancy = 30, .clear = 4};
+  run.statement.sets = std::make_shared<const ComparedSets>(
+      ComparedSets{.with = {}, .without = {}, .blocks = {{"logs/a.csv", 1, 1.5, 0.8}, {"logs/a.csv", 0, 0.5, 0.2}}});
+  run.statement.rivals = {{kGravity, 0.6}};
+  page->source.predictions = {{"without it", Replayed(*page, page->source.values).logs}};
   page->result = ToJson(run);
   page->source.content = PageOf(run);
   return page;

@@ -1,5 +1,5 @@
-// Reports to look at: a replay of the demo log, a long log, and diagnoses made up to have everything a diagnosis can
-// have, one for each verdict.
+// Reports to look at: a replay of the demo log, a long log, a statement explained, and diagnoses made up to have
+// everything a diagnosis can have, one for each verdict.
 #ifndef GAPSCOPE_TESTS_REPORT_PAGES_H_
 #define GAPSCOPE_TESTS_REPORT_PAGES_H_
 
@@ -30,6 +30,8 @@ DiagnoseRun MadeDiagnosis(Verdict verdict);
 std::unique_ptr<Page> ReplayPage();
 // The same, and replayed by a model with a cable spring, under MadeDiagnosis.
 std::unique_ptr<Page> DiagnosisPage(Verdict verdict);
+// Why the first of those effects is believed.
+std::unique_ptr<Page> ExplanationPage();
 // One signal of `rows` rows with a spike of one row at `spike`.
 std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike);
 

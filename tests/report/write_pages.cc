@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   for (const Verdict verdict :
        {Verdict::kNone, Verdict::kParameters, Verdict::kEffects, Verdict::kAmbiguous, Verdict::kUnknown})
     write(VerdictName(verdict), *testing::DiagnosisPage(verdict));
+  write("explained", *testing::ExplanationPage());
   write("long", *testing::LongPage(1000000, 654321));
   return good ? 0 : 1;
 }

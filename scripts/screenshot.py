@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""screenshot.py PAGE.html OUT.png: the first screens of a page from disk, 1280 wide, in headless Chromium."""
+"""screenshot.py PAGE.html OUT.png [FIRST LAST]: of a page from disk, 1280 wide, in headless Chromium: its first
+screens, or what stands from one element to another (CSS selectors)."""
+import base64
 import pathlib
 import shutil
 import sys
@@ -10,9 +12,30 @@ from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 
-WIDTH, HEIGHT = 1280, 1500
+WIDTH, HEIGHT, MARGIN = 1280, 1500, 6
+# Where the first element begins and the last one ends on the page; nothing that stays in view may cover them.
+BOX = """
+document.querySelectorAll("header, nav").forEach((bar) => { bar.style.position = "static"; });
+const [first, last] = [...arguments].map((selector) => {
+  const part = document.querySelector(selector);
+  if (!part || !part.checkVisibility()) throw new Error(`nothing to see of ${selector}`);
+  return part.getBoundingClientRect();
+});
+return [first.top + scrollY, last.bottom + scrollY];
+"""
 
-page, out = sys.argv[1:]
+
+def save(driver, out, parts):
+    if not parts:
+        driver.save_screenshot(out)
+        return
+    top, bottom = driver.execute_script(BOX, *parts)
+    clip = {"x": 0, "y": top - MARGIN, "width": WIDTH, "height": bottom - top + 2 * MARGIN, "scale": 1}
+    shot = driver.execute_cdp_cmd("Page.captureScreenshot", {"clip": clip, "captureBeyondViewport": True})
+    pathlib.Path(out).write_bytes(base64.b64decode(shot["data"]))
+
+
+page, out, *parts = sys.argv[1:]
 with tempfile.TemporaryDirectory() as profile:
     options = Options()
     options.binary_location = shutil.which("chromium")
@@ -24,5 +47,5 @@ with tempfile.TemporaryDirectory() as profile:
                            {"width": WIDTH, "height": HEIGHT, "deviceScaleFactor": 1, "mobile": False})
     driver.get(pathlib.Path(page).resolve().as_uri())
     time.sleep(0.5)  # fonts and charts
-    driver.save_screenshot(out)
+    save(driver, out, parts)
     driver.quit()

@@ -1,4 +1,4 @@
-"""Scores verdicts of `gapscope diagnose` against sealed labels: the table of targets of docs/diagnosis.md, baselines,
+"""Scores verdicts of `gapscope diagnose` against sealed labels: the targets of docs/results_diagnose.md, baselines,
 confusions."""
 import json, math, random
 from collections import Counter

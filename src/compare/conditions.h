@@ -1,6 +1,6 @@
 // Where the gap lies: how much of a signal's squared error falls in each condition (speed, direction, |command|, time
 // since the last reversal, angle, part of the log, frequency band), against how much of the time. Coulomb friction
-// shows near zero speed, a torque-speed curve at high speed, a delay at high frequency (diagnosis.md, Method 2).
+// shows near zero speed, a torque-speed curve at high speed, a delay at high frequency.
 #ifndef GAPSCOPE_COMPARE_CONDITIONS_H_
 #define GAPSCOPE_COMPARE_CONDITIONS_H_
 

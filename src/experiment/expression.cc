@@ -5,18 +5,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "src/core/names.h"
 #include "src/core/statistics.h"
 #include "src/log/text.h"
+#include "src/plugins/common/parser.h"
 
 namespace gapscope {
 namespace {
-
-constexpr std::size_t kMaxLength = 4096;
-constexpr const char* kNameChars = "0123456789_abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.@";
 
 std::optional<double> AsNumber(const std::string& text) {
   double value = 0;
@@ -25,18 +22,7 @@ std::optional<double> AsNumber(const std::string& text) {
   return value;
 }
 
-// muParser assigns to variables with '=', '+=' ...: not here.
-bool Assigns(const std::string& text) {
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] != '=') continue;
-    if (i + 1 < text.size() && text[i + 1] == '=') {
-      ++i;
-      continue;
-    }
-    if (i == 0 || (text[i - 1] != '<' && text[i - 1] != '>' && text[i - 1] != '!')) return true;
-  }
-  return false;
-}
+bool IsOfName(char c) { return std::string_view(plugins::kNameChars).find(c) != std::string_view::npos; }
 
 }  // namespace
 
@@ -65,21 +51,20 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
     impl->variable = variables + (found - names.begin());
     return Expression(std::move(impl));
   }
-  if (text.size() > kMaxLength || std::count(text.begin(), text.end(), '(') > 64) {
-    return Error{
-        .what = "the expression is too long", .where = where, .allowed = std::to_string(kMaxLength) + " characters"};
+  if (plugins::IsTooLong(text)) {
+    return Error{.what = "the expression is too long",
+                 .where = where,
+                 .allowed = std::to_string(plugins::kLongestExpression) + " characters"};
   }
-  if (Assigns(text)) {
+  if (plugins::Assigns(text)) {
     return Error{.what = "bad expression " + Quoted(text) + ": it assigns",
                  .where = where,
                  .cure = "compare with '==', or delete the '='"};
   }
   impl->parser = std::make_unique<mu::Parser>();
   try {
-    impl->parser->DefineNameChars(kNameChars);
-    impl->parser->DefineConst("pi", std::numbers::pi);
+    plugins::SetText(impl->parser.get(), text);
     for (std::size_t i = 0; i < names.size(); ++i) impl->parser->DefineVar(names[i], variables + i);
-    impl->parser->SetExpr(text);
     impl->parser->Eval();
     if (impl->parser->GetNumResults() != 1)
       return Error{.what = "bad expression " + Quoted(text) + ": several values", .where = where, .allowed = "one"};
@@ -103,13 +88,25 @@ double Expression::Evaluate() const {
 }
 
 bool Mentions(const std::string& expression, const std::string& name) {
-  const auto of_name = [](char c) { return std::string_view(kNameChars).find(c) != std::string_view::npos; };
   for (std::size_t at = expression.find(name); at != std::string::npos; at = expression.find(name, at + 1)) {
     const std::size_t end = at + name.size();
-    if ((at == 0 || !of_name(expression[at - 1])) && (end == expression.size() || !of_name(expression[end])))
+    if ((at == 0 || !IsOfName(expression[at - 1])) && (end == expression.size() || !IsOfName(expression[end])))
       return true;
   }
   return false;
+}
+
+std::string WithNames(const std::string& expression, const std::map<std::string, std::string>& names) {
+  std::string text;
+  for (std::size_t at = 0; at < expression.size();) {
+    std::size_t end = at;
+    while (end < expression.size() && IsOfName(expression[end])) ++end;
+    const std::string word = expression.substr(at, std::max<std::size_t>(1, end - at));
+    const auto found = names.find(word);
+    text += found == names.end() ? word : found->second;
+    at += word.size();
+  }
+  return text;
 }
 
 Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values,

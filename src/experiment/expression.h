@@ -34,6 +34,8 @@ class Expression {
 
 // Whether the expression reads the variable of that name.
 bool Mentions(const std::string& expression, const std::string& name);
+// The expression with other names in the places of its own: `names` maps old to new.
+std::string WithNames(const std::string& expression, const std::map<std::string, std::string>& names);
 // The value of an expression of `values`. Errors as Parse, and a result that is not finite.
 Result<double> EvaluateOnce(const std::string& text, const std::map<std::string, double>& values,
                             const std::string& where);

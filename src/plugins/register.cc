@@ -6,6 +6,7 @@ void RegisterMotor();
 void RegisterFriction();
 void RegisterSpring();
 void RegisterEncoder();
+void RegisterExpression();
 }  // namespace gapscope::plugins
 
 mjPLUGIN_LIB_INIT(gapscope) {
@@ -13,4 +14,5 @@ mjPLUGIN_LIB_INIT(gapscope) {
   gapscope::plugins::RegisterFriction();
   gapscope::plugins::RegisterSpring();
   gapscope::plugins::RegisterEncoder();
+  gapscope::plugins::RegisterExpression();
 }

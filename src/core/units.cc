@@ -1,5 +1,6 @@
 #include "src/core/units.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -45,6 +46,25 @@ Result<Unit> ParseUnit(std::string_view text) {
   Error error = NoSuch("unknown unit", std::string(text), names, "");
   error.allowed += ", counts/<per revolution>";
   return error;
+}
+
+Status CheckSiUnit(std::string_view text) {
+  static const std::vector<std::string> kSymbols = {"1", "rad", "s", "m", "kg", "N", "V", "A", "W", "ohm", "degC"};
+  std::size_t at = 0;
+  do {
+    const std::size_t end = std::min(text.find_first_of(" /", at), text.size());
+    std::string symbol(text.substr(at, end - at));
+    at = end + 1;
+    if (const auto power = symbol.find_last_not_of("0123456789^-"); power != std::string::npos)
+      symbol.resize(power + 1);
+    if (std::find(kSymbols.begin(), kSymbols.end(), symbol) != kSymbols.end()) continue;
+    Error error = NoSuch("unknown unit", std::string(text), kSymbols, "");
+    error.allowed = "powers of " + error.allowed + ", as in N m s/rad";
+    const auto other = Table().find(symbol);
+    error.cure = other != Table().end() ? "write the value in " + other->second.si : DidYouMean(symbol, kSymbols);
+    return error;
+  } while (at <= text.size());
+  return Ok();
 }
 
 }  // namespace gapscope

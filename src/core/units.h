@@ -17,6 +17,10 @@ struct Unit {
 // "deg", "rpm", "ms", "mA", "counts/2048" ... Errors: unknown unit, with the nearest known one.
 Result<Unit> ParseUnit(std::string_view text);
 
+// "N m s/rad", "kg m^2", "1/s": whole powers of SI's symbols, '/' before each one that divides. Error: another unit,
+// with the nearest symbol, or what it is in SI.
+Status CheckSiUnit(std::string_view text);
+
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_CORE_UNITS_H_

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "src/core/units.h"
+#include "src/experiment/own_effects.h"
 #include "src/experiment/yaml_reader.h"
 
 namespace gapscope {
@@ -215,21 +216,6 @@ Status ReadParameters(const YAML::Node& node, const std::string& path, Experimen
   return names.Finish();
 }
 
-Status ReadSettings(const YAML::Node& node, const std::string& path, Experiment* experiment) {
-  if (!node.IsDefined()) return Ok();
-  YamlMap fields(node, path, "'set'");
-  for (const auto& pair : node) {
-    if (!pair.first.IsScalar()) break;
-    FieldSetting setting{.field = pair.first.Scalar(),
-                         .expressions = fields.TextList(pair.first.Scalar().c_str()),
-                         .where = YamlPlace(path, pair.first)};
-    if (setting.expressions.empty())
-      fields.Fail(pair.first, {.what = "the field '" + setting.field + "' has no expression"});
-    experiment->settings.push_back(std::move(setting));
-  }
-  return fields.Finish();
-}
-
 Status ReadLimits(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment) {
   for (const YAML::Node& item : items) {
     YamlMap map(item, path, "a limit");
@@ -328,9 +314,11 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   map.Text("doc", "");
   const std::string model = map.Text("model");
   if (model.empty()) map.Fail(root, {.what = "'model' is empty", .allowed = "the path of an MJCF file"});
-  const std::vector<YAML::Node> commands = map.List("commands"), limits = map.List("limits");
+  const std::vector<YAML::Node> commands = map.List("commands"), candidates = map.List("candidates"),
+                                limits = map.List("limits");
   const YAML::Node log = map.Child("log"), values = map.Child("values"), measured = map.Child("measured"),
-                   parameters = map.Child("parameters"), set = map.Child("set"), replay = map.Child("replay");
+                   parameters = map.Child("parameters"), set = map.Child("set"), without = map.Child("without"),
+                   replay = map.Child("replay");
   map.Child("controller");  // LoadController of replay/controller.h reads it
   GS_RETURN_IF_ERROR(map.Finish());
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
@@ -341,7 +329,9 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   GS_RETURN_IF_ERROR(ReadCommands(commands, path, &experiment));
   GS_RETURN_IF_ERROR(ReadMeasured(measured, path, &experiment));
   GS_RETURN_IF_ERROR(ReadParameters(parameters, path, &experiment));
-  GS_RETURN_IF_ERROR(ReadSettings(set, path, &experiment));
+  if (set.IsDefined()) GS_RETURN_IF_ERROR(ReadFieldSettings(set, path, &experiment.settings));
+  GS_RETURN_IF_ERROR(ReadOwnEffects(candidates, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadSwitchedOff(without, path, &experiment));
   GS_RETURN_IF_ERROR(ReadLimits(limits, path, &experiment));
   GS_RETURN_IF_ERROR(ReadReplay(replay, path, &experiment));
   return experiment;

@@ -101,6 +101,38 @@ struct FieldSetting {
   std::string where;  // file:line:column, for errors
 };
 
+// What a parameter of an effect says.
+enum class ParameterRole {
+  kSize,   // how strong it is
+  kPlace,  // where it lies: a rest angle, a phase, a number of periods
+  kShape,  // how its curve bends: simpler models have a fixed value for it, so it does not count as a parameter
+  kTime,   // how late it is
+};
+
+// A parameter of an effect that the experiment states, in SI.
+struct OwnParameter {
+  std::string key, unit, where = "";
+  double neutral = 0;  // the effect does nothing here
+  double low = 0, high = 0;
+  std::vector<double> trials;                        // values to screen with
+  double start = 0;                                  // where a fit starts when nothing better is known
+  std::optional<ParameterRole> role = std::nullopt;  // none: as the expression shows
+};
+
+// An effect of the experiment's own: a torque on a joint, or other expressions for fields of the model.
+struct OwnEffect {
+  std::string name, meaning = "";
+  std::string joint = "", torque = "";      // an expression as gapscope.expression reads it, N m; empty: `settings`
+  std::vector<FieldSetting> settings = {};  // expressions of its own and the experiment's parameters, and log values
+  std::vector<OwnParameter> parameters = {};
+  std::string where = "", torque_where = "";  // file:line:column, for errors
+};
+
+// An effect that is not asked about, on one place or (empty) on all.
+struct SwitchedOff {
+  std::string effect, on, where;
+};
+
 // How far an experiment on the rig may go, as magnitudes about zero; 0: no limit is stated. Exactly one of joint and
 // actuator is named.
 struct Limit {
@@ -131,6 +163,8 @@ struct Experiment {
   std::vector<MeasuredSpec> measured;
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
+  std::vector<OwnEffect> candidates;
+  std::vector<SwitchedOff> without;
   std::vector<Limit> limits;
   ReplayDefaults replay;
 };

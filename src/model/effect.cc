@@ -32,13 +32,19 @@ const std::vector<Effect>& Catalogue() {
   return catalogue;
 }
 
-std::vector<std::string> EffectNames() {
+namespace {
+
+std::vector<std::string> NamesOf(const std::vector<Effect>& effects) {
   std::vector<std::string> names;
-  for (const Effect& effect : Catalogue()) {
+  for (const Effect& effect : effects) {
     if (names.empty() || names.back() != effect.name) names.push_back(effect.name);
   }
   return names;
 }
+
+}  // namespace
+
+std::vector<std::string> EffectNames() { return NamesOf(Catalogue()); }
 
 std::string EffectTitle(const std::string& name) {
   for (const Effect& effect : Catalogue()) {
@@ -85,7 +91,7 @@ std::string ScaleName(const std::string& on, RigSize size) {
 namespace {
 
 // Where an effect makes sense in this rig.
-std::vector<std::string> Places(const Effect& effect, const Rig& rig) {
+std::vector<std::string> PossiblePlaces(const Effect& effect, const Rig& rig) {
   std::vector<std::string> places;
   switch (effect.place) {
     case EffectPlace::kMotor:
@@ -110,7 +116,24 @@ std::vector<std::string> Places(const Effect& effect, const Rig& rig) {
     case EffectPlace::kSignal:
       for (const auto& signal : rig.Signals()) places.push_back(signal);
       break;
+    case EffectPlace::kNamed:
+      places.push_back(effect.on);
+      break;
   }
+  return places;
+}
+
+// Whether the experiment switches the effect off there.
+bool IsOff(const std::string& effect, const std::string& on, const Rig& rig) {
+  const auto& without = rig.experiment().without;
+  return std::any_of(without.begin(), without.end(),
+                     [&](const SwitchedOff& off) { return off.effect == effect && (off.on.empty() || off.on == on); });
+}
+
+// Where an effect may act in this rig.
+std::vector<std::string> Places(const Effect& effect, const Rig& rig) {
+  std::vector<std::string> places = PossiblePlaces(effect, rig);
+  std::erase_if(places, [&](const std::string& on) { return IsOff(effect.name, on, rig); });
   return places;
 }
 
@@ -142,10 +165,10 @@ bool HasNoScale(const Effect& effect) {
 // The entry of a use in the catalogue and where that acts; null: no such place. On all, of a name that stands twice,
 // the first.
 std::pair<const Effect*, std::vector<std::string>> Placed(const EffectUse& use, const Rig& rig) {
-  for (const Effect& effect : Catalogue()) {
+  for (const Effect& effect : rig.effects()) {
     if (effect.name == use.effect && IsOneOf(use.on, Places(effect, rig))) return {&effect, {use.on}};
   }
-  for (const Effect& effect : Catalogue()) {
+  for (const Effect& effect : rig.effects()) {
     if (effect.name != use.effect || use.on != kOnAll) continue;
     if (auto places = SharedPlaces(effect, rig); !places.empty()) return {&effect, std::move(places)};
   }
@@ -155,7 +178,7 @@ std::pair<const Effect*, std::vector<std::string>> Placed(const EffectUse& use, 
 // All uses, of one size for all places too whatever that says.
 std::vector<EffectUse> EveryUse(const Rig& rig) {
   std::vector<EffectUse> uses;
-  for (const Effect& effect : Catalogue()) {
+  for (const Effect& effect : rig.effects()) {
     for (const auto& place : Places(effect, rig)) uses.push_back({effect.name, place});
     const auto [shared, all] = Placed({effect.name, kOnAll}, rig);
     if (shared == &effect && all.size() > 1) uses.push_back({effect.name, kOnAll});
@@ -174,14 +197,19 @@ Scales ScalesAt(const std::string& on, const Rig& rig, const ScaleTable& table) 
 Result<EffectUse> ParseEffectUse(const std::string& text, const Rig& rig) {
   const std::size_t at = text.find('@');
   const std::string name = text.substr(0, at), on = at == std::string::npos ? "" : text.substr(at + 1);
-  const std::vector<std::string> names = EffectNames();
+  const std::vector<std::string> names = NamesOf(rig.effects());
   std::vector<std::string> places;
-  for (const Effect& effect : Catalogue()) {
+  for (const Effect& effect : rig.effects()) {
     if (effect.name != name) continue;
     for (const auto& place : Places(effect, rig)) places.push_back(place);
   }
   if (std::find(names.begin(), names.end(), name) == names.end()) {
     return NoSuch("unknown effect", name, names, "--with " + text);
+  }
+  if (IsOff(name, on, rig)) {
+    return Error{.what = "the effect '" + name + "' is switched off for this experiment",
+                 .where = "--with " + text,
+                 .cure = "take it out of 'without' in " + rig.experiment().path};
   }
   if (places.empty()) {
     return Error{.what = "the effect '" + name + "' makes no sense in this model", .where = "--with " + text};
@@ -225,6 +253,22 @@ Status CheckTogether(const std::vector<EffectUse>& uses, const Rig& rig) {
                    .allowed = "one of the two",
                    .cure = "give each place its own size: " + Join(each)};
     }
+  }
+  return Ok();
+}
+
+Status CheckSwitchedOff(const Rig& rig) {
+  for (const SwitchedOff& off : rig.experiment().without) {
+    bool known = false;
+    std::vector<std::string> places;
+    for (const Effect& effect : rig.effects()) {
+      if (effect.name != off.effect) continue;
+      known = true;
+      for (const auto& place : PossiblePlaces(effect, rig)) places.push_back(place);
+    }
+    if (!known) return NoSuch("'without' names an unknown effect", off.effect, NamesOf(rig.effects()), off.where);
+    if (!off.on.empty() && !IsOneOf(off.on, places))
+      return NoSuch("'without' names the effect '" + off.effect + "' where it cannot act", off.on, places, off.where);
   }
   return Ok();
 }
@@ -331,7 +375,8 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
   std::vector<std::string> names;
   for (const auto& p : PlacedParameters(use, structure.rig(), table)) {
     names.push_back(p.name);
-    const Parameter::With with = effect.parameters[names.size() - 1].with;
+    const EffectParameter& entry = effect.parameters[names.size() - 1];
+    const Parameter::With with = entry.with;
     structure.AddParameter({.name = p.name,
                             .unit = p.unit,
                             .doc = effect.meaning,
@@ -342,7 +387,7 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                             .with = with,
                             .size = with == Parameter::With::kNone ? "" : names.front(),
                             .owner = Parameter::Owner::kEffect,
-                            .of_torque = IsOfTorque(p.scale)});
+                            .of_torque = entry.of_torque || IsOfTorque(p.scale)});
   }
   for (const std::string& place : PlacesOf(use, structure.rig())) {
     AddScales(structure, place, table);

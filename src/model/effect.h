@@ -1,9 +1,11 @@
-// The catalogue of effects that a model may lack. One file per effect under src/model/effects/ states its parameters
-// and how it enters a model; adding a file there adds the effect everywhere. Meaning and names: docs/effects.md.
+// The catalogue of effects that a model may lack, and a rig's own candidates beside it. One file per effect under
+// src/model/effects/ states its parameters and how it enters a model; adding a file there adds the effect everywhere.
+// Meaning and names: docs/effects.md.
 #ifndef GAPSCOPE_MODEL_EFFECT_H_
 #define GAPSCOPE_MODEL_EFFECT_H_
 
 #include <compare>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -25,6 +27,7 @@ enum class EffectPlace {
   kDrivenJoint,  // a joint with an actuator
   kSpringJoint,  // a joint that has a spring in the base model
   kSignal,       // a measured signal
+  kNamed,        // Effect::on alone
 };
 
 // A rig's own size, so that one catalogue serves all rigs: bounds and trial values of effect parameters are multiples
@@ -44,14 +47,6 @@ double ScaleOf(ScaleKind kind, const Scales& scales);
 // Whether it scales a torque, or a torque per something of the motion: stiffness, drag.
 bool IsOfTorque(ScaleKind kind);
 
-// What a parameter of an effect says.
-enum class ParameterRole {
-  kSize,   // how strong it is
-  kPlace,  // where it lies: a rest angle, a phase, a number of periods
-  kShape,  // how its curve bends: simpler models have a fixed value for it, so it does not count as a parameter
-  kTime,   // how late it is
-};
-
 struct EffectParameter {
   std::string key, unit;  // "stiffness_n_m_per_rad", "N m/rad"
   ParameterRole role = ParameterRole::kSize;
@@ -64,6 +59,7 @@ struct EffectParameter {
   Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
   bool takes_over =
       false;  // another start of a fit: all of the first parameter's torque, at the scale, made by this one
+  bool of_torque = false;  // it is one, whatever its scale says
 };
 
 // What an effect makes of the motion, whatever its formula.
@@ -111,14 +107,17 @@ struct Effect {
   std::string same_on_one_signal = "";  // the same motion where one command and one signal are all that is logged
   std::string same_but_constant = "";   // on one joint apart from this one by a constant torque alone
   std::string unlikely_beside = "";     // on an upright axis, which does not feel gravity, this one is the likely one
+  std::string on = "";                  // of EffectPlace::kNamed
   // Enters the effect in the structure; parameter i has the name `names[i]`.
-  Status (*apply)(Structure& structure, const std::string& on, const std::vector<std::string>& names);
+  std::function<Status(Structure& structure, const std::string& on, const std::vector<std::string>& names)> apply;
 };
 
-// All effects, sorted by name; a name that acts differently on motors and joints stands twice.
+// All effects of the program, sorted by name; a name that acts differently on motors and joints stands twice. A rig
+// has these and its own: Rig::effects().
 const std::vector<Effect>& Catalogue();
 std::vector<std::string> EffectNames();  // each once
-// The title of an effect; of a name that the catalogue lacks (another version's result), what it would be by default.
+// The title of an effect; of a name that the catalogue lacks (a rig's own, another version's result), the name in
+// words.
 std::string EffectTitle(const std::string& name);
 
 // The rig's own size at a place, a parameter that expressions of effects there may use.
@@ -148,8 +147,11 @@ void AddToCatalogue(Effect effect);
 Result<std::vector<EffectUse>> ParseEffects(const std::vector<std::string>& texts, const Rig& rig);
 // Error: an effect on all places and on one of them beside it, whose size would be a sum of two.
 Status CheckTogether(const std::vector<EffectUse>& uses, const Rig& rig);
-// Every effect on every place where it makes sense; on a rig with several drives also on all of them, where one size
-// can be meant for all: the effect's numbers are times and shares, which no drive's own size scales.
+// Error: what the experiment switches off does not exist, or cannot act there.
+Status CheckSwitchedOff(const Rig& rig);
+// Every effect on every place where it makes sense and is not switched off; on a rig with several drives also on all of
+// them, where one size can be meant for all: the effect's numbers are times and shares, which no drive's own size
+// scales.
 std::vector<EffectUse> AllUses(const Rig& rig);
 // Where a use acts: its place; of EFFECT@all each drive (of effects on joints, each driven joint), or each signal.
 std::vector<std::string> PlacesOf(const EffectUse& use, const Rig& rig);

@@ -30,6 +30,12 @@ struct Field {
 // without such a stage.
 Result<Field> ResolveField(const mjModel& model, const std::string& field, const std::string& where);
 
+// What a component is, by its first slot.
+inline double ReadComponent(const mjModel& model, const std::vector<FieldSlot>& slots) {
+  const FieldSlot& slot = slots.front();
+  const char* base = slot.in_options ? reinterpret_cast<const char*>(&model.opt) : static_cast<char*>(model.buffer);
+  return *reinterpret_cast<const mjtNum*>(base + slot.offset) / slot.factor;
+}
 // Writes one component.
 inline void WriteComponent(mjModel& model, const std::vector<FieldSlot>& slots, double value) {
   for (const FieldSlot& slot : slots) {

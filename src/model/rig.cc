@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "src/core/collect.h"
+#include "src/model/own_candidates.h"
 
 namespace gapscope {
 namespace {
@@ -44,6 +45,12 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
     return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(read.get())),
                  .where = experiment.model_path};
   }
+  rig->effects_ = Catalogue();
+  GS_ASSIGN(std::vector<Effect> own, OwnCandidates(*rig));
+  std::move(own.begin(), own.end(), std::back_inserter(rig->effects_));
+  std::stable_sort(rig->effects_.begin(), rig->effects_.end(),
+                   [](const Effect& a, const Effect& b) { return a.name < b.name; });
+  GS_RETURN_IF_ERROR(CheckSwitchedOff(*rig));
   return std::shared_ptr<const Rig>(std::move(rig));
 }
 

@@ -11,6 +11,7 @@
 #include "src/core/mujoco_handles.h"
 #include "src/experiment/experiment.h"
 #include "src/model/drive_facts.h"
+#include "src/model/effect.h"
 
 namespace gapscope {
 
@@ -19,11 +20,14 @@ std::string OneLine(std::string text);
 
 class Rig {
  public:
-  // Errors: the MJCF does not load or compile (with MuJoCo's own message).
+  // Errors: the MJCF does not load or compile (with MuJoCo's own message); a candidate of the experiment's own that
+  // does not fit it, or an effect switched off that does not exist (file:line).
   static Result<std::shared_ptr<const Rig>> Load(const Experiment& experiment);
 
   const Experiment& experiment() const { return experiment_; }
   const mjModel& compiled() const { return *compiled_; }
+  // What the model may lack: the catalogue and the experiment's own candidates, sorted by name.
+  const std::vector<Effect>& effects() const { return effects_; }
   // The MJCF to be changed: this one stays as it was read.
   SpecPtr CopySpec() const;
 
@@ -42,6 +46,7 @@ class Rig {
   Rig() = default;
 
   Experiment experiment_;
+  std::vector<Effect> effects_;
   SpecPtr spec_;
   mutable std::mutex copying_;  // MuJoCo does not say that one spec may be copied twice at a time
   ModelPtr compiled_;

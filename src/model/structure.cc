@@ -51,6 +51,16 @@ Status Structure::AddSpringTerm(const std::string& joint, const std::string& key
   return Ok();
 }
 
+Status Structure::Replace(const std::string& field, std::vector<std::string> expressions) {
+  if (std::find(replaced_.begin(), replaced_.end(), field) != replaced_.end()) {
+    return Error{.what = "two effects change the field '" + field + "'", .allowed = "one", .cure = "drop one of them"};
+  }
+  replaced_.push_back(field);
+  std::erase_if(settings, [&](const FieldSetting& setting) { return setting.field == field; });
+  Set(field, std::move(expressions));
+  return Ok();
+}
+
 Status Structure::AddSplit(Split split) {
   if (!FindJoint(split.joint)) return NoSuch("the model has no such joint", split.joint, rig_.Joints(), "");
   for (const auto& other : splits) {

@@ -36,6 +36,15 @@ class Structure {
     std::string joint, share, stiffness, damping, gap;  // expressions
   };
   Status AddSplit(Split split);
+  // A torque of the experiment's own on a joint: a formula as gapscope.expression reads it.
+  struct OwnTorque {
+    std::string name, joint, formula;
+    bool of_command;  // it reads the command of the joint's drive
+    Terms parameters;
+  };
+  void AddOwnTorque(OwnTorque torque) { own_torques_.push_back(std::move(torque)); }
+  // Other expressions in the place of what the experiment or the MJCF says of a field. Error: two effects do it.
+  Status Replace(const std::string& field, std::vector<std::string> expressions);
   void Set(const std::string& field, std::vector<std::string> expressions);
   void AddParameter(Parameter parameter) { parameters.push_back(std::move(parameter)); }
 
@@ -66,6 +75,9 @@ class Structure {
   Result<std::string> ConvertDrive(const std::vector<mjsActuator*>& inputs);
   Status FinishFriction(const std::string& name, Terms terms);
   void FinishSpring(const std::string& joint, const Terms& terms);
+  void FinishOwnTorque(const OwnTorque& torque);
+  // A passive plugin acts from a body of its own, without mass, since a body carries one plugin.
+  void HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance);
   void AddNumeric(const std::string& name, double value);
   // The live parameters of an instance, set by the terms.
   void AddLive(const std::string& instance, const Terms& terms);
@@ -73,6 +85,8 @@ class Structure {
 
   const Rig& rig_;
   std::map<std::string, Terms> motor_, friction_, spring_;  // by joint
+  std::vector<OwnTorque> own_torques_;
+  std::vector<std::string> replaced_;  // fields
 };
 
 }  // namespace gapscope

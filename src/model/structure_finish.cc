@@ -4,6 +4,7 @@
 
 #include "src/experiment/expression.h"
 #include "src/model/structure.h"
+#include "src/plugins/expression/expression.h"
 #include "src/plugins/friction/friction.h"
 #include "src/plugins/motor/motor_config.h"
 #include "src/plugins/spring/spring.h"
@@ -91,6 +92,7 @@ Status Structure::Finish() {
   for (const auto& [joint, terms] : motor_) GS_RETURN_IF_ERROR(FinishMotor(joint, terms));
   for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(FinishFriction(joint, terms));
   for (const auto& [joint, terms] : spring_) FinishSpring(joint, terms);
+  for (const OwnTorque& torque : own_torques_) FinishOwnTorque(torque);
   return Ok();
 }
 
@@ -301,15 +303,35 @@ void Structure::FinishSpring(const std::string& joint, const Terms& terms) {
     return;
   }
   const std::string instance = joint + ".spring";
-  // A body carries one plugin: a friction plugin may be there, so the spring stands on a massless child.
-  mjsBody* holder = mjs_addBody(mjs_getParent(element->element), nullptr);
+  AddInstance(spec.get(), plugins::Spring::kName, instance, {{"joint", joint}});
+  HoldPlugin(element, plugins::Spring::kName, instance);
+  AddLive(instance, terms);
+}
+
+void Structure::HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance) {
+  mjsBody* holder = mjs_addBody(mjs_getParent(joint->element), nullptr);
   mjs_setName(holder->element, instance.c_str());
   holder->mass = kTinyInertia;
   std::fill_n(holder->inertia, 3, kTinyInertia * 1e-6);
   holder->explicitinertial = 1;
-  AddInstance(spec.get(), plugins::Spring::kName, instance, {{"joint", joint}});
-  Attach(&holder->plugin, plugins::Spring::kName, instance);
-  AddLive(instance, terms);
+  Attach(&holder->plugin, plugin, instance);
+}
+
+void Structure::FinishOwnTorque(const OwnTorque& torque) {
+  using plugins::Expression;
+  const std::string instance = torque.joint + ".own." + torque.name;
+  std::map<std::string, std::string> attributes = {{"joint", torque.joint}, {"torque", torque.formula}};
+  Terms live = torque.parameters;
+  if (torque.of_command) {
+    attributes["actuator"] = rig_.ActuatorOf(torque.joint);
+    // During a replay the host delays what it sends; an exported model's formula must see it late by itself.
+    const char* delay = plugins::kFormulaDelay;
+    const auto drive = motor_.find(MotorSide(torque.joint));
+    if (drive != motor_.end() && drive->second.contains(delay)) live[delay] = drive->second.at(delay);
+  }
+  AddInstance(spec.get(), Expression::kName, instance, attributes);
+  HoldPlugin(FindJoint(torque.joint), Expression::kName, instance);
+  AddLive(instance, live);
 }
 
 }  // namespace gapscope

@@ -25,6 +25,8 @@ const char* PlaceText(EffectPlace place) {
       return "a joint with a spring in the base model";
     case EffectPlace::kSignal:
       return "a measured signal";
+    case EffectPlace::kNamed:
+      break;
   }
   return "";
 }

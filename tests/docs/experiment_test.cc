@@ -54,6 +54,14 @@ TEST(ExperimentDocTest, NamesEveryKey) {
       {"command", "model: m.xml\ncommands: [{actuator: a, column: c, zzz: 1}]\n" + measured},
       {"measured", "model: m.xml\nmeasured: [{signal: a, joint: a, zzz: 1}]\n"},
       {"parameter", "model: m.xml\nparameters: {p: {unit: s, nominal: 1, frozen: true, zzz: 1}}\n" + measured},
+      {"candidate",
+       "model: m.xml\ncandidates: [{name: n, joint: j, torque: k, parameters: {k: {unit: 1, bounds: [0, 1]}}, "
+       "zzz: 1}]\n" +
+           measured},
+      {"parameter of a candidate",
+       "model: m.xml\ncandidates: [{name: n, joint: j, torque: k, parameters: {k: {unit: 1, "
+       "bounds: [0, 1], zzz: 1}}}]\n" +
+           measured},
       {"limit", "model: m.xml\nlimits: [{joint: a, zzz: 1}]\n" + measured},
       {"replay", "model: m.xml\nreplay: {zzz: 1}\n" + measured},
   };

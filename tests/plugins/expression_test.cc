@@ -13,13 +13,14 @@ struct FormulaModel {
   bool with_plugin = true;
 
   std::string Xml() const {
-    std::string xml = "<mujoco><compiler angle=\"radian\"/><option timestep=\"0.001\" integrator=\"" + integrator +
-                      "\"/>";
+    std::string xml =
+        "<mujoco><compiler angle=\"radian\"/><option timestep=\"0.001\" integrator=\"" + integrator + "\"/>";
     if (with_plugin) {
-      xml += "<extension><plugin plugin=\"gapscope.expression\"><instance name=\"f\"><config key=\"joint\" "
-             "value=\"j\"/>" +
-             (torque.empty() ? "" : "<config key=\"torque\" value=\"" + torque + "\"/>") + config +
-             "</instance></plugin></extension>";
+      xml +=
+          "<extension><plugin plugin=\"gapscope.expression\"><instance name=\"f\"><config key=\"joint\" "
+          "value=\"j\"/>" +
+          (torque.empty() ? "" : "<config key=\"torque\" value=\"" + torque + "\"/>") + config +
+          "</instance></plugin></extension>";
     }
     return xml + "<custom>" + numeric + "</custom><worldbody><body><joint name=\"j\" axis=\"0 0 1\" " + joint +
            "/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/>" +
@@ -117,21 +118,21 @@ TEST(ExpressionTest, RefusesWithACure) {
     const char* says;
   };
   mju_user_warning = [](const char*) {};
-  for (const auto& [model, says] : std::vector<Case>{
-           {{}, "set <config key=\"torque\""},
-           {{.torque = "k*angle"}, "add <numeric name=\"f.k\""},
-           {{.torque = "angle", .numeric = Numeric("kk", 1)}, "numeric 'f.kk' sets no parameter"},
-           {{.torque = "sin(angle"}, "arenthes"},
-           {{.torque = "angle = 3"}, "it assigns"},
-           {{.torque = "angle, speed"}, "several values"},
-           {{.torque = std::string(5000, '1')}, "too long"},
-           {{.torque = "command"}, "set <config key=\"actuator\""},
-           {{.torque = "command", .config = Config("actuator", "b")}, "the name of an actuator"},
-           {{.torque = "command",
-             .numeric = Numeric("command_delay_s", 0.1),
-             .config = Config("actuator", "a") + Config("max_delay_s", 0.02)},
-            "raise max_delay_s"},
-           {{.torque = "angle", .config = Config("max_delay_s", -1)}, "leave it out for no delay"}}) {
+  for (const auto& [model, says] :
+       std::vector<Case>{{{}, "set <config key=\"torque\""},
+                         {{.torque = "k*angle"}, "add <numeric name=\"f.k\""},
+                         {{.torque = "angle", .numeric = Numeric("kk", 1)}, "numeric 'f.kk' sets no parameter"},
+                         {{.torque = "sin(angle"}, "arenthes"},
+                         {{.torque = "angle = 3"}, "it assigns"},
+                         {{.torque = "angle, speed"}, "several values"},
+                         {{.torque = std::string(5000, '1')}, "too long"},
+                         {{.torque = "command"}, "set <config key=\"actuator\""},
+                         {{.torque = "command", .config = Config("actuator", "b")}, "the name of an actuator"},
+                         {{.torque = "command",
+                           .numeric = Numeric("command_delay_s", 0.1),
+                           .config = Config("actuator", "a") + Config("max_delay_s", 0.02)},
+                          "raise max_delay_s"},
+                         {{.torque = "angle", .config = Config("max_delay_s", -1)}, "leave it out for no delay"}}) {
     std::string error;
     EXPECT_FALSE(Compile(model.Xml(), &error)) << model.torque;
     EXPECT_NE(error.find(says), std::string::npos) << model.torque << ": " << error;

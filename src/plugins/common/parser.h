@@ -5,6 +5,7 @@
 #include <muParser.h>
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <string_view>
 
@@ -13,6 +14,12 @@ namespace gapscope::plugins {
 inline constexpr std::size_t kLongestExpression = 4096;
 // What names are made of: NAME@ON.KEY is one.
 inline constexpr const char* kNameChars = "0123456789_abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.@";
+
+// What the formula of a torque may read beside its parameters: rad, rad/s, the command's unit, s.
+enum FormulaInput { kAngle, kSpeed, kCommand, kTime, kFormulaInputCount };
+inline constexpr std::array<const char*, kFormulaInputCount> kFormulaInputs = {"angle", "speed", "command", "time"};
+// How late it reads the command, a parameter too.
+inline constexpr const char* kFormulaDelay = "command_delay_s";
 
 // muParser recurses on parentheses.
 inline bool IsTooLong(std::string_view text) {

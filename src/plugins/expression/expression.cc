@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "src/plugins/common/parser.h"
 #include "src/plugins/common/refusal.h"
 #include "src/plugins/common/register.h"
 #include "src/plugins/motor/history.h"
@@ -11,11 +10,19 @@
 namespace gapscope::plugins {
 namespace {
 
-constexpr double kLongestDelay_s = 10;
+constexpr double kLongestDelay_s = 10, kDefaultMaxDelay_s = 0.13;
 
+std::string GivenMaxDelay(const mjModel* m, int instance) {
+  const char* text = mj_getPluginConfig(m, instance, "max_delay_s");
+  return text ? text : "";
+}
+
+// A custom text that held it would not be there yet when MuJoCo asks for the state's size: hence a default.
 double MaxDelay(const mjModel* m, int instance) {
   double value = 0;
-  return ParseNumber(ConfigText(m, instance, "max_delay_s"), &value) ? value : 0;
+  if (ParseNumber(GivenMaxDelay(m, instance), &value)) return value;
+  const std::string numeric = InstanceName(m, instance) + "." + kFormulaDelay;
+  return mj_name2id(m, mjOBJ_NUMERIC, numeric.c_str()) >= 0 ? kDefaultMaxDelay_s : 0;
 }
 
 }  // namespace
@@ -54,7 +61,7 @@ std::string Expression::Resolve(const mjModel* m, int instance) {
 
 std::string Expression::ResolveDelay(const mjModel* m, int instance) {
   if (std::string fault = live_.Resolve(m, instance, kSpecs); !fault.empty()) return fault;
-  const std::string text(ConfigText(m, instance, "max_delay_s"));
+  const std::string text = GivenMaxDelay(m, instance);
   max_delay_s_ = MaxDelay(m, instance);
   if (!text.empty() && !(max_delay_s_ > 0 && max_delay_s_ <= kLongestDelay_s))
     return Fault(m, instance, "max_delay_s", text, "0 to 10 s, above 0", "leave it out for no delay");
@@ -93,13 +100,13 @@ std::string Expression::ResolveNames(const mjModel* m, int instance, const std::
   const std::string prefix = InstanceName(m, instance) + ".";
   std::vector<const char*> keys = {kSpecs[kCommandDelay].key};
   parameters_.resize(names.size());
-  for (std::size_t i = 0; i < kInputs; ++i) parser_.DefineVar(kInputNames[i], &inputs_[i]);
+  for (std::size_t i = 0; i < kFormulaInputCount; ++i) parser_.DefineVar(kFormulaInputs[i], &inputs_[i]);
   for (const std::string& name : names) {
-    if (name == kInputNames[kCommand] && ctrl_address_ < 0) {
+    if (name == kFormulaInputs[kCommand] && ctrl_address_ < 0) {
       return Fault(m, instance, "actuator", "", "the actuator whose command the formula reads",
                    "set <config key=\"actuator\" value=\"...\"/>");
     }
-    if (std::find(kInputNames.begin(), kInputNames.end(), name) != kInputNames.end()) continue;
+    if (std::find(kFormulaInputs.begin(), kFormulaInputs.end(), name) != kFormulaInputs.end()) continue;
     const int id = mj_name2id(m, mjOBJ_NUMERIC, (prefix + name).c_str());
     if (id < 0) {
       return Fault(m, instance, "torque", name, "angle, speed, command, time, pi and numerics of the instance",
@@ -154,8 +161,7 @@ void Expression::Advance(const mjModel*, mjData* d) const {
 void RegisterExpression() {
   static const std::vector<const char*> attributes =
       AttributesOf(Expression::kSpecs, {"joint", "torque", "actuator", "max_delay_s"});
-  const mjpPlugin plugin =
-      PluginOf<Expression>(Expression::kName, mjPLUGIN_PASSIVE, attributes, Expression::StateSize);
+  const mjpPlugin plugin = PluginOf<Expression>(Expression::kName, mjPLUGIN_PASSIVE, attributes, Expression::StateSize);
   mjp_registerPlugin(&plugin);
 }
 

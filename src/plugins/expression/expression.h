@@ -17,18 +17,16 @@
 #include <vector>
 
 #include "src/plugins/common/parameters.h"
+#include "src/plugins/common/parser.h"
 
 namespace gapscope::plugins {
 
 class Expression {
  public:
   static constexpr const char* kName = "gapscope.expression";
-  // What a formula may read beside its parameters, in SI.
-  enum Input { kAngle, kSpeed, kCommand, kTime, kInputs };
-  static constexpr std::array<const char*, kInputs> kInputNames = {"angle", "speed", "command", "time"};
   enum Key { kCommandDelay, kKeyCount };
   static constexpr std::array<ParameterSpec, kKeyCount> kSpecs = {{
-      {"command_delay_s", "s", 0, 0, 10, Combine::kSum, Needs::kHistory, "", true},
+      {kFormulaDelay, "s", 0, 0, 10, Combine::kSum, Needs::kHistory, "", true},
   }};
 
   // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model does nothing.
@@ -51,7 +49,7 @@ class Expression {
   double Command(const mjModel* m, mjData* d) const;
 
   mu::Parser parser_;  // bound to the numbers below, which each compute writes: one instance is one mjData's
-  mutable std::array<double, kInputs> inputs_{};
+  mutable std::array<double, kFormulaInputCount> inputs_{};
   mutable std::vector<double> parameters_;
   std::vector<int> addresses_;  // of each parameter in numeric_data
   LiveParameters<kKeyCount> live_;

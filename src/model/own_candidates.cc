@@ -1,0 +1,326 @@
+#include "src/model/own_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "src/core/collect.h"
+#include "src/core/names.h"
+#include "src/experiment/expression.h"
+#include "src/model/fields.h"
+#include "src/model/rig.h"
+#include "src/model/structure.h"
+#include "src/plugins/common/parser.h"
+
+namespace gapscope {
+namespace {
+
+using Values = std::vector<double>;
+
+bool IsSame(const Values& a, const Values& b) {
+  constexpr double kRounding = 1e-9;
+  double size = 0, apart = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!std::isfinite(a[i]) || !std::isfinite(b[i])) return false;
+    size = std::max({size, std::abs(a[i]), std::abs(b[i])});
+    apart = std::max(apart, std::abs(a[i] - b[i]));
+  }
+  return apart <= kRounding * size;
+}
+
+// a + factor * b.
+Values Sum(const Values& a, double factor, const Values& b) {
+  Values sum = a;
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += factor * b[i];
+  return sum;
+}
+
+// A candidate's expressions at values of its parameters: a torque at a dozen motions, fields at the base model's nominal
+// parameters.
+class Probe {
+ public:
+  Probe(const OwnEffect& own, const Experiment& experiment) : own_(own) {
+    std::vector<std::string> names, texts = {own.torque};
+    if (own.torque.empty()) {
+      for (const Parameter& p : experiment.parameters) names.push_back(p.name), variables_.push_back(p.nominal);
+      for (const LogValue& v : experiment.values)
+        names.push_back(v.name), variables_.push_back(v.fallback.value_or(1));
+      texts.clear();
+      for (const FieldSetting& s : own.settings) texts.insert(texts.end(), s.expressions.begin(), s.expressions.end());
+    } else {
+      names.assign(plugins::kFormulaInputs.begin(), plugins::kFormulaInputs.end());
+      variables_.assign(names.size(), 0);
+    }
+    first_ = names.size();
+    for (const OwnParameter& p : own.parameters) names.push_back(p.key), variables_.push_back(p.neutral);
+    for (const std::string& text : texts)
+      expressions_.push_back(Expression::Parse(text, names, variables_.data(), own.where).value());
+  }
+  Probe(const Probe&) = delete;
+  Probe& operator=(const Probe&) = delete;
+
+  Values At(const Values& parameters) {
+    std::copy(parameters.begin(), parameters.end(), variables_.begin() + static_cast<std::ptrdiff_t>(first_));
+    Values values;
+    const int motions = own_.torque.empty() ? 1 : kMotions;
+    for (int k = 0; k < motions; ++k) {
+      if (!own_.torque.empty()) Move(k + 1);
+      for (const Expression& expression : expressions_) values.push_back(expression.Evaluate());
+    }
+    return values;
+  }
+  Values AtNeutral() { return At(Collect(own_.parameters, &OwnParameter::neutral)); }
+  // Parameter i moved from there alone.
+  Values Alone(std::size_t i) {
+    Values values = Collect(own_.parameters, &OwnParameter::neutral);
+    values[i] = Moved(own_.parameters[i]);
+    return At(values);
+  }
+  // All moved, i to this value.
+  Values Beside(std::size_t i, double value) {
+    Values values = Collect(own_.parameters, Moved);
+    values[i] = value;
+    return At(values);
+  }
+  // A value at which the parameter does something.
+  static double Moved(const OwnParameter& p) {
+    Values values = p.trials;
+    values.insert(values.begin(), p.start);
+    values.insert(values.end(), {p.high, p.low});
+    return *std::find_if(values.begin(), values.end(), [&](double value) { return value != p.neutral; });
+  }
+
+ private:
+  static constexpr int kMotions = 12;
+  // Nothing about these motions is special: no zero, both signs.
+  void Move(int k) {
+    variables_[plugins::kAngle] = 1.9 * std::sin(1.7 * k);
+    variables_[plugins::kSpeed] = 5.3 * std::sin(2.3 * k + 0.4);
+    variables_[plugins::kCommand] = 3.1 * std::cos(1.1 * k);
+    variables_[plugins::kTime] = 0.83 * k;
+  }
+
+  const OwnEffect& own_;
+  Values variables_;
+  std::size_t first_ = 0;  // of the candidate's parameters in variables_
+  std::vector<Expression> expressions_;
+};
+
+bool IsLinear(Probe& probe, std::size_t i, double value) {
+  const Values none = probe.Beside(i, 0), once = probe.Beside(i, value), twice = probe.Beside(i, 2 * value);
+  return IsSame(Sum(twice, -1, none), Sum(Sum(once, -1, none), 1, Sum(once, -1, none)));
+}
+
+// How the torque's parameter acts with its first one, the only size: an angle, a rest, or otherwise.
+Parameter::With ActsWith(Probe& probe, std::size_t i, const OwnParameter& p) {
+  const Values at_zero = probe.Beside(i, 0), at_one = probe.Beside(i, 1),
+               at_quarter = probe.Beside(i, std::numbers::pi / 2);
+  bool angle = p.low <= -std::numbers::pi && p.high >= std::numbers::pi;
+  bool rest = !p.trials.empty() && *std::max_element(p.trials.begin(), p.trials.end()) > 0;
+  for (const double value : {0.7, 2.1, -1.3}) {
+    const Values at = probe.Beside(i, value), none(at.size(), 0);
+    angle = angle && IsSame(at, Sum(Sum(none, std::cos(value), at_zero), std::sin(value), at_quarter));
+    rest = rest && IsSame(at, Sum(at_zero, value, Sum(at_one, -1, at_zero)));
+  }
+  return angle ? Parameter::With::kAngle : rest ? Parameter::With::kRest : Parameter::With::kNone;
+}
+
+// The sizes first, those that act linearly before the others: results show the first one.
+std::vector<EffectParameter> ParametersOf(const OwnEffect& own, Probe& probe) {
+  const Values neutral = probe.AtNeutral();
+  std::vector<std::pair<int, EffectParameter>> ranked;
+  for (std::size_t i = 0; i < own.parameters.size(); ++i) {
+    const OwnParameter& p = own.parameters[i];
+    const auto role =
+        p.role.value_or(IsSame(probe.Alone(i), neutral) ? ParameterRole::kPlace : ParameterRole::kSize);
+    const bool size = role == ParameterRole::kSize,
+               linear = size && p.neutral == 0 && IsLinear(probe, i, Probe::Moved(p));
+    ranked.push_back({linear ? 0 : size ? 1 : 2,
+                      {.key = p.key,
+                       .unit = p.unit,
+                       .role = role,
+                       .neutral = p.neutral,
+                       .low = p.low,
+                       .high = p.high,
+                       .trials = p.trials,
+                       .start = p.start,
+                       .of_torque = linear && !own.torque.empty()}});
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  return Collect(ranked, [](const auto& entry) { return entry.second; });
+}
+
+// Which parameters the catalogue would call an angle or a rest of the first one.
+void Couple(const OwnEffect& own, Probe& probe, std::vector<EffectParameter>* parameters) {
+  const auto index = [&](const std::string& key) {
+    const auto found = std::find_if(own.parameters.begin(), own.parameters.end(),
+                                    [&](const OwnParameter& p) { return p.key == key; });
+    return static_cast<std::size_t>(found - own.parameters.begin());
+  };
+  const EffectParameter& size = parameters->front();
+  const Values without = probe.Beside(index(size.key), 0);
+  if (!size.of_torque || !IsSame(without, Values(without.size(), 0))) return;
+  for (EffectParameter& p : *parameters) {
+    if (p.role == ParameterRole::kPlace) p.with = ActsWith(probe, index(p.key), own.parameters[index(p.key)]);
+  }
+}
+
+std::string ElementOf(const std::string& field) {
+  const std::size_t first = field.find('/'), last = field.rfind('/');
+  return field.substr(first + 1, last > first ? last - first - 1 : std::string::npos);
+}
+
+// Forces of a joint that its own motion makes.
+bool IsOfMotion(const OwnEffect& own) {
+  if (!own.torque.empty()) {
+    return !Mentions(own.torque, plugins::kFormulaInputs[plugins::kCommand]) &&
+           !Mentions(own.torque, plugins::kFormulaInputs[plugins::kTime]);
+  }
+  return std::all_of(own.settings.begin(), own.settings.end(), [](const FieldSetting& s) {
+    const std::string last = s.field.substr(s.field.rfind('/') + 1);
+    return s.field.starts_with("joint/") &&
+           (last.starts_with("damping") || last.starts_with("stiffness") || last == "springref");
+  });
+}
+
+Status CheckTorque(const OwnEffect& own, Probe& probe, const Rig& rig) {
+  const std::vector<std::string> joints = rig.Joints();
+  if (std::find(joints.begin(), joints.end(), own.joint) == joints.end())
+    return NoSuch("a candidate acts on a joint that the MJCF lacks", own.joint, joints, own.where);
+  if (Mentions(own.torque, plugins::kFormulaInputs[plugins::kCommand]) && rig.ActuatorOf(own.joint).empty()) {
+    return Error{.what = "the joint '" + own.joint + "' has no drive whose command a torque could follow",
+                 .where = own.torque_where,
+                 .allowed = "angle, speed, time and parameters"};
+  }
+  for (const double torque : probe.AtNeutral()) {
+    if (torque == 0) continue;
+    return Error{.what = "the torque of '" + own.name + "' is not zero at the neutral values of its parameters",
+                 .where = own.torque_where,
+                 .actual = std::to_string(torque),
+                 .allowed = "0, whatever the motion",
+                 .cure = "give a parameter the 'neutral' value at which the effect does nothing"};
+  }
+  return Ok();
+}
+
+// What the base model says of a field at its nominal parameters; empty: a log decides.
+Result<Values> BaseValues(const FieldSetting& own, const Rig& rig) {
+  const Experiment& experiment = rig.experiment();
+  GS_ASSIGN(const Field field, ResolveField(rig.compiled(), own.field, own.where));
+  const auto set = std::find_if(experiment.settings.begin(), experiment.settings.end(),
+                                [&](const FieldSetting& s) { return s.field == own.field; });
+  if (set == experiment.settings.end()) {
+    return Collect(field.components, [&](const auto& c) { return ReadComponent(rig.compiled(), c); });
+  }
+  std::map<std::string, double> nominal;
+  for (const Parameter& p : experiment.parameters) nominal[p.name] = p.nominal;
+  Values values;
+  for (const std::string& text : set->expressions) {
+    for (const LogValue& value : experiment.values) {
+      if (Mentions(text, value.name)) return Values{};
+    }
+    GS_ASSIGN(const double value, EvaluateOnce(text, nominal, set->where));
+    values.push_back(value);
+  }
+  return values;
+}
+
+Status CheckFields(const OwnEffect& own, Probe& probe, const Rig& rig) {
+  const Values neutral = probe.AtNeutral();
+  auto at = neutral.begin();
+  for (const FieldSetting& setting : own.settings) {
+    GS_ASSIGN(const Field field, ResolveField(rig.compiled(), setting.field, setting.where));
+    if (field.components.size() != setting.expressions.size()) {
+      return Error{
+          .what = "the field '" + setting.field + "' has " + std::to_string(field.components.size()) + " numbers",
+          .where = setting.where,
+          .actual = std::to_string(setting.expressions.size()) + " expressions"};
+    }
+    GS_ASSIGN(const Values base, BaseValues(setting, rig));
+    for (std::size_t i = 0; i < setting.expressions.size(); ++i, ++at) {
+      constexpr double kPrinted = 1e-4;  // of an MJCF with rounded numbers
+      if (base.empty() || std::abs(*at - base[i]) <= kPrinted * std::abs(base[i])) continue;
+      return Error{.what = "the field '" + setting.field + "' is another one at the neutral values of '" + own.name + "'",
+                   .where = setting.where,
+                   .actual = std::to_string(*at),
+                   .allowed = std::to_string(base[i]) + ", as the model has it",
+                   .cure = "give a parameter the 'neutral' value at which the effect does nothing"};
+    }
+  }
+  return Ok();
+}
+
+Status CheckTrials(const OwnEffect& own, const Effect& effect) {
+  const bool tried = std::any_of(effect.parameters.begin(), effect.parameters.end(), [](const EffectParameter& p) {
+    return p.role != ParameterRole::kPlace &&
+           std::any_of(p.trials.begin(), p.trials.end(), [&](double trial) { return trial != p.neutral; });
+  });
+  if (tried) return Ok();
+  return Error{.what = "the candidate '" + own.name + "' has no values to be tried at",
+               .where = own.where,
+               .allowed = "'trials' of a parameter that does something alone, other than its neutral value",
+               .cure = "add 'trials: [VALUE, ...]'; where no parameter does anything alone, say 'role: size' of one"};
+}
+
+Status Apply(const OwnEffect& own, Structure& structure, const std::map<std::string, std::string>& names) {
+  if (!own.torque.empty()) {
+    structure.AddOwnTorque({.name = own.name,
+                            .joint = own.joint,
+                            .formula = own.torque,
+                            .of_command = Mentions(own.torque, plugins::kFormulaInputs[plugins::kCommand]),
+                            .parameters = names});
+    return Ok();
+  }
+  for (const FieldSetting& setting : own.settings) {
+    GS_RETURN_IF_ERROR(structure.Replace(
+        setting.field, Collect(setting.expressions, [&](const auto& text) { return WithNames(text, names); })));
+  }
+  return Ok();
+}
+
+Result<Effect> MakeEffect(const OwnEffect& own, const Rig& rig) {
+  Probe probe(own, rig.experiment());
+  const bool torque = !own.torque.empty();
+  if (torque) {
+    GS_RETURN_IF_ERROR(CheckTorque(own, probe, rig));
+  } else {
+    GS_RETURN_IF_ERROR(CheckFields(own, probe, rig));
+  }
+  Effect effect{.name = own.name,
+                .place = EffectPlace::kNamed,
+                .parameters = ParametersOf(own, probe),
+                .meaning = own.meaning.empty() ? "a candidate of the experiment file" : own.meaning,
+                .of_motion = IsOfMotion(own),
+                .on = torque ? own.joint : ElementOf(own.settings.front().field)};
+  effect.signature = torque ? "torque " + own.torque : own.settings.front().field + " = " +
+                                                           Join(own.settings.front().expressions);
+  Couple(own, probe, &effect.parameters);
+  GS_RETURN_IF_ERROR(CheckTrials(own, effect));
+  effect.apply = [own, keys = Collect(effect.parameters, &EffectParameter::key)](
+                     Structure& structure, const std::string&, const std::vector<std::string>& names) {
+    std::map<std::string, std::string> by_key;
+    for (std::size_t i = 0; i < keys.size(); ++i) by_key[keys[i]] = names[i];
+    return Apply(own, structure, by_key);
+  };
+  return effect;
+}
+
+}  // namespace
+
+Result<std::vector<Effect>> OwnCandidates(const Rig& rig) {
+  std::vector<Effect> effects;
+  const std::vector<std::string> known = EffectNames();
+  for (const OwnEffect& own : rig.experiment().candidates) {
+    if (std::find(known.begin(), known.end(), own.name) != known.end()) {
+      return Error{.what = "the catalogue has an effect of the candidate's name",
+                   .where = own.where,
+                   .actual = "'" + own.name + "'",
+                   .cure = "rename the candidate"};
+    }
+    GS_ASSIGN(Effect effect, MakeEffect(own, rig));
+    effects.push_back(std::move(effect));
+  }
+  return effects;
+}
+
+}  // namespace gapscope

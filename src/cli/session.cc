@@ -84,8 +84,9 @@ std::vector<Option> EffectOptions(ModelFlags& flags) {
   return Join({{{.flag = "--with",
                  .value = &flags.with,
                  .help = "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL|all], more than once, of " +
-                         gapscope::Join(EffectNames()),
-                 .more = "docs/effects.md lists the effects. Without a place it goes where it can act, if there is one "
+                         gapscope::Join(EffectNames()) + ", or a candidate of the experiment file",
+                 .more = "docs/effects.md lists the effects, docs/experiment.md tells of candidates. Without a place "
+                         "it goes where it can act, if there is one "
                          "such place; its parameters are then known to --set as EFFECT@PLACE.NAME"}},
                ValueOptions(flags.set, flags.params)});
 }

@@ -4,6 +4,27 @@
 
 namespace gapscope {
 
+namespace {
+
+// Effects of the experiment's own, which models of the same run will have.
+void AddCandidates(const Experiment& experiment, Hasher* hasher) {
+  for (const OwnEffect& own : experiment.candidates) {
+    hasher->Text(own.name).Text(own.joint).Text(own.torque);
+    for (const FieldSetting& setting : own.settings) {
+      hasher->Text(setting.field);
+      for (const auto& expression : setting.expressions) hasher->Text(expression);
+    }
+    for (const OwnParameter& p : own.parameters) {
+      const double role = p.role ? static_cast<double>(*p.role) : -1;
+      const double numbers[] = {p.neutral, p.low, p.high, p.start, role};
+      hasher->Text(p.key).Numbers(numbers).Numbers(p.trials);
+    }
+  }
+  for (const SwitchedOff& off : experiment.without) hasher->Text(off.effect).Text(off.on);
+}
+
+}  // namespace
+
 void AddModel(const Model& model, Hasher* hasher) {
   const mjModel& compiled = model.compiled();
   std::vector<char> bytes(static_cast<std::size_t>(mj_sizeModel(&compiled)));
@@ -18,6 +39,7 @@ void AddModel(const Model& model, Hasher* hasher) {
     hasher->Text(setting.field);
     for (const auto& expression : setting.expressions) hasher->Text(expression);
   }
+  AddCandidates(experiment, hasher);
   for (const auto& effect : model.effects()) hasher->Text(effect.Text());
   for (const CommandSpec& command : experiment.commands) hasher->Text(command.actuator).Text(command.fallback);
   for (const MeasuredSpec& signal : experiment.measured) {

@@ -294,8 +294,12 @@ void Structure::FinishSpring(const std::string& joint, const Terms& terms) {
   };
   const bool own =
       std::all_of(terms.begin(), terms.end(), [&](const auto& term) { return !native(term.first).empty(); });
-  const bool free = std::all_of(std::begin(element->stiffness), std::end(element->stiffness),
-                                [](double coefficient) { return coefficient == 0; });
+  const bool set = std::any_of(settings.begin(), settings.end(), [&](const FieldSetting& s) {
+    return std::any_of(terms.begin(), terms.end(),
+                       [&](const auto& term) { return s.field == "joint/" + joint + "/" + native(term.first); });
+  });
+  const bool free = !set && std::all_of(std::begin(element->stiffness), std::end(element->stiffness),
+                                        [](double coefficient) { return coefficient == 0; });
   if (own && free) {
     // MuJoCo's own spring does it.
     element->stiffness[0] = kTinyFriction;

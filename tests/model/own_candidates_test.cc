@@ -49,6 +49,9 @@ const std::string kCandidates = R"yaml(candidates:
   - name: heavier_tip
     set: {body/tip/mass: tip_kg}
     parameters: {tip_kg: {unit: kg, bounds: [0, 0.1], neutral: 0.02, trials: [0.03]}}
+  - name: spring
+    set: {joint/hinge/stiffness: k}
+    parameters: {k: {unit: N m/rad, bounds: [0, 1], trials: [0.1]}}
   - name: sticky
     set: {joint/hinge/damping: hinge.damping * (1 + more)}
     parameters: {more: {unit: 1, bounds: [0, 10], trials: [1]}}
@@ -86,6 +89,13 @@ TEST_F(OwnCandidatesTest, MoveAsTheNativeElement) {
   // The command, less a share of it, is a motor of smaller gain.
   const auto leaky = With({{"leaky_drive", "hinge"}}, {{"leaky_drive@hinge.share", 0.25}});
   EXPECT_LT(LargestDifference(leaky, Native("joint=\"hinge\"/>", "joint=\"hinge\" gear=\"0.75\"/>")), kRounding_rad);
+  const std::string sprung = "damping=\"0.05\" stiffness=\"0.25\"";
+  EXPECT_LT(LargestDifference(With({{"spring", "hinge"}}, {{"spring@hinge.k", 0.25}}), Native("damping=\"0.05\"", sprung)),
+            kRounding_rad);
+  // Beside an effect of the catalogue on the same field both act.
+  const auto both = With({{"spring", "hinge"}, {"cable_spring", "hinge"}},
+                         {{"spring@hinge.k", 0.125}, {"cable_spring@hinge.stiffness_n_m_per_rad", 0.125}});
+  EXPECT_LT(LargestDifference(both, Native("damping=\"0.05\"", sprung)), kRounding_rad);
   // A field that the experiment sets takes the candidate's expression, of the experiment's parameters too.
   const auto sticky = With({{"sticky", "hinge"}}, {{"sticky@hinge.more", 3}});
   EXPECT_LT(LargestDifference(sticky, With({}, {{"hinge.damping", 0.2}})), kRounding_rad);
@@ -205,10 +215,10 @@ TEST(OwnCandidateErrorsTest, SayWhatAndWhere) {
       {"body/tip/mass", "body/tip/mas", {"experiment.yaml:28:", "did you mean 'mass'?"}},
       {"body/tip/mass", "body/tip/ipos", {"experiment.yaml:28:", "has 3 numbers"}},
       {"neutral: 0.02", "neutral: 0.03", {"experiment.yaml:28:", "another one at the neutral"}},
-      {"hinge.damping * (1", "hinge.dampin * (1", {"experiment.yaml:31:", "did you mean 'hinge.damping'?"}},
-      {"without: [cogging", "without: [coging", {"experiment.yaml:33:11", "did you mean 'cogging'?"}},
-      {"quadratic_drag@wrist", "quadratic_drag@wrst", {"experiment.yaml:33:", "did you mean 'wrist'?"}},
-      {"without: [cogging, quadratic_drag@wrist]", "without: cogging", {"experiment.yaml:33:", "not a list"}},
+      {"hinge.damping * (1", "hinge.dampin * (1", {"experiment.yaml:34:", "did you mean 'hinge.damping'?"}},
+      {"without: [cogging", "without: [coging", {"experiment.yaml:36:11", "did you mean 'cogging'?"}},
+      {"quadratic_drag@wrist", "quadratic_drag@wrst", {"experiment.yaml:36:", "did you mean 'wrist'?"}},
+      {"without: [cogging, quadratic_drag@wrist]", "without: cogging", {"experiment.yaml:36:", "not a list"}},
   };
   for (const Case& c : cases) {
     std::string yaml = "model: robot.xml\n" + kYaml + kCandidates;

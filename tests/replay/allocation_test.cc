@@ -13,11 +13,16 @@ namespace {
 
 TEST(AllocationTest, RunAllocatesNothing) {
   for (const char* rig : {"joint", "qube", "xl330"}) {
-    const Experiment experiment = ShippedExperiment(rig);
+    Experiment experiment = ShippedExperiment(rig);
+    experiment.candidates = {{.name = "own",
+                              .joint = FactsOfRig(rig).joints.front(),
+                              .torque = "size * max(sin(angle), cos(time)) * command",
+                              .parameters = {{.key = "size", .unit = "N m", .low = 0, .high = 1, .trials = {0.1}}}}};
     const auto base = MakeModel(experiment);
     std::vector<std::string> texts = {"command_delay", "coulomb_friction", "stribeck_friction", "actuator_lag",
                                       "sensor_delay"};
     if (std::string(rig) == "xl330") texts = {"load_friction", "torque_delay", "sensor_delay"};
+    texts.emplace_back("own");
     const auto uses = ParseEffects(texts, *base->rig());
     ASSERT_TRUE(uses.ok()) << uses.error().Text();
     const auto model = MakeModel(experiment, uses.value());

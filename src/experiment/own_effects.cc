@@ -98,7 +98,8 @@ Status ReadOwnParameters(const YAML::Node& node, const std::string& path, const 
 
 Status CheckExpressions(const OwnEffect& effect, std::vector<std::string> names) {
   std::vector<FieldSetting> all = effect.settings;
-  if (!effect.torque.empty()) all.push_back({.field = "", .expressions = {effect.torque}, .where = effect.torque_where});
+  if (!effect.torque.empty())
+    all.push_back({.field = "", .expressions = {effect.torque}, .where = effect.torque_where});
   for (const OwnParameter& p : effect.parameters) names.push_back(p.key);
   std::vector<double> ones(names.size(), 1.0);
   for (const FieldSetting& setting : all) {

@@ -35,16 +35,15 @@ Values Sum(const Values& a, double factor, const Values& b) {
   return sum;
 }
 
-// A candidate's expressions at values of its parameters: a torque at a dozen motions, fields at the base model's nominal
-// parameters.
+// A candidate's expressions at values of its parameters: a torque at a dozen motions, fields at the base model's
+// nominal parameters.
 class Probe {
  public:
   Probe(const OwnEffect& own, const Experiment& experiment) : own_(own) {
     std::vector<std::string> names, texts = {own.torque};
     if (own.torque.empty()) {
       for (const Parameter& p : experiment.parameters) names.push_back(p.name), variables_.push_back(p.nominal);
-      for (const LogValue& v : experiment.values)
-        names.push_back(v.name), variables_.push_back(v.fallback.value_or(1));
+      for (const LogValue& v : experiment.values) names.push_back(v.name), variables_.push_back(v.fallback.value_or(1));
       texts.clear();
       for (const FieldSetting& s : own.settings) texts.insert(texts.end(), s.expressions.begin(), s.expressions.end());
     } else {
@@ -131,11 +130,12 @@ std::vector<EffectParameter> ParametersOf(const OwnEffect& own, Probe& probe) {
   std::vector<std::pair<int, EffectParameter>> ranked;
   for (std::size_t i = 0; i < own.parameters.size(); ++i) {
     const OwnParameter& p = own.parameters[i];
-    const auto role =
-        p.role.value_or(IsSame(probe.Alone(i), neutral) ? ParameterRole::kPlace : ParameterRole::kSize);
+    const auto role = p.role.value_or(IsSame(probe.Alone(i), neutral) ? ParameterRole::kPlace : ParameterRole::kSize);
     const bool size = role == ParameterRole::kSize,
                linear = size && p.neutral == 0 && IsLinear(probe, i, Probe::Moved(p));
-    ranked.push_back({linear ? 0 : size ? 1 : 2,
+    ranked.push_back({linear ? 0
+                      : size ? 1
+                             : 2,
                       {.key = p.key,
                        .unit = p.unit,
                        .role = role,
@@ -153,8 +153,8 @@ std::vector<EffectParameter> ParametersOf(const OwnEffect& own, Probe& probe) {
 // Which parameters the catalogue would call an angle or a rest of the first one.
 void Couple(const OwnEffect& own, Probe& probe, std::vector<EffectParameter>* parameters) {
   const auto index = [&](const std::string& key) {
-    const auto found = std::find_if(own.parameters.begin(), own.parameters.end(),
-                                    [&](const OwnParameter& p) { return p.key == key; });
+    const auto found =
+        std::find_if(own.parameters.begin(), own.parameters.end(), [&](const OwnParameter& p) { return p.key == key; });
     return static_cast<std::size_t>(found - own.parameters.begin());
   };
   const EffectParameter& size = parameters->front();
@@ -240,11 +240,12 @@ Status CheckFields(const OwnEffect& own, Probe& probe, const Rig& rig) {
     for (std::size_t i = 0; i < setting.expressions.size(); ++i, ++at) {
       constexpr double kPrinted = 1e-4;  // of an MJCF with rounded numbers
       if (base.empty() || std::abs(*at - base[i]) <= kPrinted * std::abs(base[i])) continue;
-      return Error{.what = "the field '" + setting.field + "' is another one at the neutral values of '" + own.name + "'",
-                   .where = setting.where,
-                   .actual = std::to_string(*at),
-                   .allowed = std::to_string(base[i]) + ", as the model has it",
-                   .cure = "give a parameter the 'neutral' value at which the effect does nothing"};
+      return Error{
+          .what = "the field '" + setting.field + "' is another one at the neutral values of '" + own.name + "'",
+          .where = setting.where,
+          .actual = std::to_string(*at),
+          .allowed = std::to_string(base[i]) + ", as the model has it",
+          .cure = "give a parameter the 'neutral' value at which the effect does nothing"};
     }
   }
   return Ok();
@@ -292,8 +293,8 @@ Result<Effect> MakeEffect(const OwnEffect& own, const Rig& rig) {
                 .meaning = own.meaning.empty() ? "a candidate of the experiment file" : own.meaning,
                 .of_motion = IsOfMotion(own),
                 .on = torque ? own.joint : ElementOf(own.settings.front().field)};
-  effect.signature = torque ? "torque " + own.torque : own.settings.front().field + " = " +
-                                                           Join(own.settings.front().expressions);
+  effect.signature =
+      torque ? "torque " + own.torque : own.settings.front().field + " = " + Join(own.settings.front().expressions);
   Couple(own, probe, &effect.parameters);
   GS_RETURN_IF_ERROR(CheckTrials(own, effect));
   effect.apply = [own, keys = Collect(effect.parameters, &EffectParameter::key)](

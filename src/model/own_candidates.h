@@ -1,5 +1,5 @@
-// The candidates that an experiment file states, as effects beside the catalogue's. What the catalogue's files say of an
-// effect is found from its expressions: which parameters are sizes, which act linearly, what it is a function of.
+// The candidates that an experiment file states, as effects beside the catalogue's. What the catalogue's files say of
+// an effect is found from its expressions: which parameters are sizes, which act linearly, what it is a function of.
 #ifndef GAPSCOPE_MODEL_OWN_CANDIDATES_H_
 #define GAPSCOPE_MODEL_OWN_CANDIDATES_H_
 

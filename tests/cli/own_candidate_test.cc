@@ -15,11 +15,12 @@ constexpr double kAmplitude_n_m = 4, kPhase_rad = -0.6;  // the twin's sine is o
 class OwnCandidateTest : public ::testing::Test {
  protected:
   OwnCandidateTest() {
-    const Answer made = scratch_.Shell(
-        "'" GAPSCOPE_TWIN "' --rig joint --nominal --seed 5 --excitation multisine --excitation triangle --duration 6 "
-        "--rate 250 --set cogging@joint.amplitude_n_m=4 --set cogging@joint.periods_per_rev=1 --set "
-        "cogging@joint.phase_rad=0.6 --set cogging@joint.second_share=0 --out '" +
-        scratch_.Path("twin") + "'");
+    const Answer made =
+        scratch_.Shell("'" GAPSCOPE_TWIN
+                       "' --rig joint --nominal --seed 5 --excitation multisine --excitation triangle --duration 6 "
+                       "--rate 250 --set cogging@joint.amplitude_n_m=4 --set cogging@joint.periods_per_rev=1 --set "
+                       "cogging@joint.phase_rad=0.6 --set cogging@joint.second_share=0 --out '" +
+                       scratch_.Path("twin") + "'");
     EXPECT_EQ(made.status, 0) << made.err;
   }
   Answer Run(const std::string& command, const std::string& experiment, const std::string& flags) {

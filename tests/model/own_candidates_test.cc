@@ -90,8 +90,9 @@ TEST_F(OwnCandidatesTest, MoveAsTheNativeElement) {
   const auto leaky = With({{"leaky_drive", "hinge"}}, {{"leaky_drive@hinge.share", 0.25}});
   EXPECT_LT(LargestDifference(leaky, Native("joint=\"hinge\"/>", "joint=\"hinge\" gear=\"0.75\"/>")), kRounding_rad);
   const std::string sprung = "damping=\"0.05\" stiffness=\"0.25\"";
-  EXPECT_LT(LargestDifference(With({{"spring", "hinge"}}, {{"spring@hinge.k", 0.25}}), Native("damping=\"0.05\"", sprung)),
-            kRounding_rad);
+  EXPECT_LT(
+      LargestDifference(With({{"spring", "hinge"}}, {{"spring@hinge.k", 0.25}}), Native("damping=\"0.05\"", sprung)),
+      kRounding_rad);
   // Beside an effect of the catalogue on the same field both act.
   const auto both = With({{"spring", "hinge"}, {"cable_spring", "hinge"}},
                          {{"spring@hinge.k", 0.125}, {"cable_spring@hinge.stiffness_n_m_per_rad", 0.125}});
@@ -199,7 +200,9 @@ TEST(OwnCandidateErrorsTest, SayWhatAndWhere) {
       {"a: {unit: N m, bounds: [0, 1]", "a: {unit: N m, bounds: [1, 0]", {"experiment.yaml:21:", "low below high"}},
       {"a: {unit: N m, bounds: [0, 1]", "a: {unit: N m, bounds: [0, .inf]", {"experiment.yaml:21:", "finite"}},
       {"a: {unit: N m, bounds: [0, 1]", "a: {unit: N m", {"experiment.yaml:21:", "has no bounds"}},
-      {"a: {unit: N m, bounds", "a: {unit: Nm, bounds", {"experiment.yaml:21:", "unknown unit", "write the value in N m"}},
+      {"a: {unit: N m, bounds",
+       "a: {unit: Nm, bounds",
+       {"experiment.yaml:21:", "unknown unit", "write the value in N m"}},
       {"a: {unit: N m, bounds", "a: {unit: N q, bounds", {"experiment.yaml:21:", "unknown unit", "as in N m s/rad"}},
       {"trials: [0.1]}\n      phase", "trials: [2]}\n      phase", {"experiment.yaml:21:", "'trials'", "outside its"}},
       {"trials: [0.1]}\n      phase", "trials: [0]}\n      phase", {"no values to be tried at", "add 'trials"}},
@@ -207,7 +210,8 @@ TEST(OwnCandidateErrorsTest, SayWhatAndWhere) {
       {"name: eccentric", "name: backlash", {"experiment.yaml:16:", "the catalogue has an effect"}},
       {"name: eccentric", "name: soft_cable", {"experiment.yaml:16:", "stands twice"}},
       {"name: eccentric", "name: two@words", {"experiment.yaml:16:", "not a name of a candidate"}},
-      {"name: eccentric\n    joint: hinge", "name: eccentric\n    joint: hing",
+      {"name: eccentric\n    joint: hinge",
+       "name: eccentric\n    joint: hing",
        {"experiment.yaml:16:", "did you mean 'hinge'?"}},
       {"name: eccentric\n    joint: hinge", "name: eccentric", {"neither a torque nor a change of fields"}},
       {"name: leaky_drive\n    joint: hinge", "name: leaky_drive\n    joint: wrist", {"has no drive"}},

@@ -13,6 +13,7 @@ namespace gapscope {
 
 // Values are of all its parameters, SI, in the model's order.
 struct RunModel {
+  std::string experiment;  // the experiment file's path as it was given; empty: it is not said
   std::vector<EffectUse> effects;
   std::vector<std::pair<std::string, double>> values;
 };

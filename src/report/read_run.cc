@@ -13,6 +13,12 @@ using nlohmann::ordered_json;
 
 double NumberAt(const ordered_json& json, const char* key) { return NumberFrom(json.at(key)); }
 
+RunModel OwnModelFrom(const ordered_json& result) {
+  RunModel model = RunModelFrom(result.at("model"));
+  model.experiment = result.value("experiment", "");
+  return model;
+}
+
 SignalScore ScoreFrom(const std::string& signal, const ordered_json& json) {
   return {.signal = signal,
           .rmse = NumberAt(json, "rmse"),
@@ -79,7 +85,7 @@ TuneRun TuneRunFrom(const ordered_json& json) {
       .held_out_by = json.at("held_out_by"),
       .train = LogsFrom(json.at("train")),
       .held_out = LogsFrom(json.at("held_out")),
-      .model = RunModelFrom(json.at("model")),
+      .model = OwnModelFrom(json),
       .time_step_s = NumberAt(json, "time_step_s"),
       .command_shift_s = NumberAt(json, "command_shift_s"),
   };
@@ -110,7 +116,7 @@ Result<RunModel> ReadRunModel(const ordered_json& json, const std::string& where
   constexpr char kAllowed[] = "a result of gapscope replay, tune or diagnose";
   if (!json.is_object() || !json.contains("model"))
     return Error{.what = "not a result of a model: it has no 'model'", .where = where, .allowed = kAllowed};
-  return ReadGuarded([&] { return RunModelFrom(json.at("model")); }, where, kAllowed);
+  return ReadGuarded([&] { return OwnModelFrom(json); }, where, kAllowed);
 }
 
 Result<TuneRun> ReadTuneRun(const ordered_json& json, const std::string& where) {

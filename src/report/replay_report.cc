@@ -94,6 +94,7 @@ ordered_json ToJson(const ReplayRun& run, Timing timing) {
     if (run.loop) entry["statistics"] = ToJson(run.loop->logs[l], run.loop->actuator);
     json["logs"].push_back(std::move(entry));
   }
+  json["experiment"] = run.model.experiment;
   json["effects"] = JsonEffects(run.model.effects);
   json["parameters"] = ordered_json::object();
   for (const auto& [name, value] : run.parameters) json["parameters"][name] = value;

@@ -183,6 +183,7 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
   json["held_out_by"] = run.held_out_by;
   json["train"] = Json(run.train);
   json["held_out"] = Json(run.held_out);
+  json["experiment"] = run.model.experiment;
   json["effects"] = JsonEffects(run.model.effects);
   json["model"] = JsonModel(run.model);
   json["time_step_s"] = run.time_step_s;

@@ -23,19 +23,20 @@ const RunInfo kInfo = {.seed = 7, .gapscope = "0.0.1", .mujoco = "1.2.3"};
 // One log of two signals, the second badly off, and a model with an effect.
 ReplayRun MadeReplay() {
   const std::vector<double> time_s = {0, 0.5, 1, 1.5};
-  ReplayRun run{
-      .info = kInfo,
-      .result = {.mode = ReplayMode::kFreeRun,
-                 .time_step_s = 0.001,
-                 .time_step_error = 0.0005,
-                 .logs = {{.log_path = "logs/a.csv", .windows = 1, .time_s = time_s}},
-                 .wall_s = 0.25,
-                 .simulated_s = 1.5,
-                 .steps = 1500},
-      .comparison = {.error = 0.5, .logs = {{.log_path = "logs/a.csv", .error = 0.5}}},
-      .model = {.effects = {{"cable_spring", "arm"}}, .values = {{"arm.mass", 0.1}, {"scale@arm.torque_n_m", 2}}},
-      .parameters = {{"arm.mass", 0.1}},
-      .other_error = 0.3};
+  ReplayRun run{.info = kInfo,
+                .result = {.mode = ReplayMode::kFreeRun,
+                           .time_step_s = 0.001,
+                           .time_step_error = 0.0005,
+                           .logs = {{.log_path = "logs/a.csv", .windows = 1, .time_s = time_s}},
+                           .wall_s = 0.25,
+                           .simulated_s = 1.5,
+                           .steps = 1500},
+                .comparison = {.error = 0.5, .logs = {{.log_path = "logs/a.csv", .error = 0.5}}},
+                .model = {.experiment = "rig.yaml",
+                          .effects = {{"cable_spring", "arm"}},
+                          .values = {{"arm.mass", 0.1}, {"scale@arm.torque_n_m", 2}}},
+                .parameters = {{"arm.mass", 0.1}},
+                .other_error = 0.3};
   for (const double error : {0.25, 1.0}) {
     const std::string name = error < 1 ? "arm_rad" : "pendulum_rad";
     run.result.logs[0].signals.push_back({.signal = name, .measured = {0, 1, 0, 1}, .predicted = {0, 1, 0, 1 - error}});
@@ -67,7 +68,7 @@ TEST(ReplayRunTest, JsonSaysWhatTheRunHolds) {
             R"("pendulum_rad":{"rmse":0.5,"mae":0.25,"nrmse":1.0,"max":1.0,"lag_s":0.002,"correlation":0.9}},)"
             R"("where":[{"signal":"arm_rad","condition":"speed 0..0.2 rad/s","share_of_error":0.6,)"
             R"("share_of_time":0.1,"low":0.5,"high":0.7}]}],)"
-            R"("effects":[{"name":"cable_spring","on":"arm"}],"parameters":{"arm.mass":0.1},)"
+            R"("experiment":"rig.yaml","effects":[{"name":"cable_spring","on":"arm"}],"parameters":{"arm.mass":0.1},)"
             R"("model":{"effects":[{"name":"cable_spring","on":"arm"}],)"
             R"("values":{"arm.mass":0.1,"scale@arm.torque_n_m":2.0}},)"
             R"("cost":{"wall_s":0.25,"simulated_s":1.5,"steps":1500},"seed":7,)"
@@ -143,7 +144,9 @@ TuneRun MadeTune() {
       .held_out = {{.log = "b.csv",
                     .outcome = Outcome::kDiverged,
                     .signals = {{.signal = "arm_rad", .rmse = 5, .mae = 6, .nrmse = 7}}}},
-      .model = {.effects = {{"coulomb_friction", "arm"}}, .values = {{"motor.kt", 0.05}, {"arm.mass", 0.09}}},
+      .model = {.experiment = "rig.yaml",
+                .effects = {{"coulomb_friction", "arm"}},
+                .values = {{"motor.kt", 0.05}, {"arm.mass", 0.09}}},
       .time_step_s = 0.002,
       .command_shift_s = -0.0005};
 }

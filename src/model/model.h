@@ -28,6 +28,19 @@ struct SignalSource {
   int cutoff = -1, damping_ratio = -1;  // parameters of the low-pass between mechanism and log
 };
 
+// A model outside a replay: what an MJCF of it is made of.
+struct ExportedModel {
+  SpecPtr spec;  // compiled, with the values in it
+  ModelPtr compiled;
+  // Which parameters make a field what it is: "joint/arm/damping", "numeric/motor.torque_limit_n_m".
+  struct Origin {
+    std::string field;
+    std::vector<std::string> parameters;
+  };
+  std::vector<Origin> origins;
+  std::vector<std::string> left_out;  // fields that each log sets anew, where none was given
+};
+
 class Model {
  public:
   // The rig with effects added. Errors: a name in the experiment that the MJCF lacks (file:line and the nearest),
@@ -69,6 +82,10 @@ class Model {
   // `log_values` of one log.
   Result<std::string> ToXml(std::span<const double> values, const std::map<std::string, double>& log_values,
                             const ScaleTable& scales) const;
+  // What ToXml writes. Without `log_values`, fields that depend on them stay as the rig's MJCF has them. Errors: a
+  // parameter that is not finite; as Build.
+  Result<ExportedModel> Export(std::span<const double> values, const std::map<std::string, double>* log_values,
+                               const ScaleTable& scales) const;
 
   // The same structure with everything that is only drawn, which compiled() leaves out; bodies stand where `values` put
   // them. qpos means the same in both. Error: the MJCF does not compile with its pictures (a missing texture, say).
@@ -106,6 +123,9 @@ class Model {
   std::vector<int> command_delays_;
   std::vector<int> memories_;
 };
+
+// An MJCF of a compiled spec. Error: MuJoCo cannot write it; `where` names its file.
+Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where);
 
 // Inertia of the joint's own body (without its children) about the joint's axis, with the armature of the joint; kg
 // m^2.

@@ -316,6 +316,7 @@ void Structure::HoldPlugin(const mjsJoint* joint, const std::string& plugin, con
   mjsBody* holder = mjs_addBody(mjs_getParent(joint->element), nullptr);
   mjs_setName(holder->element, instance.c_str());
   holder->mass = kTinyInertia;
+  std::fill_n(holder->ipos, 3, 0.0);
   std::fill_n(holder->inertia, 3, kTinyInertia * 1e-6);
   holder->explicitinertial = 1;
   Attach(&holder->plugin, plugin, instance);

@@ -21,8 +21,9 @@ nlohmann::ordered_json Written() {
   friction.parameters = {{"friction_n_m", "N m", 0.0006, 0.0003, 0.0011}};
   friction.numbers = {.gain = 2, .gain_held_out = 1, .gain_free = NAN, .discrepancy = 50, .clear = 3, .dry = true};
   friction.sets = std::make_shared<const ComparedSets>(
-      ComparedSets{.with = {{friction.use}, {{"arm.damping", 0.1}, {"coulomb_friction@arm.friction_n_m", 0.0006}}},
-                   .without = {{}, {{"arm.damping", 0.2}}},
+      ComparedSets{.with = {.effects = {friction.use},
+                            .values = {{"arm.damping", 0.1}, {"coulomb_friction@arm.friction_n_m", 0.0006}}},
+                   .without = {.values = {{"arm.damping", 0.2}}},
                    .blocks = {{"a.csv", 1.5, 2, 0.7}}});
   friction.rivals = {{{"load_friction", "arm"}, 0.4}};
   d.statements = {friction, {.use = {"backlash", "arm"}, .bounds = {{"gap_rad", "rad", 0.01, 0.01, 0.01}}}};

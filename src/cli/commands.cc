@@ -3,8 +3,9 @@
 namespace gapscope::cli {
 
 std::vector<Command> AllCommands() {
-  return {InitCommand(),     InspectCommand(), ReplayCommand(), TuneCommand(), DiagnoseCommand(), ExplainCommand(),
-          IdentifyCommand(), DesignCommand(),  RenderCommand(), PlanCommand(), RunCommand(),      MergeCommand()};
+  return {InitCommand(),    InspectCommand(), ReplayCommand(),   TuneCommand(),   DiagnoseCommand(),
+          ExplainCommand(), ApplyCommand(),   IdentifyCommand(), DesignCommand(), RenderCommand(),
+          PlanCommand(),    RunCommand(),     MergeCommand()};
 }
 
 }  // namespace gapscope::cli

@@ -33,6 +33,7 @@ std::vector<Command> InputCommands();     // sweep, steps, triangle, multisine, 
 std::vector<Command> FeedbackCommands();  // lqr, poles
 Command OptimalCommand();
 Command RenderCommand();
+Command ApplyCommand();
 Command PlanCommand();  // plan, run and merge: many logs, shared out
 Command RunCommand();
 Command MergeCommand();

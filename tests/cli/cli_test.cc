@@ -274,6 +274,55 @@ TEST_F(CliTest, AClosedLoopsPageHoldsTheResultThatIsPrinted) {
   EXPECT_EQ(sent.substr(0, sent.find('\n')), "__time,logged/motor,closed_loop/motor");
 }
 
+TEST_F(CliTest, ApplyWritesAResultIntoTheMjcf) {
+  const std::string log = JointLog(), out = scratch_.Path("out"), changed = scratch_.Path("new/robot.xml");
+  ASSERT_EQ(
+      Run("replay " + Joint() + " '" + log + "' --with coulomb_friction --set coulomb_friction@joint.friction_n_m=2 " +
+          "--with sensor_delay@position_rad --out '" + out + "'")
+          .status,
+      0);
+  const Answer answer = Run("apply '" + out + "' --out '" + changed + "'");
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_NE(answer.out.find("frictionloss"), std::string::npos) << answer.out;
+  EXPECT_NE(answer.out.find("not in it: sensor_delay@position_rad"), std::string::npos) << answer.out;
+  // All of the user's lines but the joint's and the path of what it includes.
+  const Answer diff = scratch_.Shell("diff '" + kModels + "joint/joint.xml' '" + changed + "' | grep '^<'");
+  EXPECT_EQ(std::count(diff.out.begin(), diff.out.end(), '\n'), 2) << diff.out;
+  EXPECT_NE(ReadAll(changed).find("<!-- gapscope: coulomb_friction@joint: 2 N m -->"), std::string::npos);
+  const auto json = nlohmann::json::parse(Run("apply '" + out + "' --out '" + changed + "' --json").out);
+  EXPECT_EQ(json["schema"], "gapscope.apply/1");
+  EXPECT_EQ(json["changes"][0]["element"], "joint joint");
+}
+
+TEST_F(CliTest, ApplyRefusesWhatIsNoResultOfThisModel) {
+  const std::string log = JointLog(), out = scratch_.Path("out");
+  ASSERT_EQ(Run("replay " + Joint() + " '" + log + "' --with coulomb_friction --out '" + out + "'").status, 0);
+  const std::string kept = scratch_.Write("kept.xml", "as it was"), to = " --out '" + kept + "'";
+  ExpectRefused("apply", {"result"});
+  ExpectRefused("apply '" + out + "'", {"--out"});
+  ExpectRefused("apply '" + scratch_.Path("nowhere") + "'" + to, {"nowhere", "cannot open"});
+  std::filesystem::create_directories(scratch_.Path("empty"));
+  ExpectRefused("apply '" + scratch_.Path("empty") + "'" + to, {"empty/result.json"});
+  ExpectRefused("apply '" + scratch_.Write("other.json", "{\"schema\": \"gapscope.bench/1\"}") + "'" + to,
+                {"gapscope.bench/1", "gapscope.diagnosis/1"});
+  ExpectRefused("apply '" + scratch_.Write("list.json", "[1]") + "'" + to, {"schema none"});
+  const std::string result = ReadAll(out + "/result.json");
+  auto json = nlohmann::ordered_json::parse(result);
+  json.erase("experiment");
+  const std::string old = "apply '" + scratch_.Write("old.json", json.dump()) + "'" + to;
+  ExpectRefused(old, {"does not name its experiment", "--experiment FILE"});
+  EXPECT_EQ(ReadAll(kept), "as it was");
+  // Of another rig, and of one that has changed since.
+  ExpectRefused(old + " --experiment '" + kModels + "qube/experiment.yaml'", {"coulomb_friction@joint", "arm"});
+  json["model"]["values"]["joint.inertai"] = 1;
+  ExpectRefused("apply '" + scratch_.Write("gone.json", json.dump()) + "' --experiment " + Joint() + to,
+                {"joint.inertai", "did you mean 'joint.inertia'?"});
+  json["experiment"] = "gone/experiment.yaml";
+  ExpectRefused("apply '" + scratch_.Write("moved.json", json.dump()) + "'" + to,
+                {"gone/experiment.yaml", "--experiment FILE"});
+  EXPECT_EQ(ReadAll(kept), "as it was");
+}
+
 TEST_F(CliTest, AnUnwritableOutIsRefused) {
   const std::string log = JointLog();
   const std::string file = scratch_.Write("in_the_way", "x");

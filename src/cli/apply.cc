@@ -1,0 +1,100 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "src/cli/commands.h"
+#include "src/cli/result_model.h"
+#include "src/cli/session.h"
+#include "src/core/file.h"
+#include "src/core/names.h"
+#include "src/report/apply_report.h"
+#include "src/report/read_run.h"
+
+namespace gapscope::cli {
+namespace {
+
+struct ApplyFlags {
+  CommonFlags common;
+  std::string result, experiment;
+};
+
+// The experiment of a result: what is given, else what it names itself.
+Result<Experiment> ExperimentOf(const ApplyFlags& flags, const nlohmann::ordered_json& json) {
+  const std::vector<std::string> schemas = {"gapscope.diagnosis/1", "gapscope.tune/1", "gapscope.replay/1"};
+  const std::string schema = json.is_object() && json.contains("schema") ? json["schema"].dump() : "none";
+  const bool known =
+      std::any_of(schemas.begin(), schemas.end(), [&](const std::string& one) { return schema == '"' + one + '"'; });
+  if (!known) {
+    return Error{.what = "not a result that an MJCF can be changed by",
+                 .where = flags.result,
+                 .actual = "schema " + schema,
+                 .allowed = "a result of diagnose, tune or replay: " + Join(schemas)};
+  }
+  if (!flags.experiment.empty()) return LoadExperiment(flags.experiment);
+  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.result));
+  constexpr char kCure[] = "give it: --experiment FILE";
+  if (held.experiment.empty())
+    return Error{.what = "the result does not name its experiment", .where = flags.result, .cure = kCure};
+  std::error_code failed;
+  if (!std::filesystem::exists(held.experiment, failed)) {
+    return Error{.what = "the result's experiment is not there",
+                 .where = flags.result,
+                 .actual = held.experiment,
+                 .cure = "go to the folder where the result was made, or " + std::string(kCure)};
+  }
+  return LoadExperiment(held.experiment);
+}
+
+Result<int> RunApply(const ApplyFlags& flags) {
+  GS_ASSIGN(const nlohmann::ordered_json json, ReadJson(flags.result));
+  GS_ASSIGN(const Experiment experiment, ExperimentOf(flags, json));
+  GS_ASSIGN(std::shared_ptr<const Rig> rig, Rig::Load(experiment));
+  // Scales bound effects; they do not make their values.
+  GS_ASSIGN(const ResultModel result, LoadResultModel(rig, flags.result, {}));
+  const ApplyOptions options{.out = flags.common.out, .notes = NotesOf(json, *result.model, result.values)};
+  GS_ASSIGN(const AppliedMjcf applied, ApplyToMjcf(*result.model, result.values, options));
+  GS_RETURN_IF_ERROR(WriteFile(flags.common.out, applied.text));
+  ApplyRun run{.model = experiment.model_path,
+               .result = flags.result,
+               .out = flags.common.out,
+               .setter = experiment.settings.empty() ? "" : experiment.path,
+               .changes = applied.changes,
+               .left_out = applied.left_out};
+  run.needs_plugins = applied.text.find("plugin=\"gapscope.") != std::string::npos;
+  for (const auto& use : result.model->effects()) {
+    if (EffectOf(use, *rig).place == EffectPlace::kSignal) run.of_signals.push_back(use);
+  }
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  return kDone;
+}
+
+}  // namespace
+
+Command ApplyCommand() {
+  auto flags = std::make_shared<ApplyFlags>();
+  const std::vector<Option> own = {
+      {.flag = "result",
+       .value = &flags->result,
+       .required = true,
+       .help = "Folder that diagnose, tune or replay wrote with --out, or its result.json"},
+      {.flag = "--out",
+       .value = &flags->common.out,
+       .required = true,
+       .help = "The changed MJCF",
+       .more =
+           "Best beside the MJCF itself, or the MJCF itself. Files that it includes are named as seen from its folder"},
+      {.flag = "--experiment",
+       .value = &flags->experiment,
+       .unset = "the one that the result names",
+       .help = "Experiment file whose MJCF is changed",
+       .more = "Another one where the files have moved since"}};
+  return {.name = "apply",
+          .what = "Write a result into your own MJCF: only the elements that change, each with a comment that says why",
+          .options = Join({own, PrintOptions(flags->common)}),
+          .example = "gapscope apply out/demo --out robot.xml",
+          .run = [flags] { return RunApply(*flags); }};
+}
+
+}  // namespace gapscope::cli

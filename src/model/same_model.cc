@@ -92,7 +92,8 @@ std::string DifferenceOf(const mjModel& a, const mjModel& b) {
   X(nq)
   X(nv)
   X(nu)
-  X(nactuator) X(nout) X(na) X(nbody) X(njnt) X(ntendon) X(nwrap) X(neq)
+  X(nactuator)
+  X(nout) X(na) X(nbody) X(njnt) X(ntendon) X(nwrap) X(neq)
 #undef X
       if (std::string difference = NameDifference(a, b); !difference.empty()) return difference;
   if (!Same(a.opt.gravity, b.opt.gravity, 3)) return "gravity";

@@ -148,7 +148,8 @@ std::string ToTable(const ApplyRun& run) {
   if (!run.left_out.empty()) text += fmt::format("  as it was, since each log sets it anew: {}\n", Join(run.left_out));
   if (run.needs_plugins) text += "  it has plugin elements: load libgapscope_plugins.so before it\n";
   if (!run.setter.empty())
-    text += fmt::format("  take out of 'set' in {} what stands here now: it writes nominal values over the MJCF's\n", run.setter);
+    text += fmt::format("  take out of 'set' in {} what stands here now: it writes nominal values over the MJCF's\n",
+                        run.setter);
   return text;
 }
 

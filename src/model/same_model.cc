@@ -87,15 +87,21 @@ std::string NameDifference(const mjModel& a, const mjModel& b) {
 }  // namespace
 
 std::string DifferenceOf(const mjModel& a, const mjModel& b) {
-#define X(name) \
-  if (a.name != b.name) return "the size " #name;
-  X(nq)
-  X(nv)
-  X(nu)
-  X(nactuator)
-  X(nout) X(na) X(nbody) X(njnt) X(ntendon) X(nwrap) X(neq)
-#undef X
-      if (std::string difference = NameDifference(a, b); !difference.empty()) return difference;
+  const std::pair<const char*, bool> sizes[] = {{"nq", a.nq == b.nq},
+                                                {"nv", a.nv == b.nv},
+                                                {"nu", a.nu == b.nu},
+                                                {"nactuator", a.nactuator == b.nactuator},
+                                                {"nout", a.nout == b.nout},
+                                                {"na", a.na == b.na},
+                                                {"nbody", a.nbody == b.nbody},
+                                                {"njnt", a.njnt == b.njnt},
+                                                {"ntendon", a.ntendon == b.ntendon},
+                                                {"nwrap", a.nwrap == b.nwrap},
+                                                {"neq", a.neq == b.neq}};
+  for (const auto& [name, same] : sizes) {
+    if (!same) return std::string("the size ") + name;
+  }
+  if (std::string difference = NameDifference(a, b); !difference.empty()) return difference;
   if (!Same(a.opt.gravity, b.opt.gravity, 3)) return "gravity";
   if (a.opt.timestep != b.opt.timestep || a.opt.integrator != b.opt.integrator) return "the time step or integrator";
   const mjModel* m = &a;

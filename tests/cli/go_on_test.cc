@@ -12,33 +12,36 @@ namespace {
 const std::string kSource = GAPSCOPE_SOURCE_DIR;
 const std::string kQube = "'" + kSource + "/models/qube/experiment.yaml'", kLog = "'" + kSource + "/demo/qube.csv'";
 
-// One quick diagnosis of the demo's log: its arm has a cable spring and dry friction that the model lacks.
+// One quick diagnosis of the demo's log, for all of them: its arm has a cable spring and dry friction that the model
+// lacks.
 class GoOnTest : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    scratch_ = new Scratch;
+  void SetUp() override {
     found_ = Run("diagnose " + kQube + " " + kLog + " --effort quick --quiet --out '" + Folder() + "'");
+    ASSERT_EQ(found_.status, 0) << found_.err;
   }
-  static void TearDownTestSuite() {
-    delete scratch_;
-    scratch_ = nullptr;
-  }
-  static std::string Folder() { return scratch_->Path("found"); }
-  static Answer Run(const std::string& arguments) { return scratch_->Shell("'" GAPSCOPE_PROGRAM "' " + arguments); }
-  static nlohmann::json Found() { return nlohmann::json::parse(ReadAll(Folder() + "/result.json")); }
-  void SetUp() override { ASSERT_EQ(found_.status, 0) << found_.err; }
-  static void ExpectRefused(const std::string& arguments, const std::vector<std::string>& says) {
+  std::string Folder() const { return scratch_.Path("found"); }
+  Answer Run(const std::string& arguments) { return scratch_.Shell("'" GAPSCOPE_PROGRAM "' " + arguments); }
+  nlohmann::json Found() const { return nlohmann::json::parse(ReadAll(Folder() + "/result.json")); }
+  void ExpectRefused(const std::string& arguments, const std::vector<std::string>& says) {
     SCOPED_TRACE(arguments);
     const Answer answer = Run(arguments);
     EXPECT_EQ(answer.status, 2);
     EXPECT_EQ(answer.out, "");
     for (const auto& part : says) EXPECT_NE(answer.err.find(part), std::string::npos) << answer.err;
   }
-  static inline Scratch* scratch_ = nullptr;
-  static inline Answer found_;
+  // What is asked of it.
+  void TheTermsOfAStatementMakeItsEvidence();
+  void AStatementIsDrawnWithItsEffectAndWithoutIt();
+  void WhatIsAcceptedBecomesKnown();
+  void WhatDoesNotGoTogetherIsRefused();
+  void AnotherVersionsDiagnosisIsRefused();
+
+  Scratch scratch_;
+  Answer found_;
 };
 
-TEST_F(GoOnTest, TheTermsOfAStatementMakeItsEvidence) {
+void GoOnTest::TheTermsOfAStatementMakeItsEvidence() {
   const Answer answer = Run("explain '" + Folder() + "' coulomb_friction@arm --json");
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto why = nlohmann::json::parse(answer.out);
@@ -55,8 +58,8 @@ TEST_F(GoOnTest, TheTermsOfAStatementMakeItsEvidence) {
   EXPECT_EQ(std::count(why["without"]["effects"].begin(), why["without"]["effects"].end(), use), 0);
 }
 
-TEST_F(GoOnTest, AStatementIsDrawnWithItsEffectAndWithoutIt) {
-  const std::string out = scratch_->Path("why");
+void GoOnTest::AStatementIsDrawnWithItsEffectAndWithoutIt() {
+  const std::string out = scratch_.Path("why");
   const Answer answer = Run("explain '" + Folder() + "' 1 --out '" + out + "'");
   ASSERT_EQ(answer.status, 0) << answer.err;
   EXPECT_NE(answer.out.find("What the probability is made of"), std::string::npos) << answer.out;
@@ -65,7 +68,7 @@ TEST_F(GoOnTest, AStatementIsDrawnWithItsEffectAndWithoutIt) {
   EXPECT_NE(page.find("\"label\":\"with it\""), std::string::npos);
 }
 
-TEST_F(GoOnTest, WhatIsAcceptedBecomesKnown) {
+void GoOnTest::WhatIsAcceptedBecomesKnown() {
   const std::string stiffness = "cable_spring@arm.stiffness_n_m_per_rad";
   const Answer answer = Run("diagnose " + kQube + " " + kLog + " --effort quick --quiet --json --from '" + Folder() +
                             "' --accept cable_spring@arm --freeze " + stiffness);
@@ -79,7 +82,7 @@ TEST_F(GoOnTest, WhatIsAcceptedBecomesKnown) {
   EXPECT_EQ(result["statements"][0]["answer"], "present");
 }
 
-TEST_F(GoOnTest, WhatDoesNotGoTogetherIsRefused) {
+void GoOnTest::WhatDoesNotGoTogetherIsRefused() {
   ExpectRefused("explain '" + Folder() + "' 0", {"no such statement", "1 .. "});
   ExpectRefused("explain '" + Folder() + "' coulomb_fricton@arm", {"did you mean 'coulomb_friction@arm'?"});
   ExpectRefused("explain '" + Folder() + "/nowhere' 1", {"nowhere"});
@@ -88,23 +91,31 @@ TEST_F(GoOnTest, WhatDoesNotGoTogetherIsRefused) {
   ExpectRefused(diagnose + "--freeze arm.dampin", {"--freeze", "did you mean 'arm.damping'?"});
   ExpectRefused(diagnose + "--with cable_spring@arm", {"cable_spring@arm", "twice"});
   ExpectRefused("diagnose " + kQube + " " + kLog + " --accept 1", {"--accept", "nothing to accept from", "--from"});
-  const std::string copy = scratch_->Write("copy.csv", ReadAll(kSource + "/demo/qube.csv"));
+  const std::string copy = scratch_.Write("copy.csv", ReadAll(kSource + "/demo/qube.csv"));
   ExpectRefused("diagnose " + kQube + " '" + copy + "' --from '" + Folder() + "'", {"a diagnosis of other logs"});
   ExpectRefused("diagnose '" + kSource + "/models/flexjoint/experiment.yaml' " + kLog + " --from '" + Folder() + "'",
                 {"arm_rad"});
 }
 
-TEST_F(GoOnTest, AnotherVersionsDiagnosisIsRefused) {
+void GoOnTest::AnotherVersionsDiagnosisIsRefused() {
   auto other = Found();
   other["policy"]["search.tie"] = 0.2;
-  const std::string path = scratch_->Write("other.json", other.dump());
+  const std::string path = scratch_.Write("other.json", other.dump());
   ExpectRefused("explain '" + path + "' 1", {"another version", "diagnose again"});
   other = Found();
   other["schema"] = "gapscope.tune/1";
-  ExpectRefused("explain '" + scratch_->Write("tune.json", other.dump()) + "' 1", {"not a diagnosis"});
+  ExpectRefused("explain '" + scratch_.Write("tune.json", other.dump()) + "' 1", {"not a diagnosis"});
   other = Found();
   other["statements"][0].erase("blocks");
-  ExpectRefused("explain '" + scratch_->Write("torn.json", other.dump()) + "' 1", {"can be read", "blocks"});
+  ExpectRefused("explain '" + scratch_.Write("torn.json", other.dump()) + "' 1", {"can be read", "blocks"});
+}
+
+TEST_F(GoOnTest, FromOneDiagnosisToTheNext) {
+  TheTermsOfAStatementMakeItsEvidence();
+  AStatementIsDrawnWithItsEffectAndWithoutIt();
+  WhatIsAcceptedBecomesKnown();
+  WhatDoesNotGoTogetherIsRefused();
+  AnotherVersionsDiagnosisIsRefused();
 }
 
 }  // namespace

@@ -65,8 +65,8 @@ std::string Expression::ResolveDelay(const mjModel* m, int instance) {
   max_delay_s_ = MaxDelay(m, instance);
   if (!text.empty() && !(max_delay_s_ > 0 && max_delay_s_ <= kLongestDelay_s))
     return Fault(m, instance, "max_delay_s", text, "0 to 10 s, above 0", "leave it out for no delay");
-  if (live_(m, kCommandDelay) > max_delay_s_) {
-    return Fault(m, instance, "command_delay_s", std::to_string(live_(m, kCommandDelay)),
+  if (live_(m, kLateCommand) > max_delay_s_) {
+    return Fault(m, instance, "command_delay_s", std::to_string(live_(m, kLateCommand)),
                  "0 to max_delay_s = " + std::to_string(max_delay_s_) + " s", "raise max_delay_s");
   }
   state_ = m->plugin_stateadr[instance];
@@ -98,7 +98,7 @@ std::string Expression::ResolveFormula(const mjModel* m, int instance) {
 
 std::string Expression::ResolveNames(const mjModel* m, int instance, const std::vector<std::string>& names) {
   const std::string prefix = InstanceName(m, instance) + ".";
-  std::vector<const char*> keys = {kSpecs[kCommandDelay].key};
+  std::vector<const char*> keys = {kSpecs[kLateCommand].key};
   parameters_.resize(names.size());
   for (std::size_t i = 0; i < kFormulaInputCount; ++i) parser_.DefineVar(kFormulaInputs[i], &inputs_[i]);
   for (const std::string& name : names) {
@@ -107,10 +107,11 @@ std::string Expression::ResolveNames(const mjModel* m, int instance, const std::
                    "set <config key=\"actuator\" value=\"...\"/>");
     }
     if (std::find(kFormulaInputs.begin(), kFormulaInputs.end(), name) != kFormulaInputs.end()) continue;
-    const int id = mj_name2id(m, mjOBJ_NUMERIC, (prefix + name).c_str());
+    const std::string full = prefix + name;
+    const int id = mj_name2id(m, mjOBJ_NUMERIC, full.c_str());
     if (id < 0) {
       return Fault(m, instance, "torque", name, "angle, speed, command, time, pi and numerics of the instance",
-                   "add <numeric name=\"" + prefix + name + "\" data=\"...\"/>");
+                   "add <numeric name=\"" + full + "\" data=\"...\"/>");
     }
     parser_.DefineVar(name, &parameters_[addresses_.size()]);
     addresses_.push_back(m->numeric_adr[id]);
@@ -133,7 +134,7 @@ double Expression::Command(const mjModel* m, mjData* d) const {
     history.Open(d->time, 0, 0, &now);
   }
   double mean = 0;
-  history.MeanCommand(std::clamp(live_(m, kCommandDelay), 0.0, max_delay_s_), m->opt.timestep, &mean);
+  history.MeanCommand(std::clamp(live_(m, kLateCommand), 0.0, max_delay_s_), m->opt.timestep, &mean);
   return mean;
 }
 
@@ -142,12 +143,11 @@ void Expression::Compute(const mjModel* m, mjData* d, int) const {
   inputs_ = {d->qpos[angle_address_], d->qvel[dof_], ctrl_address_ < 0 ? 0 : Command(m, d), d->time};
   for (std::size_t i = 0; i < addresses_.size(); ++i) parameters_[i] = m->numeric_data[addresses_[i]];
   // A torque that does not exist ends the simulation as a divergence: nothing is thrown into the engine.
-  double torque = std::numeric_limits<double>::quiet_NaN();
   try {
-    torque = parser_.Eval();
+    d->qfrc_passive[dof_] += parser_.Eval();
   } catch (const mu::Parser::exception_type&) {
+    d->qfrc_passive[dof_] = std::numeric_limits<double>::quiet_NaN();
   }
-  d->qfrc_passive[dof_] += torque;
 }
 
 void Expression::Advance(const mjModel*, mjData* d) const {

@@ -24,7 +24,7 @@ namespace gapscope::plugins {
 class Expression {
  public:
   static constexpr const char* kName = "gapscope.expression";
-  enum Key { kCommandDelay, kKeyCount };
+  enum Key { kLateCommand, kKeyCount };
   static constexpr std::array<ParameterSpec, kKeyCount> kSpecs = {{
       {kFormulaDelay, "s", 0, 0, 10, Combine::kSum, Needs::kHistory, "", true},
   }};

@@ -144,7 +144,7 @@ class Includes {
       GS_ASSIGN(const bool holds, Holds(held, path, wanted, 0));
       if (!holds) continue;
       const std::string inside = Inside(&held, path);
-      xml.Replace(i, XmlComment("gapscope: in place of the include of " + file) + "\n" + inside);
+      xml.Replace(i, XmlComment("gapscope: in place of the include of " + file).append("\n").append(inside));
       return xml.Edited();
     }
     const XmlElement& e = before_.at(wanted);

@@ -12,7 +12,7 @@
 namespace gapscope {
 namespace {
 
-constexpr double kRelative = 1e-4;
+constexpr double kAlike = 1e-4;
 constexpr double kOfLargest = 1e-9;  // a number beside the largest of its kind: what arithmetic leaves of zero
 
 // Derived from the others, drawn, an index that names stand for (plugins), what a command is called (ctrlspec), or
@@ -32,9 +32,8 @@ bool Same(const T* a, const T* b, mjtSize count) {
   for (mjtSize i = 0; i < count; ++i) largest = std::max(largest, std::abs(static_cast<double>(a[i])));
   return std::equal(a, a + count, b, [&](T x, T y) {
     const double l = static_cast<double>(x), r = static_cast<double>(y);
-    return x == y ||
-           (std::is_floating_point_v<T> &&
-            std::abs(l - r) <= std::max(kOfLargest * largest, kRelative * std::max(std::abs(l), std::abs(r))));
+    return x == y || (std::is_floating_point_v<T> &&
+                      std::abs(l - r) <= std::max(kOfLargest * largest, kAlike * std::max(std::abs(l), std::abs(r))));
   });
 }
 

@@ -274,7 +274,8 @@ std::string XmlText::IndentOfChildren(int parent) const {
   };
   if (const XmlElement* child = of_own_line(parent)) return Indent(child->begin);
   const XmlElement* section = of_own_line(0);
-  const std::string step = section ? Indent(section->begin).substr(Indent(elements_[0].begin).size()) : "";
+  const std::string root = Indent(elements_[0].begin), own = section ? Indent(section->begin) : "";
+  const std::string step = own.starts_with(root) ? own.substr(root.size()) : "";
   return Indent(elements_[parent].begin) + (step.empty() ? "  " : step);
 }
 

@@ -70,6 +70,9 @@ TEST(XmlTextTest, OneLineAndWindowsLineEnds) {
   XmlText windows = Parsed("<m>\r\n <b>\r\n </b>\r\n</m>\r\n");
   windows.AddChild(1, XmlText::Place::kLast, {"<k/>"});
   EXPECT_EQ(windows.Edited(), "<m>\r\n <b>\r\n  <k/>\r\n </b>\r\n</m>\r\n");
+  XmlText outdented = Parsed("  <m>\n<b>\n</b>\n  </m>");
+  outdented.AddChild(1, XmlText::Place::kLast, {"<k/>"});
+  EXPECT_EQ(outdented.Edited(), "  <m>\n<b>\n  <k/>\n</b>\n  </m>");
 }
 
 TEST(XmlTextTest, WhatIsNoXmlIsRefusedWithItsLine) {

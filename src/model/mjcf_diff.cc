@@ -83,11 +83,6 @@ class Differ {
     if (!changed.attributes.empty() || was.tag != is.tag) diff_.changed.push_back(std::move(changed));
     if (is.tag == "option") return;
     for (const int child : is.children) Child(b, child);
-    for (const int child : was.children) {
-      const bool kept =
-          std::any_of(is.children.begin(), is.children.end(), [&](int c) { return Match(b, c) == child; });
-      if (!kept) diff_.removed.push_back(child);
-    }
   }
 
   const XmlText &before_, &after_;

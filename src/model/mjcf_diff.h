@@ -20,7 +20,6 @@ struct MjcfDiff {
   };
   std::vector<Changed> changed;
   std::vector<Added> added;
-  std::vector<int> removed;
 };
 // Of the sections that a model's motion depends on and an effect may change.
 MjcfDiff DiffMjcf(const XmlText& before, const XmlText& after);

@@ -10,7 +10,10 @@
 #include "src/core/file.h"
 #include "src/core/names.h"
 #include "src/report/apply_report.h"
+#include "src/report/diagnose_report.h"
 #include "src/report/read_run.h"
+#include "src/report/replay_report.h"
+#include "src/report/tune_report.h"
 
 namespace gapscope::cli {
 namespace {
@@ -20,20 +23,21 @@ struct ApplyFlags {
   std::string result, experiment;
 };
 
-// The experiment of a result: what is given, else what it names itself.
-Result<Experiment> ExperimentOf(const ApplyFlags& flags, const nlohmann::ordered_json& json) {
-  const std::vector<std::string> schemas = {"gapscope.diagnosis/1", "gapscope.tune/1", "gapscope.replay/1"};
+Status CheckSchema(const nlohmann::ordered_json& json, const std::string& where) {
+  const std::vector<std::string> schemas = {kDiagnosisSchema, kTuneSchema, kReplaySchema};
   const std::string schema = json.is_object() && json.contains("schema") ? json["schema"].dump() : "none";
   const bool known =
       std::any_of(schemas.begin(), schemas.end(), [&](const std::string& one) { return schema == '"' + one + '"'; });
-  if (!known) {
-    return Error{.what = "not a result that an MJCF can be changed by",
-                 .where = flags.result,
-                 .actual = "schema " + schema,
-                 .allowed = "a result of diagnose, tune or replay: " + Join(schemas)};
-  }
+  if (known) return Ok();
+  return Error{.what = "not a result that an MJCF can be changed by",
+               .where = where,
+               .actual = "schema " + schema,
+               .allowed = "a result of diagnose, tune or replay: " + Join(schemas)};
+}
+
+// What is given, else what the result names itself.
+Result<Experiment> ExperimentOf(const ApplyFlags& flags, const RunModel& held) {
   if (!flags.experiment.empty()) return LoadExperiment(flags.experiment);
-  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.result));
   constexpr char kCure[] = "give it: --experiment FILE";
   if (held.experiment.empty())
     return Error{.what = "the result does not name its experiment", .where = flags.result, .cure = kCure};
@@ -49,10 +53,12 @@ Result<Experiment> ExperimentOf(const ApplyFlags& flags, const nlohmann::ordered
 
 Result<int> RunApply(const ApplyFlags& flags) {
   GS_ASSIGN(const nlohmann::ordered_json json, ReadJson(flags.result));
-  GS_ASSIGN(const Experiment experiment, ExperimentOf(flags, json));
+  GS_RETURN_IF_ERROR(CheckSchema(json, flags.result));
+  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.result));
+  GS_ASSIGN(const Experiment experiment, ExperimentOf(flags, held));
   GS_ASSIGN(std::shared_ptr<const Rig> rig, Rig::Load(experiment));
   // Scales bound effects; they do not make their values.
-  GS_ASSIGN(const ResultModel result, LoadResultModel(rig, flags.result, {}));
+  GS_ASSIGN(const ResultModel result, BuildRunModel(rig, held, flags.result, {}));
   const ApplyOptions options{.out = flags.common.out, .notes = NotesOf(json, *result.model, result.values)};
   GS_ASSIGN(const AppliedMjcf applied, ApplyToMjcf(*result.model, result.values, options));
   GS_RETURN_IF_ERROR(WriteFile(flags.common.out, applied.text));

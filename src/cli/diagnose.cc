@@ -91,10 +91,10 @@ std::set<std::filesystem::path> FilesOf(const std::vector<std::string>& paths) {
 
 // An earlier diagnosis must be of this experiment and these logs: sizes that other data gave are --set's.
 Status CheckSameData(const EarlierDiagnosis& earlier, const DiagnoseFlags& flags) {
-  if (FilesOf({earlier.experiment}) != FilesOf({flags.model.experiment}))
+  if (FilesOf({earlier.model.experiment}) != FilesOf({flags.model.experiment}))
     return Error{.what = "a diagnosis of another experiment",
                  .where = "--from " + flags.from,
-                 .actual = earlier.experiment,
+                 .actual = earlier.model.experiment,
                  .allowed = flags.model.experiment};
   std::vector<std::string> given = flags.model.logs, then = earlier.train_logs;
   given.insert(given.end(), flags.hold_out.begin(), flags.hold_out.end());

@@ -1,6 +1,5 @@
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
@@ -21,11 +20,10 @@ struct ExplainFlags {
 };
 
 // The page draws the held-out logs' windows by the model with the effect and by the one without it.
-Status WriteExplanation(const ExplainFlags& flags, const EarlierDiagnosis& earlier, const std::string& while_column,
-                        const ExplainRun& run) {
+Status WriteExplanation(const ExplainFlags& flags, const EarlierDiagnosis& earlier, const ExplainRun& run) {
   ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
-  GS_ASSIGN(Experiment experiment, LoadExperiment(earlier.experiment));
-  experiment.replay.while_column = while_column;
+  GS_ASSIGN(Experiment experiment, LoadExperiment(earlier.model.experiment));
+  experiment.replay.while_column = earlier.while_column;
   experiment.replay.mode = ReplayMode::kWindows;
   GS_ASSIGN(const auto recordings, LoadRecordings(experiment, earlier.held_out_logs, pool));
   GS_ASSIGN(const auto bare, Model::Load(experiment));
@@ -58,7 +56,7 @@ Result<int> RunExplain(const ExplainFlags& flags) {
                    .where = "--out",
                    .cure = "leave --out away, or take a statement that has `numbers`"};
     }
-    GS_RETURN_IF_ERROR(WriteExplanation(flags, earlier, json.value("while", ""), run));
+    GS_RETURN_IF_ERROR(WriteExplanation(flags, earlier, run));
   }
   fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToText(run));
   return kDone;

@@ -192,6 +192,11 @@ Result<Field> TendonField(const mjModel& m, const std::string& name, const std::
 
 }  // namespace
 
+std::string ElementOfField(const std::string& field) {
+  const std::size_t first = field.find('/'), last = field.rfind('/');
+  return field.substr(first + 1, last > first ? last - first - 1 : std::string::npos);
+}
+
 Result<Field> ResolveField(const mjModel& m, const std::string& text, const std::string& where) {
   const std::size_t first = text.find('/'), last = text.rfind('/');
   const std::string kind = text.substr(0, first);
@@ -201,7 +206,7 @@ Result<Field> ResolveField(const mjModel& m, const std::string& text, const std:
                  .actual = "'" + text + "'",
                  .allowed = "KIND/NAME/FIELD, numeric/NAME or option/gravity"};
   }
-  const std::string name = text.substr(first + 1, last > first ? last - first - 1 : std::string::npos);
+  const std::string name = ElementOfField(text);
   const std::string field = last > first ? text.substr(last + 1) : "";
   if (kind == "option" && name == "gravity") return Gravity(m);
   if (kind == "numeric") return NumericField(m, text.substr(first + 1), where);

@@ -36,6 +36,9 @@ inline double ReadComponent(const mjModel& model, const std::vector<FieldSlot>& 
   const char* base = slot.in_options ? reinterpret_cast<const char*>(&model.opt) : static_cast<char*>(model.buffer);
   return *reinterpret_cast<const mjtNum*>(base + slot.offset) / slot.factor;
 }
+// NAME of KIND/NAME/FIELD.
+std::string ElementOfField(const std::string& field);
+
 // Writes one component.
 inline void WriteComponent(mjModel& model, const std::vector<FieldSlot>& slots, double value) {
   for (const FieldSlot& slot : slots) {

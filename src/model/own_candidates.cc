@@ -133,9 +133,8 @@ std::vector<EffectParameter> ParametersOf(const OwnEffect& own, Probe& probe) {
     const auto role = p.role.value_or(IsSame(probe.Alone(i), neutral) ? ParameterRole::kPlace : ParameterRole::kSize);
     const bool size = role == ParameterRole::kSize,
                linear = size && p.neutral == 0 && IsLinear(probe, i, Probe::Moved(p));
-    ranked.push_back({linear ? 0
-                      : size ? 1
-                             : 2,
+    const int rank = linear ? 0 : size ? 1 : 2;
+    ranked.push_back({rank,
                       {.key = p.key,
                        .unit = p.unit,
                        .role = role,
@@ -163,11 +162,6 @@ void Couple(const OwnEffect& own, Probe& probe, std::vector<EffectParameter>* pa
   for (EffectParameter& p : *parameters) {
     if (p.role == ParameterRole::kPlace) p.with = ActsWith(probe, index(p.key), own.parameters[index(p.key)]);
   }
-}
-
-std::string ElementOf(const std::string& field) {
-  const std::size_t first = field.find('/'), last = field.rfind('/');
-  return field.substr(first + 1, last > first ? last - first - 1 : std::string::npos);
 }
 
 // Forces of a joint that its own motion makes.
@@ -292,7 +286,7 @@ Result<Effect> MakeEffect(const OwnEffect& own, const Rig& rig) {
                 .parameters = ParametersOf(own, probe),
                 .meaning = own.meaning.empty() ? "a candidate of the experiment file" : own.meaning,
                 .of_motion = IsOfMotion(own),
-                .on = torque ? own.joint : ElementOf(own.settings.front().field)};
+                .on = torque ? own.joint : ElementOfField(own.settings.front().field)};
   effect.signature =
       torque ? "torque " + own.torque : own.settings.front().field + " = " + Join(own.settings.front().expressions);
   Couple(own, probe, &effect.parameters);

@@ -69,10 +69,10 @@ Statement StatementFrom(const ordered_json& json) {
 
 EarlierDiagnosis DiagnosisFrom(const ordered_json& json) {
   const auto& logs = json.at("logs");
-  return {.experiment = json.at("experiment"),
-          .train_logs = logs.at("train"),
+  return {.train_logs = logs.at("train"),
           .held_out_logs = logs.at("held_out"),
-          .model = RunModelFrom(json.at("model")),
+          .while_column = json.value("while", ""),
+          .model = ResultModelFrom(json),
           .statements = Collect(json.at("statements"), StatementFrom)};
 }
 

@@ -11,9 +11,9 @@
 namespace gapscope {
 
 struct EarlierDiagnosis {
-  std::string experiment;  // path, as it was given
   std::vector<std::string> train_logs, held_out_logs;
-  RunModel model;                     // the final one
+  std::string while_column;           // rows were used until it fell to zero; empty: all
+  RunModel model;                     // the final one, which names the experiment
   std::vector<Statement> statements;  // in the result's order; sizes without their units
 };
 

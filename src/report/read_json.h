@@ -17,6 +17,8 @@ inline double NumberFrom(const nlohmann::ordered_json& json) { return json.is_nu
 
 // As JsonModel wrote it.
 RunModel RunModelFrom(const nlohmann::ordered_json& json);
+// The model of a whole result, with the experiment that the result names.
+RunModel ResultModelFrom(const nlohmann::ordered_json& result);
 
 template <class Read>
 auto ReadGuarded(const Read& read, const std::string& where, const char* allowed) -> Result<decltype(read())> {

@@ -13,12 +13,6 @@ using nlohmann::ordered_json;
 
 double NumberAt(const ordered_json& json, const char* key) { return NumberFrom(json.at(key)); }
 
-RunModel OwnModelFrom(const ordered_json& result) {
-  RunModel model = RunModelFrom(result.at("model"));
-  model.experiment = result.value("experiment", "");
-  return model;
-}
-
 SignalScore ScoreFrom(const std::string& signal, const ordered_json& json) {
   return {.signal = signal,
           .rmse = NumberAt(json, "rmse"),
@@ -85,7 +79,7 @@ TuneRun TuneRunFrom(const ordered_json& json) {
       .held_out_by = json.at("held_out_by"),
       .train = LogsFrom(json.at("train")),
       .held_out = LogsFrom(json.at("held_out")),
-      .model = OwnModelFrom(json),
+      .model = ResultModelFrom(json),
       .time_step_s = NumberAt(json, "time_step_s"),
       .command_shift_s = NumberAt(json, "command_shift_s"),
   };
@@ -99,6 +93,12 @@ RunModel RunModelFrom(const ordered_json& json) {
   RunModel model;
   for (const auto& effect : json.at("effects")) model.effects.push_back({effect.at("name"), effect.at("on")});
   for (const auto& [name, value] : json.at("values").items()) model.values.emplace_back(name, NumberFrom(value));
+  return model;
+}
+
+RunModel ResultModelFrom(const ordered_json& result) {
+  RunModel model = RunModelFrom(result.at("model"));
+  model.experiment = result.value("experiment", "");
   return model;
 }
 
@@ -116,12 +116,12 @@ Result<RunModel> ReadRunModel(const ordered_json& json, const std::string& where
   constexpr char kAllowed[] = "a result of gapscope replay, tune or diagnose";
   if (!json.is_object() || !json.contains("model"))
     return Error{.what = "not a result of a model: it has no 'model'", .where = where, .allowed = kAllowed};
-  return ReadGuarded([&] { return OwnModelFrom(json); }, where, kAllowed);
+  return ReadGuarded([&] { return ResultModelFrom(json); }, where, kAllowed);
 }
 
 Result<TuneRun> ReadTuneRun(const ordered_json& json, const std::string& where) {
   const auto read = [&] { return TuneRunFrom(json); };
-  return ReadGuarded(read, where, "gapscope.tune/1");
+  return ReadGuarded(read, where, kTuneSchema);
 }
 
 }  // namespace gapscope

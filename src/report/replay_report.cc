@@ -81,7 +81,7 @@ ReplayRun ReplayRunOf(const Model& model, std::span<const double> values, Replay
 ordered_json ToJson(const ReplayRun& run, Timing timing) {
   const ReplayResult& result = run.result;
   ordered_json json = {
-      {"schema", "gapscope.replay/1"},
+      {"schema", kReplaySchema},
       {"mode", NameOf(result.mode)},
       {"error", JsonNumber(run.comparison.error)},
       {result.mode == ReplayMode::kWindows ? "error_free_run" : "error_windows", JsonNumber(run.other_error)},

@@ -30,6 +30,7 @@ struct ReplayRun {
 // The parts that come from the model. `values` as model.Nominal().
 ReplayRun ReplayRunOf(const Model& model, std::span<const double> values, ReplayResult result, Comparison comparison);
 
+inline constexpr const char* kReplaySchema = "gapscope.replay/1";
 nlohmann::ordered_json ToJson(const ReplayRun& run, Timing timing = Timing::kInclude);
 // At most 100 columns.
 std::string ToTable(const ReplayRun& run, const Console& console = {});

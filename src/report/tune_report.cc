@@ -161,7 +161,7 @@ ordered_json JsonErrors(const TuneRun& run) {
 }
 
 ordered_json ToJson(const TuneRun& run, Timing timing) {
-  ordered_json json = {{"schema", "gapscope.tune/1"},    {"optimizer", run.optimizer},
+  ordered_json json = {{"schema", kTuneSchema},          {"optimizer", run.optimizer},
                        {"termination", run.termination}, {"starts_agree", run.starts_agree},
                        {"starts", run.starts},           {"cost", run.cost},
                        {"evaluations", run.evaluations}, {"replays", run.replays}};

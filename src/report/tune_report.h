@@ -54,6 +54,7 @@ struct TuneRun {
 };
 TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed);
 
+inline constexpr const char* kTuneSchema = "gapscope.tune/1";
 nlohmann::ordered_json ToJson(const TuneRun& run, Timing timing = Timing::kInclude);
 std::string ToTable(const TuneRun& run, const Console& console = {});
 

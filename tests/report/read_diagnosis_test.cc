@@ -39,7 +39,7 @@ TEST(ReadDiagnosisTest, IsWhatWasWritten) {
   const auto read = ReadDiagnosis(nlohmann::ordered_json::parse(Written().dump()), "here");
   ASSERT_TRUE(read.ok()) << read.error().Text();
   const EarlierDiagnosis& d = read.value();
-  EXPECT_EQ(d.experiment, "qube.yaml");
+  EXPECT_EQ(d.model.experiment, "qube.yaml");
   EXPECT_EQ(d.held_out_logs, std::vector<std::string>{"c.csv"});
   ASSERT_EQ(d.statements.size(), 2u);
   const Statement& friction = d.statements[0];

@@ -7,6 +7,37 @@
 
 namespace gapscope {
 
+namespace {
+
+// Means over the steps between kept rows; the last value is the command's own.
+std::vector<double> MeansOf(const std::vector<double>& fine, const std::vector<double>& time_s,
+                            const std::vector<std::size_t>& kept) {
+  std::vector<double> means = Collect(kept, [&](std::size_t row) { return fine[row]; });
+  for (std::size_t k = 0; k + 1 < kept.size(); ++k) {
+    double sum = 0;
+    for (std::size_t row = kept[k]; row < kept[k + 1]; ++row) sum += fine[row] * (time_s[row + 1] - time_s[row]);
+    means[k] = sum / (time_s[kept[k + 1]] - time_s[kept[k]]);
+  }
+  return means;
+}
+
+// A mean that is held for its step flattens what varies faster than the steps, once by the mean and once by the hold:
+// at f by sinc(f step)^2, half a percent at 10 Hz and 4 ms, which is more than encoders miss. A twelfth of the second
+// difference gives it back to second order; no further than the command itself goes there, so that jumps stay jumps.
+std::vector<double> Sharpened(const std::vector<double>& means, const std::vector<double>& fine,
+                              const std::vector<std::size_t>& kept) {
+  std::vector<double> sharp = means;
+  for (std::size_t k = 1; k + 2 < kept.size(); ++k) {
+    const auto from = fine.begin() + static_cast<std::ptrdiff_t>(kept[k - 1]);
+    const auto to = fine.begin() + static_cast<std::ptrdiff_t>(kept[k + 2]);
+    const auto [low, high] = std::minmax_element(from, to);
+    sharp[k] = std::clamp(means[k] - (means[k + 1] - 2 * means[k] + means[k - 1]) / 12, *low, *high);
+  }
+  return sharp;
+}
+
+}  // namespace
+
 Recording Coarsen(const Recording& recording, double least_step_s) {
   // A drive's torque follows its command at once: under the mean of a few commands it would seem to be late.
   const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
@@ -28,13 +59,7 @@ Recording Coarsen(const Recording& recording, double least_step_s) {
   for (auto& measured : coarse.measured) measured.values = pick(measured.values);
   for (auto& command : coarse.commands) {
     const std::vector<double> fine = command.values;
-    command.values = pick(fine);
-    for (std::size_t k = 0; k + 1 < kept.size(); ++k) {
-      double sum = 0;
-      for (std::size_t row = kept[k]; row < kept[k + 1]; ++row)
-        sum += fine[row] * (recording.time_s[row + 1] - recording.time_s[row]);
-      command.values[k] = sum / (coarse.time_s[k + 1] - coarse.time_s[k]);
-    }
+    command.values = Sharpened(MeansOf(fine, recording.time_s, kept), fine, kept);
   }
   std::vector<double> steps;
   for (std::size_t k = 0; k + 1 < kept.size(); ++k) steps.push_back(coarse.time_s[k + 1] - coarse.time_s[k]);

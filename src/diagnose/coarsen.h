@@ -8,8 +8,8 @@
 namespace gapscope {
 
 // Keeps stamps at least `least_step_s` apart. Measured values are those of the kept stamps; a command becomes its mean
-// over the time until the next kept stamp, which keeps its impulse. Of the timeline only the median step follows. A log
-// with a scored torque is left as it is.
+// over the time until the next kept stamp, which keeps its impulse, sharpened by what means and their holding flatten.
+// Of the timeline only the median step follows. A log with a scored torque is left as it is.
 Recording Coarsen(const Recording& recording, double least_step_s);
 
 }  // namespace gapscope

@@ -75,14 +75,25 @@ LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
   const auto of_force = [](const Recording::Measured& m) {
     return TraitsOf(m.spec.kind).stage == SignalStage::kForces;
   };
+  std::set<std::string> signals;
+  for (const Recording& recording : recordings) {
+    for (const auto& measured : recording.measured) {
+      if (measured.spec.scored) signals.insert(measured.spec.signal);
+    }
+  }
   return {.one = std::all_of(recordings.begin(), recordings.end(),
                              [&](const Recording& r) {
                                return r.measured.size() == 1 &&
                                       std::count_if(r.commands.begin(), r.commands.end(), changes) <= 1;
                              }),
-          .torque = std::any_of(recordings.begin(), recordings.end(), [&](const Recording& r) {
-            return std::any_of(r.measured.begin(), r.measured.end(), of_force);
-          })};
+          .torque = std::any_of(
+              recordings.begin(), recordings.end(),
+              [&](const Recording& r) { return std::any_of(r.measured.begin(), r.measured.end(), of_force); }),
+          .signals = std::move(signals)};
+}
+
+bool IsOfMissingSensor(const EffectUse& use, const Rig& rig, const LoggedSignals& logged) {
+  return EffectOf(use, rig).place == EffectPlace::kSignal && use.on != kOnAll && !logged.signals.contains(use.on);
 }
 
 bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, const LoggedSignals& logged) {

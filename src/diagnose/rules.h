@@ -2,6 +2,10 @@
 #ifndef GAPSCOPE_DIAGNOSE_RULES_H_
 #define GAPSCOPE_DIAGNOSE_RULES_H_
 
+#include <set>
+#include <string>
+#include <vector>
+
 #include "src/experiment/recording.h"
 #include "src/model/model.h"
 
@@ -16,10 +20,13 @@ bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig,
 
 // What the logs hold, as far as it makes effects one.
 struct LoggedSignals {
-  bool one = false;     // one command that changes (a constant supply does not) and one signal are all
-  bool torque = false;  // a drive's torque is measured: a constant load on a servo shows
+  bool one = false;                    // one command that changes (a constant supply does not) and one signal are all
+  bool torque = false;                 // a drive's torque is measured: a constant load on a servo shows
+  std::set<std::string> signals = {};  // that are scored in any log
 };
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings);
+// Whether the effect is a sensor's whose signal no log has, or none that is scored.
+bool IsOfMissingSensor(const EffectUse& use, const Rig& rig, const LoggedSignals& logged);
 // Whether the two are the same motion on such logs, whatever their fits cost: a late command and a late sensor where
 // that sensor is all that is measured, or where all commands, and all sensors, are late alike; Coulomb friction and
 // friction by direction on a joint that a servo or a spring holds, apart by a zero offset.

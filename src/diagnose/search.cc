@@ -56,7 +56,8 @@ class Searcher {
     result_.chosen = result_.base;
     for (const auto& use : AllUses(*bench_.rig)) {
       const bool known = std::find(bench_.known.begin(), bench_.known.end(), use) != bench_.known.end();
-      if (!known && IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
+      if (known || IsOfMissingSensor(use, *bench_.rig, result_.logged)) continue;
+      if (IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
     }
     return Ok();
   }

@@ -217,8 +217,8 @@ LocalFit FitLocally(const Recording& recording, const Recording::Measured& measu
   // A slope that the samples cannot tell from rest is rest: at a log's first row the fit is one-sided and weak.
   constexpr double kSignificant = 2;
   if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(measured.values[row]))
-    return {measured.values[row], 0};
-  return {fit[0], fit[1] / scale};
+    return {measured.values[row], 0, std::sqrt(scatter), scale};
+  return {fit[0], fit[1] / scale, std::sqrt(scatter), scale};
 }
 
 }  // namespace gapscope

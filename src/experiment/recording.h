@@ -49,6 +49,8 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
 // count, or by so little way beside the next 40 ms that motion had only begun.
 struct LocalFit {
   double value = 0, slope = 0;
+  // Standard deviation of the samples about it, and how far they lie to either side; 0: there is no fit.
+  double scatter = 0, half_width_s = 0;
 };
 LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
                     double half_width_s);

@@ -35,6 +35,43 @@ TEST(CoarsenTest, KeepsSamplesAndImpulse) {
   EXPECT_DOUBLE_EQ(coarse.timeline.median_step_s, 0.004);
 }
 
+// Where a mass is under the command, at the kept stamps; its second differences are those of 10 Hz alone.
+double SwingOfAMass(const Recording& r) {
+  std::vector<double> way;
+  double position = 0, speed = 0;
+  for (std::size_t k = 0; k + 1 < r.rows(); ++k) {
+    const double step = r.time_s[k + 1] - r.time_s[k], u = r.commands[0].values[k];
+    position += speed * step + 0.5 * u * step * step;
+    speed += u * step;
+    if (std::abs(std::remainder(r.time_s[k + 1], 0.004)) < 1e-9) way.push_back(position);
+  }
+  double squares = 0;
+  for (std::size_t k = 25; k < 75; ++k) squares += std::pow(way[k + 1] - 2 * way[k] + way[k - 1], 2);  // two periods
+  return std::sqrt(squares);
+}
+
+// A mean that is held would move it half a percent less.
+TEST(CoarsenTest, MovesAMassAsTheCommandItselfDoes) {
+  std::vector<double> time, command;
+  for (int i = 0; i <= 400; ++i) {
+    time.push_back(0.001 * i);
+    command.push_back(std::cos(2 * M_PI * 10 * time.back()));
+  }
+  const Recording fine = MakeRecording(time, command, command);
+  EXPECT_NEAR(SwingOfAMass(Coarsen(fine, 0.004)) / SwingOfAMass(fine), 1, 3e-4);
+}
+
+// Sharpening goes no further than the command goes.
+TEST(CoarsenTest, LeavesJumpsAsTheyAre) {
+  std::vector<double> time, command;
+  for (int i = 0; i <= 40; ++i) {
+    time.push_back(0.001 * i);
+    command.push_back(i < 16 ? 0 : 5);
+  }
+  const Recording coarse = Coarsen(MakeRecording(time, command, command), 0.004);
+  for (std::size_t k = 0; k < coarse.rows(); ++k) EXPECT_EQ(coarse.commands[0].values[k], k < 4 ? 0 : 5) << k;
+}
+
 // A missed row holds the old command for longer: it weighs by its time.
 TEST(CoarsenTest, WeighsByTime) {
   const Recording fine = MakeRecording({0, 0.001, 0.004, 0.005, 0.006, 0.009}, {8, 4, 1, 1, 1, 1}, {0, 1, 4, 5, 6, 9});

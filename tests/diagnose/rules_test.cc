@@ -124,6 +124,20 @@ TEST(BoundTest, LiesAtTheEndOfARange) {
   EXPECT_EQ(BoundOf(1.999, -2, 2), OnBound::kHigh);
 }
 
+TEST(RulesTest, ASensorThatIsNotLoggedHasNoEffect) {
+  const Rig rig = LoadRig("joint");
+  Recording log;
+  log.measured.resize(2);
+  log.measured[0].spec = {.signal = "position_rad", .scored = true};
+  log.measured[1].spec = {.signal = "torque_n_m", .scored = false};
+  const LoggedSignals logged = WhatIsLogged({log});
+  const auto& known = *rig.model->rig();
+  EXPECT_FALSE(IsOfMissingSensor({"sensor_delay", "position_rad"}, known, logged));
+  EXPECT_TRUE(IsOfMissingSensor({"sensor_delay", "velocity_rad_per_s"}, known, logged));
+  EXPECT_TRUE(IsOfMissingSensor({"sensor_delay", "torque_n_m"}, known, logged)) << "not scored";
+  EXPECT_FALSE(IsOfMissingSensor({"command_delay", "motor"}, known, logged));
+}
+
 TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {
   Recording servo;
   servo.measured.resize(1);

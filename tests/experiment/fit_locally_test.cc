@@ -35,7 +35,25 @@ TEST(FitLocallyTest, AParabolaIsExactEverywhere) {
     const LocalFit fit = Fit(r, row);
     EXPECT_NEAR(fit.value, y(t), 1e-12) << row;
     EXPECT_NEAR(fit.slope, -2 + 6 * t, 1e-9) << row;
+    EXPECT_NEAR(fit.scatter, 0, 1e-6) << row;
   }
+}
+
+// Of noise its deviation; of a cubic, by Legendre's polynomials on -h .. h, a h^3 sqrt(4 / 175) beside a slope that is
+// off by 3/5 a h^2.
+TEST(FitLocallyTest, ScatterIsWhatAParabolaLeaves) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal(0, 0.01);
+  const Recording noisy = Sampled(4001, 0.00025, [&](double) { return normal(random); });
+  double squares = 0;
+  for (std::size_t row = 500; row < 3500; row += 100) squares += std::pow(Fit(noisy, row).scatter, 2) / 30;
+  EXPECT_NEAR(std::sqrt(squares), 0.01, 0.0005);
+  const Recording cubic = Sampled(4001, 0.00025, [](double t) { return 1e4 * std::pow(t - 0.5, 3); });
+  const LocalFit fit = Fit(cubic, 2000);
+  EXPECT_NEAR(fit.half_width_s, kHalfWidth_s, 0.00025 * 1.001);
+  const double edge = 1e4 * std::pow(kHalfWidth_s, 3);
+  EXPECT_NEAR(fit.scatter / (edge * std::sqrt(4.0 / 175)), 1, 0.03);
+  EXPECT_NEAR(fit.slope / (0.6 * edge / kHalfWidth_s), 1, 0.03);
 }
 
 TEST(FitLocallyTest, IrregularStampsChangeNothing) {

@@ -52,28 +52,6 @@ Result<Hypothesis> MakeRival(const DesignRig& rig, const EffectUse& use, const S
   return Hypothesis{.name = use.Text(), .model = model, .values = std::move(values)};
 }
 
-std::string ReproducingCommand(const OptimalFlags& flags, const InputScore& best) {
-  const Waveform& w = best.wave;
-  std::string text = fmt::format("gapscope design {} {} --duration {:g} --rate {:g} --amplitude {:.6g}",
-                                 w.shape == WaveShape::kChirp ? "sweep" : NameOf(w.shape), flags.rig.experiment,
-                                 w.duration_s, flags.rig.rate_hz, best.amplitude);
-  switch (w.shape) {
-    case WaveShape::kChirp:
-    case WaveShape::kMultisine:
-      text += fmt::format(" --low-hz {:.6g} --high-hz {:.6g}", w.low_hz, w.high_hz);
-      break;
-    case WaveShape::kSteps:
-      text += fmt::format(" --hold-s {:.6g} --seed {}", 1 / (2 * w.low_hz), w.seed);
-      break;
-    default:
-      text += fmt::format(" --period {:.6g}", 1 / w.low_hz);
-  }
-  for (const auto& [flag, list] : {std::pair{"--value", &flags.rig.value}, {"--hold", &flags.rig.hold}}) {
-    for (const auto& item : *list) text += fmt::format(" {} {}", flag, item);
-  }
-  return text + " --out input.csv";
-}
-
 // The input that tells --separate's effects apart.
 Result<OptimalDesign> DesignToSeparate(const OptimalFlags& flags, const DesignRig& rig, const Hypothesis& base,
                                        const OptimalOptions& options, ThreadPool& pool) {
@@ -129,11 +107,12 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
   GS_RETURN_IF_ERROR(
       WriteInput(flags.rig.out, InputCsv(rig.experiment, design.inputs.front().rehearsal), flags.rig.common.quiet));
   using Purpose = OptimalRun::Purpose;
-  const OptimalRun run{.info = {.seed = flags.rig.common.seed},
-                       .purpose = flags.parameters.empty() ? Purpose::kEffects : Purpose::kParameters,
-                       .design = design,
-                       .unit = rig.unit,
-                       .command = ReproducingCommand(flags, design.inputs.front())};
+  const OptimalRun run{
+      .info = {.seed = flags.rig.common.seed},
+      .purpose = flags.parameters.empty() ? Purpose::kEffects : Purpose::kParameters,
+      .design = design,
+      .unit = rig.unit,
+      .command = CommandFor(flags.rig.experiment, rig.rehearsal, design.inputs.front()) + " --out input.csv"};
   fmt::print("{}", flags.rig.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }

@@ -73,6 +73,7 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
   source.values = diagnosis.nominal_values;
   source.parameters = diagnosis.model->parameters();
   files.report = &source;
+  files.next_experiment = diagnosis.next.input_csv;
   return WriteRun(out, ToJson(run), files);
 }
 
@@ -263,7 +264,7 @@ Command DiagnoseCommand() {
           .options = Join({LogOptions(flags->model),
                            EffectOptions(flags->model),
                            own,
-                           {FolderOption(flags->common, "result.json, report.html and model.xml")},
+                           {FolderOption(flags->common, "result.json, report.html, model.xml and next_experiment.csv")},
                            CommonOptions(flags->common)}),
           .example = "gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis",
           .run = [flags] { return RunDiagnose(*flags); }};

@@ -1,5 +1,7 @@
 #include "src/design/optimal.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -97,10 +99,20 @@ double Relative(const SearchSpace& space, std::size_t k, double deviation) {
   return value != 0 ? deviation * c.scale / std::abs(value) : deviation / (c.high - c.low);
 }
 
+// Whether it has all effects of the other one, and more.
+bool HasMore(const Hypothesis& rival, const Hypothesis& other) {
+  const auto& more = rival.model->effects();
+  const auto& less = other.model->effects();
+  return more.size() > less.size() && std::all_of(less.begin(), less.end(), [&](const EffectUse& use) {
+           return std::find(more.begin(), more.end(), use) != more.end();
+         });
+}
+
 // Each rival's log on this input, imitated by every other one.
-void Separate(const std::vector<Hypothesis>& rivals, int jacobians, InputScore* score) {
+void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& options, int jacobians, InputScore* score) {
   const Recording& input = score->rehearsal.recording;
-  const std::vector<double> floors = FloorsOf(input);
+  std::vector<double> floors = options.floors.empty() ? FloorsOf(input) : options.floors;
+  floors.resize(input.measured.size(), 1);  // of limits, which are not scored
   score->per_target.clear();
   score->score = kInfinity;
   for (const Hypothesis& truth : rivals) {
@@ -108,8 +120,14 @@ void Separate(const std::vector<Hypothesis>& rivals, int jacobians, InputScore* 
     const Rehearsal foretold = Rehearse(*truth.model, simulator, input, truth.values);
     for (const Hypothesis& imitation : rivals) {
       if (&truth == &imitation) continue;
+      if (HasMore(imitation, truth)) {
+        score->per_target.push_back(0);
+        continue;
+      }
       const double distance =
-          foretold.worst < kInfinity ? ForetoldFit(imitation, foretold.recording, floors).Misfit(jacobians) : kInfinity;
+          foretold.worst < kInfinity
+              ? ForetoldFit(imitation, foretold.recording, floors, options.window_s).Misfit(jacobians)
+              : kInfinity;
       // What cannot be simulated separates nothing.
       score->per_target.push_back(std::isfinite(distance) ? distance : 0);
       score->score = std::min(score->score, score->per_target.back());
@@ -189,16 +207,39 @@ Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<
   }
   GS_ASSIGN(auto sized, SizeInputs(models, options, pool));
   pool.ForEach(sized.size(), [&](std::size_t i, int) {
-    if (sized[i]) Separate(rivals, kRoughJacobians, &*sized[i]);
+    if (sized[i]) Separate(rivals, options, kRoughJacobians, &*sized[i]);
   });
   for (auto next = WorthRefining(sized, options.batch); !next.empty(); next = WorthRefining(sized, options.batch)) {
     pool.ForEach(next.size(), [&](std::size_t i, int) {
-      Separate(rivals, kJacobians, next[i]);
+      Separate(rivals, options, kJacobians, next[i]);
       next[i]->refined = true;
     });
   }
   SortByScore(sized, &design);
   return design;
+}
+
+std::string CommandFor(const std::string& experiment, const RehearsalOptions& rehearsal, const InputScore& input) {
+  const Waveform& w = input.wave;
+  std::string text = fmt::format("gapscope design {} {} --duration {:g} --rate {:g} --amplitude {:.6g}",
+                                 w.shape == WaveShape::kChirp ? "sweep" : NameOf(w.shape), experiment, w.duration_s,
+                                 rehearsal.rate_hz, input.amplitude);
+  switch (w.shape) {
+    case WaveShape::kChirp:
+    case WaveShape::kMultisine:
+      text += fmt::format(" --low-hz {:.6g} --high-hz {:.6g}", w.low_hz, w.high_hz);
+      break;
+    case WaveShape::kSteps:
+      text += fmt::format(" --hold-s {:.6g} --seed {}", 1 / (2 * w.low_hz), w.seed);
+      break;
+    default:
+      text += fmt::format(" --period {:.6g}", 1 / w.low_hz);
+  }
+  if (!rehearsal.actuator.empty()) text += " --actuator " + rehearsal.actuator;
+  for (const auto& [flag, values] : {std::pair{"--value", &rehearsal.log_values}, {"--hold", &rehearsal.hold}}) {
+    for (const auto& [name, value] : *values) text += fmt::format(" {} {}={:g}", flag, name, value);
+  }
+  return text;
 }
 
 }  // namespace gapscope

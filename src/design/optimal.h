@@ -7,7 +7,8 @@
 // "Dynamic System Identification", 1977, ch. 6.
 //
 // Effects: each rival's prediction is imitated by every other one, as `tune` would fit it. What is left, in sensor
-// floors, is how well the input separates the two; the input whose least separated pair is farthest apart wins (Hunter
+// floors, is how well the input separates the two (one that only has more effects imitates it fully, and is not asked);
+// the input whose least separated pair is farthest apart wins (Hunter
 // and Reiner, "Designs for discriminating between two rival models", Technometrics 7, 1965).
 #ifndef GAPSCOPE_DESIGN_OPTIMAL_H_
 #define GAPSCOPE_DESIGN_OPTIMAL_H_
@@ -26,6 +27,8 @@ struct OptimalOptions {
   // Inputs are first scored by rough fits. The best ones, so many at a time, by full ones until none is left that could
   // be better.
   std::size_t batch = 2;
+  std::vector<double> floors;  // per measured signal, SI; empty: FloorsOf
+  double window_s = 0;         // rivals are compared in windows of this length; 0: in one run from rest
 };
 
 struct InputScore {
@@ -60,6 +63,9 @@ Result<OptimalDesign> DesignForParameters(const Hypothesis& base, const std::vec
 // `rivals`: at least two. Errors: as above, and a rival that cannot be simulated.
 Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<Hypothesis>& rivals,
                                       const OptimalOptions& options, ThreadPool& pool);
+
+// The command that makes an input again.
+std::string CommandFor(const std::string& experiment, const RehearsalOptions& rehearsal, const InputScore& input);
 
 }  // namespace gapscope
 

@@ -31,22 +31,29 @@ std::vector<double> WeightsOf(const Recording& log, std::size_t signals, const s
   return weights;
 }
 
-FitOptions OptionsOf(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
-                     double rows_per_reading) {
-  const double half_sample_s = 0.5 * log.timeline.median_step_s;
-  return {.free = hypothesis.model->FreeParameters(),
-          .objective = ObjectiveKind::kFreeRun,
-          .start = WindowStart::kRest,
-          .fit_states = false,
-          .shift_range_s = half_sample_s,
-          .weights = WeightsOf(log, hypothesis.model->sources().size(), floors, rows_per_reading),
-          .prior_share = kFitPolicy.known_share,
-          .prior_offset_rad = kFitPolicy.known_offset_rad,
-          .prior_shift_s = half_sample_s,
-          .linear_terms = true};
-}
-
 double RowsPerReading(const Recording& log) { return std::max(1.0, kNoiseCorrelation_s / log.timeline.median_step_s); }
+
+FitOptions OptionsOf(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
+                     double window_s) {
+  const double half_sample_s = 0.5 * log.timeline.median_step_s;
+  FitOptions options{.free = hypothesis.model->FreeParameters(),
+                     .objective = ObjectiveKind::kFreeRun,
+                     .start = WindowStart::kRest,
+                     .fit_states = false,
+                     .shift_range_s = half_sample_s,
+                     .weights = WeightsOf(log, hypothesis.model->sources().size(), floors, RowsPerReading(log)),
+                     .prior_share = kFitPolicy.known_share,
+                     .prior_offset_rad = kFitPolicy.known_offset_rad,
+                     .prior_shift_s = half_sample_s,
+                     .linear_terms = true};
+  if (window_s > 0) {
+    options.objective = ObjectiveKind::kWindows;
+    options.start = WindowStart::kLog;
+    options.window_s = window_s;
+    options.fit_states = true;
+  }
+  return options;
+}
 
 }  // namespace
 
@@ -72,11 +79,12 @@ std::vector<double> FloorsOf(const Recording& predicted) {
   return Collect(predicted.measured, [](const auto& measured) { return FloorOf(measured.spec, measured.values); });
 }
 
-ForetoldFit::ForetoldFit(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors)
+ForetoldFit::ForetoldFit(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
+                         double window_s)
     : rows_per_reading_(RowsPerReading(log)),
       model_(hypothesis.model),
       logs_(ScoredLog(log, floors)),
-      problem_(*model_, logs_, OptionsOf(hypothesis, log, floors, rows_per_reading_), hypothesis.values, pool_) {}
+      problem_(*model_, logs_, OptionsOf(hypothesis, log, floors, window_s), hypothesis.values, pool_) {}
 
 std::vector<double> ForetoldFit::Deviations(const std::vector<std::size_t>& wanted) {
   const Linearization at = Linearize(

@@ -11,6 +11,7 @@
 #include "src/diagnose/explain.h"
 #include "src/diagnose/gap_shares.h"
 #include "src/diagnose/judge.h"
+#include "src/diagnose/next_experiment.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/remainder.h"
 #include "src/diagnose/sizes.h"
@@ -159,26 +160,6 @@ std::vector<CandidateReport> DescribeCandidates(const Workbench& bench, const Se
   return reports;
 }
 
-// The experiment that tells the first of a group from the second, or the leader from its nearest rival.
-void SuggestNext(const SearchResult& found, const Judgement& judgement, const std::string& experiment,
-                 Diagnosis* result) {
-  std::vector<Explanation> rivals;
-  for (const auto& group : result->ambiguous) {
-    if (rivals.empty() && group.size() > 1) rivals = {group[0], group[1]};
-  }
-  if (rivals.empty()) {
-    for (const auto& member : found.members) {
-      if (rivals.empty() && !member.rivals.empty()) rivals = {member.use, member.rivals.front().use};
-    }
-  }
-  if (rivals.empty() && !judgement.statements.empty()) rivals = {judgement.statements.front().use};
-  if (rivals.empty()) return;
-  result->next_command = "gapscope design optimal " + experiment;
-  for (const auto& rival : rivals) result->next_command += " --separate " + NameOf(rival);
-  if (rivals.size() < 2) rivals.push_back({});
-  result->next_separates = rivals;
-}
-
 // The set of the effects that are there, refitted to the end.
 Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement& judgement) {
   EffectSet set;
@@ -235,7 +216,8 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(bench, chosen, *base.model);
-  SuggestNext(found, judgement, bench.rig->experiment().path, &result);
+  say("designing the next experiment");
+  result.next = DesignNext(FindOpenQuestions(bench, found, judgement), bench, noise);
   result.where = Locate(PredictHeldOut(bench, base), bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(predicted, bench.data.held_out, seed);
   result.cut = found.cut;

@@ -71,6 +71,22 @@ std::string VerdictName(Verdict verdict) {
   return "";
 }
 
+std::string WhyName(NextExperiment::Why why) {
+  switch (why) {
+    case NextExperiment::Why::kNothing:
+      return "nothing is open";
+    case NextExperiment::Why::kTogether:
+      return "told together";
+    case NextExperiment::Why::kUnsure:
+      return "not sure";
+    case NextExperiment::Why::kOneLog:
+      return "one log shows it";
+    case NextExperiment::Why::kUnseen:
+      return "unseen";
+  }
+  return "";
+}
+
 template <>
 std::span<const EnumName<SearchEffort>> EnumNames<SearchEffort>() {
   static constexpr EnumName<SearchEffort> kNames[] = {

@@ -131,6 +131,20 @@ struct AtBound {
   double value = 0;
 };
 
+// What these logs leave open, and the input that would settle it.
+struct NextExperiment {
+  enum class Why { kNothing, kTogether, kUnsure, kOneLog, kUnseen };
+  Why why = Why::kNothing;
+  std::vector<Explanation> separates;    // told apart; the first one is what the probabilities are of
+  std::vector<RunModel> models;          // of each, fitted to the logs
+  double probability = 0;                // by these logs
+  double if_present = 0, if_absent = 0;  // foretold: after the experiment, if it holds and if it does not
+  std::string input_csv;                 // in the experiment's own columns; empty: there is none
+  std::string command;                   // makes it again
+  std::string problem;                   // why there is none
+};
+std::string WhyName(NextExperiment::Why why);
+
 // What the verdict rests on as a whole.
 struct VerdictEvidence {
   // Residual over the sensors' noise, root mean square, held out: refitted base model, final model.
@@ -154,8 +168,7 @@ struct Diagnosis {
   std::vector<ConditionShare> where;    // the refitted base model's error, by condition
   std::vector<ConditionShare> remains;  // the final model's
   std::vector<CandidateReport> candidates;
-  std::string next_command;
-  std::vector<Explanation> next_separates;
+  NextExperiment next;
   std::vector<std::string> train_logs, held_out_logs;
   std::string split, explanation;
   double data_s = 0;  // of all logs

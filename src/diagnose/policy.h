@@ -62,11 +62,20 @@ struct VerdictPolicy {
   double retuned = 0.05;      // least share of the held-out cost that retuned parameters gain to be worth saying
 };
 
+// Of the next experiment.
+struct NextPolicy {
+  double absent = 0.2, sure = 0.8;  // probabilities between which a statement is open
+  double of_one_log = 0.9;          // share of what an effect gains, above which one log alone shows it
+  double duration_s = 8;            // of the input
+  double apart = 0.5;               // of what an effect gains, what random torques do not, where the logs do not say
+};
+
 struct DiagnosePolicy {
   SearchPolicy search;
   EvidencePolicy evidence;
   ProbabilityPolicy probability;
   VerdictPolicy verdict;
+  NextPolicy next;
 };
 inline constexpr DiagnosePolicy kDiagnosePolicy;
 

@@ -8,13 +8,17 @@
 
 namespace gapscope {
 
-std::vector<EvidenceTerm> EvidenceTermsOf(const StatementNumbers& n) {
-  const ProbabilityPolicy& w = kDiagnosePolicy.probability;
-  // The largest: an effect that is there shows most where its absence adds up.
+double LargestGain(const StatementNumbers& n) {
   double gain = -kInfinity;
   for (const double one : {n.gain, n.gain_held_out, n.gain_free}) {
     if (std::isfinite(one)) gain = std::max(gain, one);
   }
+  return gain;
+}
+
+std::vector<EvidenceTerm> EvidenceTermsOf(const StatementNumbers& n) {
+  const ProbabilityPolicy& w = kDiagnosePolicy.probability;
+  const double gain = LargestGain(n);
   const double evidence = std::copysign(std::log1p(std::abs(n.discrepancy)), n.discrepancy);
   return {
       {"constant", 1, 1, w.constant},

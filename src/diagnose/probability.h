@@ -16,6 +16,8 @@ struct EvidenceTerm {
   double weight = 0;
   double Adds() const { return weight * counted; }
 };
+// The largest of the three gains: an effect that is there shows most where its absence adds up.
+double LargestGain(const StatementNumbers& numbers);
 // All terms, the constant first.
 std::vector<EvidenceTerm> EvidenceTermsOf(const StatementNumbers& numbers);
 

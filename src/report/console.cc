@@ -73,4 +73,21 @@ std::string Wrapped(const std::string& text, std::size_t width, const std::strin
   return wrapped;
 }
 
+std::string WrappedCommand(const std::string& command, std::size_t width) {
+  const std::string break_before = " --", continued = " \\\n   ";
+  std::string wrapped;
+  std::size_t column = 0;
+  for (std::size_t begin = 0; begin < command.size();) {
+    const std::size_t end = std::min(command.find(break_before, begin + 1), command.size());
+    if (column > 0 && column + end - begin + 2 > width) {
+      wrapped += continued;
+      column = 3;
+    }
+    wrapped.append(command, begin, end - begin);
+    column += end - begin;
+    begin = end;
+  }
+  return wrapped;
+}
+
 }  // namespace gapscope

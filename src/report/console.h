@@ -37,6 +37,8 @@ std::vector<double> ErrorOverTime(std::span<const double> time_s, std::span<cons
 
 // Words on lines of at most `width` characters, all but the first one behind `indent`.
 std::string Wrapped(const std::string& text, std::size_t width, const std::string& indent = "");
+// A command on such lines, broken before options, for a shell.
+std::string WrappedCommand(const std::string& command, std::size_t width);
 
 }  // namespace gapscope
 

@@ -10,6 +10,7 @@
 #include "src/report/console.h"
 #include "src/report/sentences.h"
 #include "src/report/words.h"
+#include "src/report/write_run.h"
 
 namespace gapscope {
 
@@ -176,6 +177,19 @@ ordered_json JsonRivals(const std::vector<Rival>& rivals) {
   return json;
 }
 
+ordered_json Json(const NextExperiment& next) {
+  ordered_json separates = ordered_json::array();
+  for (const auto& explanation : next.separates) separates.push_back(NameOf(explanation));
+  ordered_json json = {{"command", next.command}, {"separates", separates}, {"why", WhyName(next.why)}};
+  if (!next.problem.empty()) json["problem"] = next.problem;
+  if (next.input_csv.empty()) return json;
+  json["file"] = kNextExperimentFile;
+  json["probability"] = JsonNumber(next.probability);
+  json["if_present"] = JsonNumber(next.if_present);
+  json["if_absent"] = JsonNumber(next.if_absent);
+  return json;
+}
+
 ordered_json JsonPolicy() {
   constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
   return {{"search.widenings", policy.search.widenings},
@@ -229,7 +243,12 @@ ordered_json JsonPolicy() {
           {"probability.least_clear", policy.probability.least_clear},
           {"probability.present", policy.probability.present},
           {"verdict.much_missing", policy.verdict.much_missing},
-          {"verdict.retuned", policy.verdict.retuned}};
+          {"verdict.retuned", policy.verdict.retuned},
+          {"next.absent", policy.next.absent},
+          {"next.sure", policy.next.sure},
+          {"next.of_one_log", policy.next.of_one_log},
+          {"next.duration_s", policy.next.duration_s},
+          {"next.apart", policy.next.apart}};
 }
 
 ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
@@ -261,9 +280,7 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   json["at_bounds"] = ordered_json::array();
   for (const auto& p : d.at_bounds)
     json["at_bounds"].push_back({{"name", p.name}, {"value", JsonNumber(p.value)}, {"unit", p.unit}});
-  ordered_json separates = ordered_json::array();
-  for (const auto& explanation : d.next_separates) separates.push_back(NameOf(explanation));
-  json["next_experiment"] = {{"command", d.next_command}, {"separates", separates}};
+  json["next_experiment"] = Json(d.next);
   json["explanation"] = d.explanation;
   if (d.refit_model) {
     const Experiment& experiment = d.refit_model->experiment();
@@ -293,6 +310,11 @@ std::string ToTable(const DiagnoseRun& run) {
   text += ConditionTable("where", d.where);
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);
   text += StatementTable(d);
+  if (d.next.why != NextExperiment::Why::kNothing) {
+    text += "\nnext experiment\n";
+    for (const std::string& sentence : NextSentences(d.next)) text += Wrapped("- " + sentence, 120, "  ") + "\n";
+    if (!d.next.command.empty()) text += WrappedCommand(d.next.command, 120) + "\n";
+  }
   text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.cut.empty() ? "" : ", the whole budget");
   return text;
 }

@@ -68,12 +68,9 @@ PageContent PageOf(const DiagnoseRun& run) {
     for (const auto& p : effect.parameters)
       page.fitted.push_back({.name = effect.use.Text() + "." + p.key, .value = p.value, .low = p.low, .high = p.high});
   }
-  if (!d.next_command.empty()) {
-    const std::vector<std::string> rivals = Collect(d.next_separates, [](const auto& rival) { return Words(rival); });
-    page.next_command = d.next_command;
-    page.next_text =
-        rivals.empty() ? "It would tell more about what is left." : "It tells " + Listed(rivals, "from") + " apart.";
-  }
+  for (const std::string& sentence : NextSentences(d.next))
+    page.next_text += (page.next_text.empty() ? "" : " ") + sentence;
+  page.next_command = d.next.command;
   return page;
 }
 

@@ -97,6 +97,36 @@ std::vector<Part> PartsOf(const Remainder& remainder) {
   return parts;
 }
 
+std::vector<std::string> NextSentences(const NextExperiment& next) {
+  using Why = NextExperiment::Why;
+  if (next.why == Why::kNothing) return {};
+  const std::vector<std::string> names = Collect(next.separates, [](const auto& one) { return Words(one); });
+  const std::string& first = names.front();
+  std::vector<std::string> sentences;
+  switch (next.why) {
+    case Why::kTogether:
+      sentences.push_back("These logs do not tell " + first + " from " +
+                          Listed({names.begin() + 1, names.end()}, "or") + ".");
+      break;
+    case Why::kUnsure:
+      sentences.push_back(fmt::format("Whether {} is there is not sure: P {:.2f}.", first, next.probability));
+      break;
+    case Why::kOneLog:
+      sentences.push_back("Only one log shows " + first + ".");
+      break;
+    default:
+      sentences.push_back("These logs cannot show " + first + ".");
+  }
+  if (next.input_csv.empty()) {
+    sentences.push_back("No experiment is proposed: " + next.problem);
+  } else {
+    sentences.push_back(
+        fmt::format("With the proposed log beside these, P would be about {:.2f} if it is {}, and {:.2f} if not.",
+                    next.if_present, next.why == Why::kTogether ? first : "there", next.if_absent));
+  }
+  return sentences;
+}
+
 std::string BoundText(const Statement& statement) {
   if (statement.bounds.empty()) return "";
   const EffectEstimate& bound = statement.bounds.front();

@@ -31,6 +31,7 @@ Status WriteRun(const std::string& folder, const nlohmann::ordered_json& result,
   if (!files.model_xml.empty()) GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", files.model_xml));
   for (const auto& table : files.tables)
     GS_RETURN_IF_ERROR(WriteFile(out / table.path, CsvText(table.columns, table.digits)));
+  if (!files.next_experiment.empty()) GS_RETURN_IF_ERROR(WriteFile(out / kNextExperimentFile, files.next_experiment));
   if (files.report) GS_RETURN_IF_ERROR(WriteReportHtml(folder, result, *files.report));
   return Ok();
 }

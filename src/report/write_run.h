@@ -22,10 +22,12 @@ struct RunFiles {
   std::string model_xml;  // the run's model, as MJCF
   std::vector<RunTable> tables;
   const ReportSource* report = nullptr;
+  std::string next_experiment;  // a diagnosis' proposed input, as CSV
 };
+inline constexpr const char* kNextExperimentFile = "next_experiment.csv";
 
-// Writes `folder`/result.json (the bytes that --json prints), model.xml, the tables and report.html. Errors: those of
-// WriteFile; files written before stay.
+// Writes `folder`/result.json (the bytes that --json prints), model.xml, the tables, next_experiment.csv and
+// report.html. Errors: those of WriteFile; files written before stay.
 Status WriteRun(const std::string& folder, const nlohmann::ordered_json& result, const RunFiles& files = {});
 
 }  // namespace gapscope

@@ -188,6 +188,21 @@ TEST(OptimalTest, SeparatingInputMovesWhereTheRivalsDiffer) {
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(again.value().inputs.front().amplitude, inputs.front().amplitude);
   EXPECT_EQ(again.value().inputs.front().score, inputs.front().score);
+  // A bias beside no effect: the bias shows, and that nothing is there needs no input, as a bias of zero does as well.
+  const auto there = DesignForRivals(base, {rivals[1], base}, options, pool);
+  ASSERT_TRUE(there.ok());
+  const InputScore& best = there.value().inputs.front();
+  EXPECT_EQ(best.per_target[1], 0);
+  EXPECT_EQ(best.score, best.per_target[0]);
+  EXPECT_GT(best.score, 1);
+  // In windows that begin where the log is, a bias has less time to bend the motion than over the whole log.
+  Simulator simulator(*rivals[1].model, 0);
+  const Recording log = Rehearse(*rivals[1].model, simulator, best.rehearsal.recording, rivals[1].values).recording;
+  const double in_windows = ForetoldFit(base, log, FloorsOf(log), 0.5).Misfit(4);
+  EXPECT_GT(in_windows, 0);
+  EXPECT_LT(in_windows, 0.5 * best.score);
+  // The command makes the same input.
+  EXPECT_NE(CommandFor("rig.yaml", options.rehearsal, best).find(" --amplitude "), std::string::npos);
   // A rival can imitate itself: what is left against a copy is nothing.
   const auto copy = DesignForRivals(base, {rivals[0], rivals[0]}, options, pool);
   ASSERT_TRUE(copy.ok());

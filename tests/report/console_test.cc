@@ -32,5 +32,13 @@ TEST(ErrorOverTimeTest, RootMeanSquareOfEachPart) {
   EXPECT_TRUE(std::isnan(ErrorOverTime(time, measured, predicted, 10)[1]));
 }
 
+// The shell reads it as one line.
+TEST(ConsoleTest, ACommandIsBrokenBeforeOptions) {
+  const std::string command = "gapscope design steps rig.yaml --duration 8 --rate 250 --out next.csv";
+  EXPECT_EQ(WrappedCommand(command, 120), command);
+  EXPECT_EQ(WrappedCommand(command, 50),
+            "gapscope design steps rig.yaml --duration 8 \\\n    --rate 250 --out next.csv");
+}
+
 }  // namespace
 }  // namespace gapscope

@@ -92,8 +92,13 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
        .probability = 0.03,
        .held_out_error = 0.9,
        .reason = "does not bend with the angle"}};
-  d.next_command = "gapscope design triangle --seconds 20";
-  d.next_separates = {kSpring, kGravity};
+  d.next = {.why = NextExperiment::Why::kTogether,
+            .separates = {kSpring, kGravity},
+            .probability = 0.48,
+            .if_present = 0.9,
+            .if_absent = 0.1,
+            .input_csv = "time_s,voltage_v\n0,0\n",
+            .command = "gapscope design triangle models/qube/experiment.yaml --duration 20"};
   d.explanation = "Something pulls the arm towards one angle.";
   d.train_logs = {"a"}, d.held_out_logs = {"b"};
   return {.info = {.seed = 3}, .diagnosis = std::move(d)};

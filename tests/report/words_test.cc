@@ -156,7 +156,10 @@ TEST(PageContentTest, StatementsByProbabilityAndTheNextExperiment) {
   EXPECT_EQ(page.statements[2].title, "torque bias on arm");
   EXPECT_EQ(page.statements.size(), 40u);
   EXPECT_EQ(page.more_statements, 13u);
-  EXPECT_EQ(page.next_text, "It tells cable spring on arm from gravity offset on arm apart.");
+  EXPECT_EQ(
+      page.next_text,
+      "These logs do not tell cable spring on arm from gravity offset on arm. With the proposed log beside these, P "
+      "would be about 0.90 if it is cable spring on arm, and 0.10 if not.");
   EXPECT_EQ(page.fitted[0].name, "cable_spring@arm.stiffness_n_m_per_rad");
   EXPECT_EQ(page.fitted[0].high, 0.0013);
 }

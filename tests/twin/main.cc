@@ -1,8 +1,12 @@
 // gapscope_twin: synthetic hardware logs with known causes, and their labels. See tests/twin/README.md.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <exception>
+#include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -14,7 +18,7 @@ namespace {
 
 struct Options {
   CaseRequest request;
-  std::string kind = "auto", out, label;
+  std::string kind = "auto", out, label, drive;
   std::vector<std::string> set, shapes;
   bool nominal = false, noise = true, loop = false, reference = false;
   double amplitude = 0, duration_s = 8, rate_hz = 500, low_hz = 0, high_hz = 0;
@@ -78,6 +82,44 @@ bool MakeManual(const Options& o, Case* c, std::string* problem) {
   return true;
 }
 
+// One log of the case's plant, started at rest and driven by a CSV's first two columns: time, s, and the command, held
+// from row to row.
+bool DriveBy(const std::string& path, Case* c, std::string* problem) {
+  std::ifstream file(path);
+  std::string line;
+  std::vector<double> time_s, level;
+  std::getline(file, line);
+  while (std::getline(file, line)) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream row(line);
+    double time = 0, value = 0;
+    if (!(row >> time >> value)) break;
+    time_s.push_back(time);
+    level.push_back(value);
+  }
+  if (time_s.size() < 2 || !file.eof()) {
+    *problem = "--drive " + path + ": expected a header and rows of time and command";
+    return false;
+  }
+  LogSpec log = c->logs.back();
+  log.session_s += log.excitation.duration_s;
+  log.excitation = {.shape = Shape::kSteps, .duration_s = time_s.back(), .level = level};
+  // A row's stamp may lie a rounding beside the substep's.
+  for (std::size_t i = 0; i + 1 < time_s.size(); ++i)
+    log.excitation.until_s.push_back(time_s[i] + 0.999 * (time_s[i + 1] - time_s[i]));
+  log.excitation.until_s.push_back(kNever);
+  log.amplitude = 1;
+  log.as_reference = false;
+  log.loop = {};
+  log.feedforward_n_m = 0;
+  log.rate_hz = std::round(static_cast<double>(time_s.size() - 1) / time_s.back());
+  log.start = {};
+  log.dropped_share = 0;
+  ++log.seed;
+  c->logs = {log};
+  return true;
+}
+
 int Run(const Options& o) {
   Case c;
   std::string problem;
@@ -86,6 +128,7 @@ int Run(const Options& o) {
     return Fail("--kind " + o.kind + ": none, single, pair, triple, unknown, ambiguous, rough or auto");
   const bool manual = o.nominal || !o.set.empty() || !o.shapes.empty();
   if (!(manual ? MakeManual(o, &c, &problem) : MakeCase(request, &c, &problem))) return Fail(problem);
+  if (!o.drive.empty() && !DriveBy(o.drive, &c, &problem)) return Fail(problem);
   const std::vector<Record> records = MakeRecords(c, o.noise);
   std::vector<std::string> files;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -115,6 +158,7 @@ int main(int argc, char** argv) {
   app.add_option("--severity", o.request.severity, "Instead of searching one by effect-to-floor ratio");
   app.add_option("--set", o.set, "NAME=VALUE of a base parameter or EFFECT[@ON].PARAMETER")->take_all();
   app.add_option("--excitation", o.shapes, "One log per shape")->take_all();
+  app.add_option("--drive", o.drive, "CSV of time and command: one more log of the case, driven by it, instead");
   app.add_flag("--nominal", o.nominal, "Base parameters exactly nominal");
   app.add_option("--noise", o.noise, "0: exact measurements, no dropped rows")->capture_default_str();
   app.add_flag("--loop", o.loop, "Weak position loop");

@@ -174,8 +174,10 @@ function writeParameters(parameters, notes) {
 }
 
 function writeNext(next) {
-  if (!next.command) return;
-  document.getElementById("next-text").append(element("p", {}, next.text), element("pre", {}, next.command));
+  if (!next.text) return;
+  const text = document.getElementById("next-text");
+  text.append(element("p", {}, next.text));
+  if (next.command) text.append(element("pre", {}, next.command));
   show("next");
 }
 

@@ -1,0 +1,43 @@
+// What a diagnosis leaves open, and the experiment that would settle it: of a library of inputs within the rig's limits
+// the one on which the explanations that are left differ most (src/design/optimal.h), and what the probability of the
+// first of them would be after it.
+#ifndef GAPSCOPE_DIAGNOSE_NEXT_EXPERIMENT_H_
+#define GAPSCOPE_DIAGNOSE_NEXT_EXPERIMENT_H_
+
+#include "src/diagnose/judge.h"
+
+namespace gapscope {
+
+// What is asked of a further log.
+struct OpenQuestion {
+  NextExperiment next;  // without its input
+  // The numbers of the first explanation beside the second one, by these logs.
+  StatementNumbers numbers;
+  bool nested = false;   // the second one lacks the first one's effect, and has no other one for it
+  double seconds = 0;    // of these logs
+  double remaining = 1;  // squared residual over the sensors' noise that the likeliest one leaves
+};
+
+// One question of each kind, the one most worth an experiment first: effects that are told together; one that is not
+// sure; one that a single log shows; one that these logs cannot show. Of several the largest gain's.
+std::vector<OpenQuestion> FindOpenQuestions(const Workbench& bench, SearchResult& found, const Judgement& judgement);
+
+// An input's length, and the squared residuals that the second explanation leaves where the first one holds (`there`)
+// and the other way round, both over what the likeliest one leaves of these logs.
+struct ForetoldMisfit {
+  double seconds = 0, there = 0, not_there = 0;
+};
+// The first explanation's probability in a diagnosis of the old logs and the new one, if it holds and if it does not.
+struct Foretold {
+  double if_present = 0, if_absent = 0;
+};
+Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit);
+
+// The first question that an input of the library would settle, with that input; else the first one, and why there is
+// none. `noise`: of each measured signal, SI. Limits that the experiment does not state are what the logs reached.
+NextExperiment DesignNext(const std::vector<OpenQuestion>& questions, const Workbench& bench,
+                          const std::vector<double>& noise);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_NEXT_EXPERIMENT_H_

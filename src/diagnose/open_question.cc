@@ -1,0 +1,151 @@
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/collect.h"
+#include "src/core/statistics.h"
+#include "src/diagnose/exchange.h"
+#include "src/diagnose/next_experiment.h"
+#include "src/diagnose/policy.h"
+#include "src/diagnose/probability.h"
+
+namespace gapscope {
+namespace {
+
+using Why = NextExperiment::Why;
+
+RunModel ModelOf(const Candidate& candidate) { return RunModelOf(*candidate.model, candidate.values); }
+
+class Asking {
+ public:
+  Asking(const Workbench& bench, SearchResult& found, const Judgement& judgement)
+      : bench_(bench), found_(found), judgement_(judgement) {}
+
+  std::vector<OpenQuestion> Ask() {
+    std::vector<OpenQuestion> questions;
+    for (const auto& ask : {&Asking::Together, &Asking::Unsure, &Asking::OfOneLog, &Asking::Unseen}) {
+      if (auto question = (this->*ask)()) questions.push_back(*std::move(question));
+    }
+    return questions;
+  }
+
+ private:
+  OpenQuestion Empty(Why why) const {
+    OpenQuestion question{.next = {.why = why}};
+    for (const auto& recording : bench_.data.train) question.seconds += recording.duration_s();
+    const auto residuals = static_cast<double>(found_.chosen->problem->residuals());
+    question.remaining = std::max(1.0, 2 * found_.chosen->train_cost / residuals);
+    return question;
+  }
+
+  // One of several explanations that stand in for each other. Nothing: only one can be simulated.
+  std::optional<OpenQuestion> Between(Why why, const std::vector<EffectUse>& uses, const Statement& of) {
+    constexpr std::size_t kMost = 3;
+    OpenQuestion question = Empty(why);
+    EffectSet members;
+    for (const EffectUse& use : uses) {
+      if (HasMember(use)) members = With(members, use);
+    }
+    std::vector<const Candidate*> tried;
+    for (const EffectUse& use : uses) {
+      const Candidate* candidate = members == EffectSet{use}
+                                       ? found_.chosen
+                                       : RefitInPlace(bench_, found_, members, use, Effort::kTry);
+      if (!candidate || tried.size() == kMost) continue;
+      tried.push_back(candidate);
+      question.next.separates.emplace_back(use);
+      question.next.models.push_back(ModelOf(*candidate));
+    }
+    if (tried.size() < 2) return std::nullopt;
+    question.next.probability = of.probability / static_cast<double>(tried.size());
+    question.numbers = {.gain = std::log(tried[1]->train_cost / tried[0]->train_cost),
+                        .smooth = of.numbers.smooth,
+                        .dry = of.numbers.dry};
+    return question;
+  }
+
+  // Whether an effect is there at all.
+  OpenQuestion WhetherThere(Why why, const Statement& s, const RunModel& with, const RunModel& without) const {
+    OpenQuestion question = Empty(why);
+    question.next.separates = {s.use, std::nullopt};
+    question.next.models = {with, without};
+    question.next.probability = s.probability;
+    question.numbers = s.numbers;
+    question.nested = true;
+    return question;
+  }
+
+  std::optional<OpenQuestion> Together() {
+    const Statement* first = nullptr;
+    for (const Statement& s : judgement_.statements) {
+      if (s.group < 0 || s.answer != Answer::kPresent) continue;
+      if (!first || s.numbers.gain > first->numbers.gain) first = &s;
+    }
+    if (!first) return std::nullopt;
+    return Between(Why::kTogether, judgement_.groups[static_cast<std::size_t>(first->group)], *first);
+  }
+
+  std::optional<OpenQuestion> Unsure() {
+    const Statement* first = nullptr;
+    for (const Statement& s : judgement_.statements) {
+      const bool open =
+          s.probability > kDiagnosePolicy.next.absent && s.probability < kDiagnosePolicy.next.sure && s.sets;
+      if (open && (!first || s.numbers.gain > first->numbers.gain)) first = &s;
+    }
+    if (!first) return std::nullopt;
+    return WhetherThere(Why::kUnsure, *first, first->sets->with, first->sets->without);
+  }
+
+  std::optional<OpenQuestion> OfOneLog() {
+    if (bench_.data.held_out.size() < 2) return std::nullopt;
+    for (const Statement& s : judgement_.statements) {
+      if (s.answer != Answer::kPresent || !s.sets || s.sets->blocks.empty()) continue;
+      std::map<std::string, double> logs;
+      for (const BlockGain& block : s.sets->blocks) logs[block.log] += block.share;
+      if (std::any_of(logs.begin(), logs.end(),
+                      [](const auto& log) { return log.second > kDiagnosePolicy.next.of_one_log; }))
+        return WhetherThere(Why::kOneLog, s, s.sets->with, s.sets->without);
+    }
+    return std::nullopt;
+  }
+
+  // At the size in the middle of those that a search tries.
+  std::optional<OpenQuestion> Unseen() {
+    for (const Statement& s : judgement_.statements) {
+      if (s.answer != Answer::kUnseen) continue;
+      auto made = MakeCandidate(bench_, With(found_.chosen->effects, s.use));
+      if (!made.ok()) continue;
+      const Candidate candidate = std::move(made).value();
+      std::vector<double> values = candidate.values;
+      for (std::size_t i = 0; i < found_.chosen->values.size(); ++i) {
+        const int index = candidate.model->IndexOf(found_.chosen->model->parameters()[i].name);
+        values[static_cast<std::size_t>(index)] = found_.chosen->values[i];
+      }
+      for (const auto& p : PlacedParameters(s.use, *bench_.rig, bench_.scales))
+        values[static_cast<std::size_t>(candidate.model->IndexOf(p.name))] =
+            p.trials.empty() ? p.start : p.trials[p.trials.size() / 2];
+      OpenQuestion question =
+          WhetherThere(Why::kUnseen, s, RunModelOf(*candidate.model, values), ModelOf(*found_.chosen));
+      question.numbers.dry = EffectOf(s.use, *bench_.rig).character == EffectCharacter::kDryFriction;
+      question.numbers.smooth = EffectOf(s.use, *bench_.rig).of_motion;
+      return question;
+    }
+    return std::nullopt;
+  }
+
+  bool HasMember(const EffectUse& use) const {
+    const auto& effects = found_.chosen->effects;
+    return std::find(effects.begin(), effects.end(), use) != effects.end();
+  }
+
+  const Workbench& bench_;
+  SearchResult& found_;
+  const Judgement& judgement_;
+};
+
+}  // namespace
+
+std::vector<OpenQuestion> FindOpenQuestions(const Workbench& bench, SearchResult& found, const Judgement& judgement) {
+  return Asking(bench, found, judgement).Ask();
+}
+
+}  // namespace gapscope

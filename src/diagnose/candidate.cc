@@ -38,8 +38,9 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
                      .time_step_s = time_step_s,
                      .shift_range_s = sample_s,
                      .weights = weights,
-                     .prior_share = kFitPolicy.known_share / std::sqrt(kCorrelated),
-                     .prior_offset_rad = kFitPolicy.known_offset_rad / std::sqrt(kCorrelated),
+                     .prior_share = kFitPolicy.known_share,
+                     .prior_offset_rad = kFitPolicy.known_offset_rad,
+                     .prior_scale = kCorrelated,
                      .linear_terms = true,
                      .bounds = *bounds,
                      .huber = 0};
@@ -128,7 +129,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   // What is known lies around nominal; a model that leaves more than the noise has residuals that lie, and count for
   // less.
   fit.prior_centre = bench.Nominal(*candidate->model);
-  fit.prior_scale = std::max(1.0, candidate->held_out_floors * candidate->held_out_floors);
+  fit.prior_scale *= std::max(1.0, candidate->held_out_floors * candidate->held_out_floors);
   auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
   const FitPoint start = CarryOver(*candidate->problem, candidate->point, *problem, candidate->values);
   const SolveOptions options{.max_iterations = 8,

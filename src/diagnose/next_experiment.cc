@@ -177,8 +177,12 @@ NextExperiment DesignNext(const std::vector<OpenQuestion>& questions, const Work
   NextExperiment first;
   for (const OpenQuestion& question : questions) {
     auto designed = Design(question, bench, noise);
-    NextExperiment next = designed.ok() ? std::move(designed).value() : question.next;
-    if (!designed.ok()) next.problem = designed.error().Text();
+    NextExperiment next = question.next;
+    if (designed.ok()) {
+      next = std::move(designed).value();
+    } else {
+      next.problem = designed.error().Text();
+    }
     if (next.problem.empty()) return next;
     if (&question == questions.data()) first = std::move(next);
   }

@@ -47,9 +47,8 @@ class Asking {
     }
     std::vector<const Candidate*> tried;
     for (const EffectUse& use : uses) {
-      const Candidate* candidate = members == EffectSet{use}
-                                       ? found_.chosen
-                                       : RefitInPlace(bench_, found_, members, use, Effort::kTry);
+      const Candidate* candidate =
+          members == EffectSet{use} ? found_.chosen : RefitInPlace(bench_, found_, members, use, Effort::kTry);
       if (!candidate || tried.size() == kMost) continue;
       tried.push_back(candidate);
       question.next.separates.emplace_back(use);

@@ -33,7 +33,9 @@ void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int pa
     if (!(deviation < least)) continue;
     least = deviation;
     const double value = size->value / candidate.values[static_cast<std::size_t>(other.parameter)],
-                 factor = std::exp(uncertainty.quantile * deviation);
+                 factor =
+                     std::exp(HalfInterval(c, uncertainty.of_prior, uncertainty.freedom,
+                                           Eigen::VectorXd::Unit(c.rows(), own) - Eigen::VectorXd::Unit(c.rows(), k)));
     size->ratio = {.to = space.parameter(other).name, .value = value, .low = value / factor, .high = value * factor};
   }
 }
@@ -44,8 +46,9 @@ std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& 
                                                                const Eigen::MatrixXd& beside) {
   std::map<EffectUse, std::vector<EffectEstimate>> sizes;
   if (candidate.effects.empty()) return sizes;
-  const Linearization at =
-      Linearize(*candidate.problem, candidate.point, {.columns = DifferenceOptions::Columns::kCentral});
+  // A longer step bends: what only a ratio tells would seem to be known by itself.
+  const Linearization at = Linearize(*candidate.problem, candidate.point,
+                                     {.step = kFineStep, .columns = DifferenceOptions::Columns::kCentral});
   const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at, beside);
   for (const EffectUse& use : candidate.effects) {
     for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {

@@ -12,7 +12,8 @@ namespace {
 
 struct Covariance {
   Eigen::MatrixXd robust, model_based;  // of y, in units of each coordinate's range
-  double freedom = 1;
+  Eigen::MatrixXd of_prior;             // the part of `robust` that what is known beforehand leaves
+  double freedom = 1;                   // of the part that the logs leave
 };
 
 // The sum of blocks' outer products, and how many blocks there are beyond the unknowns.
@@ -38,12 +39,15 @@ Eigen::MatrixXd Meat(const Linearization& at, double* freedom) {
 
 Covariance CovarianceOf(const FitProblem& problem, const Linearization& at) {
   Covariance result;
-  const Eigen::MatrixXd meat = Meat(at, &result.freedom);
+  Eigen::MatrixXd meat = Meat(at, &result.freedom);
   const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
-  // In units of each coordinate's range, so that flat directions mean the same for all. What the prior adds is no
-  // knowledge of the logs.
+  // In units of each coordinate's range, so that flat directions mean the same for all. What only holds open directions
+  // is no knowledge. What is known beforehand is, at its own variance: the fit counts it `scale` times, and so it
+  // scatters the solution by that much more.
+  const Prior& prior = problem.prior();
   Eigen::MatrixXd hessian = at.hessian;
-  hessian.diagonal() -= problem.prior().weight;
+  hessian.diagonal() -= prior.weight - prior.scale * prior.known;
+  meat.diagonal() += prior.scale * prior.scale * prior.known;
   hessian = range.asDiagonal() * hessian * range.asDiagonal();
   const SymmetricEigen eigen(hessian);
   const double largest = std::max(eigen.values.maxCoeff(), 1e-300);
@@ -59,7 +63,14 @@ Covariance CovarianceOf(const FitProblem& problem, const Linearization& at) {
       whitener * spread.vectors * spread.values.cwiseMax(noise).cwiseSqrt().asDiagonal();
   result.robust = half_covariance * half_covariance.transpose();
   result.model_based = noise * whitener * whitener.transpose();
+  const Eigen::MatrixXd inverse = whitener * whitener.transpose();
+  const Eigen::VectorXd scatter = (prior.scale * prior.scale * prior.known).cwiseProduct(range.cwiseAbs2());
+  result.of_prior = inverse * scatter.asDiagonal() * inverse;
   return result;
+}
+
+double HalfOf(const Covariance& c, const Eigen::VectorXd& direction) {
+  return HalfInterval(c.robust, c.of_prior, c.freedom, direction);
 }
 
 TunedParameter OfCoordinate(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
@@ -68,7 +79,7 @@ TunedParameter OfCoordinate(const FitProblem& problem, const FitPoint& point, co
   const double range = problem.layout().high[i] - problem.layout().low[i];
   const double deviation = std::sqrt(covariance.robust(i, i));
   TunedParameter tuned{.index = c.parameter, .value = c.ToValue(point.y[i])};
-  const double half = StudentQuantile(covariance.freedom) * deviation * range;
+  const double half = HalfOf(covariance, Eigen::VectorXd::Unit(covariance.robust.rows(), i)) * range;
   tuned.low = c.ToValue(std::max(c.low, point.y[i] - half));
   tuned.high = c.ToValue(std::min(c.high, point.y[i] + half));
   if (tuned.low > tuned.high) std::swap(tuned.low, tuned.high);  // a negative size, as a logarithm
@@ -96,7 +107,7 @@ TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const 
     space.SetCoordinate(point.y, i, point.y[i], &values);
   }
   const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
-  const double half = StudentQuantile(covariance.freedom) * deviation;
+  const double half = HalfOf(covariance, slope);
   tuned.low = std::max(p.low, tuned.value - half);
   tuned.high = std::min(p.high, tuned.value + half);
   tuned.at_bound =
@@ -134,6 +145,14 @@ std::vector<FlatDirection> FlatDirections(const FitProblem& problem, const Covar
 
 }  // namespace
 
+double HalfInterval(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& of_prior, double freedom,
+                    const Eigen::VectorXd& direction) {
+  const double all = direction.dot(covariance * direction);
+  if (!(all > 0)) return 0;
+  const double from_logs = std::max(all - direction.dot(of_prior * direction), 1e-9 * all);
+  return StudentQuantile(freedom * std::pow(all / from_logs, 2)) * std::sqrt(all);
+}
+
 Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at,
                                 const Eigen::MatrixXd& beside) {
   Uncertainty result;
@@ -159,6 +178,8 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
   }
   const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
   result.covariance = range.asDiagonal() * covariance.robust * range.asDiagonal();
+  result.of_prior = range.asDiagonal() * covariance.of_prior * range.asDiagonal();
+  result.freedom = covariance.freedom;
   result.quantile = StudentQuantile(covariance.freedom);
   result.flat = FlatDirections(problem, covariance);
   const Eigen::MatrixXd& own = covariance.model_based;

@@ -32,9 +32,17 @@ struct Uncertainty {
   std::vector<TunedParameter> tuned;
   std::vector<FlatDirection> flat;
   Eigen::MatrixXd covariance;                            // of y
-  double quantile = 0;                                   // deviations of a 95 % interval
+  Eigen::MatrixXd of_prior;                              // the part of it that what is known beforehand leaves
+  double freedom = 1;                                    // of the part that the logs leave
+  double quantile = 0;                                   // deviations of a 95 % interval of that part
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above CovariancePolicy::correlated
 };
+
+// Half of the 95 % interval along a direction of y. What is known beforehand is no estimate from few blocks, so that
+// the more of the variance is its, the nearer is the quantile to the normal one (Satterthwaite, Biometrics Bulletin 2,
+// 1946).
+double HalfInterval(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& of_prior, double freedom,
+                    const Eigen::VectorXd& direction);
 
 // At a solved point. `at`: linearized there by central differences, with blocks. `beside`: a covariance of y that is
 // added, for what the residuals do not say (a model's own error); empty: none.

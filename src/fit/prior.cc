@@ -38,9 +38,10 @@ Prior MakePrior(const SearchSpace& space, const FitLayout& layout, const FitOpti
   const Eigen::VectorXd range = layout.high - layout.low, knowledge = Knowledge(space, layout, options);
   Prior prior{.centre = start,
               .weight = kFitPolicy.anchor * unit * static_cast<double>(residuals) *
-                        range.cwiseAbs2().cwiseMax(1e-12).cwiseInverse()};
-  prior.weight += knowledge;
-  prior.weight += (options.prior_scale - 1) * knowledge;
+                        range.cwiseAbs2().cwiseMax(1e-12).cwiseInverse(),
+              .known = knowledge,
+              .scale = options.prior_scale};
+  prior.weight += options.prior_scale * knowledge;
   for (std::size_t i = 0; i < space.coordinates().size() && !options.prior_centre.empty(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const Coordinate& c = space.coordinates()[i];

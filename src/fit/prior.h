@@ -12,6 +12,8 @@ namespace gapscope {
 // Adds 1/2 sum weight (y - centre)^2 to the cost. Made before a solve, and not changed by it.
 struct Prior {
   Eigen::VectorXd centre, weight;  // of y; weight: on the hessian's diagonal
+  Eigen::VectorXd known;  // what is known beforehand: inverse variances, `scale` times of which are in `weight`
+  double scale = 1;       // FitOptions::prior_scale
 
   double Cost(const Eigen::VectorXd& y) const { return 0.5 * weight.cwiseProduct((y - centre).cwiseAbs2()).sum(); }
   Eigen::VectorXd Gradient(const Eigen::VectorXd& y) const { return weight.cwiseProduct(y - centre); }

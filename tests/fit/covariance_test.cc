@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "src/fit/optimizers.h"
 #include "tests/tune/fixture.h"
@@ -48,6 +49,35 @@ TEST(CovarianceTest, CoupledTermsHaveTheIntervalsOfTheirParameters) {
       EXPECT_NEAR(tuned[1][i].high - tuned[1][i].low, width, 0.05 * width) << name;
       EXPECT_GT(width, 0);
     }
+  }
+}
+
+// A log that stands still tells nothing of the gain: its interval is what was known beforehand, at that deviation,
+// however often a fit counts it and however few blocks there are.
+TEST(CovarianceTest, WhereTheLogsAreSilentTheIntervalIsWhatWasKnown) {
+  const Rig rig = LoadCart();
+  ThreadPool pool(1);
+  std::mt19937_64 random(2);
+  std::normal_distribution<double> normal(0, 1e-3);
+  std::vector<double> q(501);
+  for (double& x : q) x = normal(random);
+  const std::vector<Recording> logs = {MakeRecording(rig, std::vector<double>(q.size(), 0.0), q, kCartStep_s)};
+  const int gain = rig.Index("cart.gain");
+  const Parameter& p = rig.model->parameters()[static_cast<std::size_t>(gain)];
+  for (const double scale : {1.0, 10.0}) {
+    FitProblem problem(*rig.model, logs,
+                       {.free = {gain},
+                        .time_step_s = kCartStep_s,
+                        .fit_shift = false,
+                        .weights = {1e3},
+                        .prior_share = 0.05,
+                        .prior_scale = scale},
+                       rig.Values(), pool);
+    const FitPoint point = Solve(problem, problem.Start(), {.tolerance = 1e-7}).point;
+    const auto found = EstimateUncertainty(problem, point, Linearize(problem, point, {}));
+    const double half = 1.96 * 0.05 * (p.high - p.low);
+    EXPECT_NEAR(found.tuned[0].high - found.tuned[0].value, half, 0.01 * half) << scale;
+    EXPECT_NEAR(found.tuned[0].value - found.tuned[0].low, half, 0.01 * half) << scale;
   }
 }
 

@@ -200,7 +200,8 @@ def main():
             linked_zoom(driver, Path(folder) / "effects.html")
             text = driver.find_element(By.ID, "main").text
             for part in ["91 %", "gains too little", "0.0002 N m", "</script><b>bold</b>",
-                         "gapscope design triangle models/qube/experiment.yaml --duration 20", "cable_spring@arm.stiffness_n_m_per_rad", "sha256"]:
+                         "gapscope design triangle models/qube/experiment.yaml --duration 20",
+                         "cable_spring@arm.stiffness_n_m_per_rad", "sha256"]:
                 check(part in text, f"the diagnosis does not say '{part}'")
             check(driver.execute_script("return document.querySelectorAll('.map canvas').length") == 2,
                   "two maps of the missing torque")

@@ -106,6 +106,7 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
   NextExperiment next = question.next;
   OptimalOptions options{.duration_s = kDiagnosePolicy.next.duration_s, .floors = noise, .window_s = bench.window_s};
   Experiment experiment = bench.rig->experiment();
+  GS_ASSIGN([[maybe_unused]] const std::size_t driven, DrivenCommand(experiment, {}));  // there is a command
   FillLimits(bench.data, options.margin, &experiment);
   // The new log has the columns that these have.
   const LoggedSignals logged = WhatIsLogged(bench.data.train);

@@ -31,7 +31,6 @@ std::string Candidate::Name() const {
 
 FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s,
-                     .lead_in_s = 0,
                      .max_windows = train ? max_windows : (max_windows + 1) / 2,
                      .choice = train ? WindowChoice::kTelling : WindowChoice::kEven,
                      .windows = train ? windows : nullptr,

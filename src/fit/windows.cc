@@ -34,24 +34,6 @@ std::vector<double> MismatchOf(std::size_t log, std::size_t signals, const std::
   return squares;
 }
 
-// Where the motion bends more than a parabola does within the local fit, that fit's position and speed are off by more
-// than its noise: of a cubic by 0.6 of its value at the edge over the half width in speed, which is four times what the
-// samples scatter by; of the fourth power by what they scatter by in position. A weight is one over a deviation.
-void LoosenWhereTheLogBends(const Recording& recording, const FitLayout& layout, std::size_t log, FitWindow* window) {
-  constexpr double kSpeedPerScatter = 4;
-  const auto loosened = [](double weight, double bias) { return weight / std::hypot(1, weight * bias); };
-  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
-    const SignalLayout& signal = layout.signals[log][s];
-    if (signal.joint_state < 0 || !(signal.weight > 0)) continue;
-    const LocalFit fit = FitLocally(recording, recording.measured[s], window->rows.begin, kInitialFitHalfWidth_s);
-    const double excess = std::sqrt(std::max(0.0, fit.scatter * fit.scatter - 1 / (signal.weight * signal.weight)));
-    if (!(excess > 0)) continue;
-    double* prior = window->prior.data() + signal.joint_state;
-    prior[0] = loosened(prior[0], excess);
-    prior[1] = loosened(prior[1], kSpeedPerScatter * excess / fit.half_width_s);
-  }
-}
-
 }  // namespace
 
 std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, const FitOptions& options) {
@@ -87,9 +69,6 @@ std::vector<FitWindow> MakeFitWindows(const Model& model, const std::vector<Reco
                                     ? AtRest(model)
                                     : InitialStateAt(model, recording, taken.rows.begin, values),
                        .prior = layout.state_priors[taken.log]});
-    // Weights that were given are of the sensors' noise.
-    if (options.start == WindowStart::kLog && options.fit_states && !options.weights.empty())
-      LoosenWhereTheLogBends(recording, layout, taken.log, &windows.back());
   };
   if (options.objective != ObjectiveKind::kFreeRun) {
     for (const LogWindow& taken : TakenWindows(recordings, options)) add(taken, options.lead_in_s);

@@ -8,7 +8,6 @@
 #include <numeric>
 #include <random>
 
-#include "src/core/statistics.h"
 #include "src/fit/gram.h"
 #include "src/fit/optimizers.h"
 #include "src/fit/policy.h"
@@ -103,41 +102,6 @@ Dense DenseProblem(const Rig& rig, const Recording& recording, double lead_in_s)
       dense.jacobian(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c];
   }
   return dense;
-}
-
-// A log of so many hertz and 0.05 m, read without noise, and the largest distance of a window's true speed at its start
-// from the log's, in deviations of what a fit is told of it.
-double WorstStart(const Rig& rig, double hz, double* loosest) {
-  constexpr double kNoise = 1e-4, kSize = 0.05;
-  const double w = 2 * M_PI * hz;
-  std::vector<double> q(501);
-  for (std::size_t k = 0; k < q.size(); ++k) q[k] = kSize * std::sin(w * kCartStep_s * static_cast<double>(k) + 0.4);
-  const std::vector<Recording> logs = {MakeRecording(rig, std::vector<double>(q.size(), 0.0), q, kCartStep_s)};
-  ThreadPool pool(1);
-  FitOptions options = CartOptions(rig, ObjectiveKind::kWindows);
-  options.weights = {1 / kNoise};
-  options.window_s = 0.13;  // starts at many phases
-  const FitProblem problem(*rig.model, logs, options, rig.Values(), pool);
-  double worst = 0;
-  *loosest = kInfinity;
-  for (const FitWindow& window : problem.windows()) {
-    if (window.rows.begin == 0) continue;
-    const double speed = kSize * w * std::cos(w * logs[0].time_s[window.rows.begin] + 0.4);
-    worst = std::max(worst, std::abs(window.start.qvel[0] - speed) * window.prior[1]);
-    *loosest = std::min(*loosest, window.prior[1]);
-  }
-  return worst;
-}
-
-// The parabola that reads a start's speed off the log does not bend as a fast motion does. What the fit is told of that
-// speed must allow for it: or it keeps wrong starts, and whatever makes up for them seems to be there.
-TEST(FitProblemTest, AStartIsTrustedAsFarAsTheLogIsAParabolaThere) {
-  const Rig rig = LoadCart();
-  double slow = 0, fast = 0;
-  EXPECT_LT(WorstStart(rig, 0.2, &slow), 1);
-  EXPECT_NEAR(slow, std::sqrt(kFitPolicy.state_prior_samples) * 1e4 * kFitPolicy.speed_prior_s, 1e-6);
-  EXPECT_LT(WorstStart(rig, 10, &fast), 3);
-  EXPECT_LT(fast, 0.1 * slow);
 }
 
 TEST(FitProblemTest, CostIsHalfTheSumOfSquares) {

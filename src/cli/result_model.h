@@ -10,16 +10,6 @@
 
 namespace gapscope::cli {
 
-struct ResultModel {
-  std::shared_ptr<const Model> model;
-  std::vector<double> values;
-};
-
-// A model by names, of this rig. `where` they come from, for errors: an effect or a parameter that the rig does not
-// have.
-Result<ResultModel> BuildRunModel(std::shared_ptr<const Rig> rig, const RunModel& named, const std::string& where,
-                                  const ScaleTable& scales);
-
 // `path`: the folder or its result.json. Errors: not such a file; as BuildRunModel.
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales);
 

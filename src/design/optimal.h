@@ -8,8 +8,8 @@
 //
 // Effects: each rival's prediction is imitated by every other one, as `tune` would fit it. What is left, in sensor
 // floors, is how well the input separates the two (one that only has more effects imitates it fully, and is not asked);
-// the input whose least separated pair is farthest apart wins (Hunter
-// and Reiner, "Designs for discriminating between two rival models", Technometrics 7, 1965).
+// the input whose least separated pair is farthest apart wins (Hunter and Reiner, "Designs for discriminating between
+// two rival models", Technometrics 7, 1965).
 #ifndef GAPSCOPE_DESIGN_OPTIMAL_H_
 #define GAPSCOPE_DESIGN_OPTIMAL_H_
 

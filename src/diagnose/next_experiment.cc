@@ -75,17 +75,6 @@ RehearsalOptions RehearsalOf(const OpenQuestion& question, const Workbench& benc
   return options;
 }
 
-Result<Hypothesis> Rebuild(const std::shared_ptr<const Rig>& rig, const RunModel& named, const Explanation& explanation,
-                           const ScaleTable& scales) {
-  GS_ASSIGN(const auto model, Model::Build(rig, named.effects, scales));
-  std::vector<double> values = model->Nominal();
-  for (const auto& [name, value] : named.values) {
-    GS_ASSIGN(const int index, model->Find(name, "the next experiment"));
-    values[static_cast<std::size_t>(index)] = value;
-  }
-  return Hypothesis{.name = NameOf(explanation), .model = model, .values = std::move(values)};
-}
-
 // Of the best input; where its pairs are the ordered ones of so many explanations.
 ForetoldMisfit MisfitOf(const InputScore& best, std::size_t explanations, double remaining) {
   ForetoldMisfit misfit{.seconds = best.wave.duration_s, .there = kInfinity, .not_there = kInfinity};
@@ -117,8 +106,8 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
   GS_ASSIGN(const auto bare, Model::Build(rig));
   std::vector<Hypothesis> rivals;
   for (std::size_t i = 0; i < next.models.size(); ++i) {
-    GS_ASSIGN(Hypothesis rival, Rebuild(rig, next.models[i], next.separates[i], bench.scales));
-    rivals.push_back(std::move(rival));
+    GS_ASSIGN(ResultModel built, BuildRunModel(rig, next.models[i], "the next experiment", bench.scales));
+    rivals.push_back({.name = NameOf(next.separates[i]), .model = built.model, .values = std::move(built.values)});
   }
   const Hypothesis nominal{.name = "nominal", .model = bare, .values = bare->Nominal()};
   GS_ASSIGN(const OptimalDesign design, DesignForRivals(nominal, rivals, options, bench.pool));

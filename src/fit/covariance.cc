@@ -47,7 +47,8 @@ Covariance CovarianceOf(const FitProblem& problem, const Linearization& at) {
   const Prior& prior = problem.prior();
   Eigen::MatrixXd hessian = at.hessian;
   hessian.diagonal() -= prior.weight - prior.scale * prior.known;
-  meat.diagonal() += prior.scale * prior.scale * prior.known;
+  const Eigen::VectorXd scatter = prior.scale * prior.scale * prior.known;
+  meat.diagonal() += scatter;
   hessian = range.asDiagonal() * hessian * range.asDiagonal();
   const SymmetricEigen eigen(hessian);
   const double largest = std::max(eigen.values.maxCoeff(), 1e-300);
@@ -62,10 +63,9 @@ Covariance CovarianceOf(const FitProblem& problem, const Linearization& at) {
   const Eigen::MatrixXd half_covariance =
       whitener * spread.vectors * spread.values.cwiseMax(noise).cwiseSqrt().asDiagonal();
   result.robust = half_covariance * half_covariance.transpose();
-  result.model_based = noise * whitener * whitener.transpose();
   const Eigen::MatrixXd inverse = whitener * whitener.transpose();
-  const Eigen::VectorXd scatter = (prior.scale * prior.scale * prior.known).cwiseProduct(range.cwiseAbs2());
-  result.of_prior = inverse * scatter.asDiagonal() * inverse;
+  result.model_based = noise * inverse;
+  result.of_prior = inverse * scatter.cwiseProduct(range.cwiseAbs2()).asDiagonal() * inverse;
   return result;
 }
 
@@ -180,7 +180,6 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
   result.covariance = range.asDiagonal() * covariance.robust * range.asDiagonal();
   result.of_prior = range.asDiagonal() * covariance.of_prior * range.asDiagonal();
   result.freedom = covariance.freedom;
-  result.quantile = StudentQuantile(covariance.freedom);
   result.flat = FlatDirections(problem, covariance);
   const Eigen::MatrixXd& own = covariance.model_based;
   for (Eigen::Index i = 0; i < space.size(); ++i) {

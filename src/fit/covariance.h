@@ -34,7 +34,6 @@ struct Uncertainty {
   Eigen::MatrixXd covariance;                            // of y
   Eigen::MatrixXd of_prior;                              // the part of it that what is known beforehand leaves
   double freedom = 1;                                    // of the part that the logs leave
-  double quantile = 0;                                   // deviations of a 95 % interval of that part
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above CovariancePolicy::correlated
 };
 

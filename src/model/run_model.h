@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_MODEL_RUN_MODEL_H_
 #define GAPSCOPE_MODEL_RUN_MODEL_H_
 
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,6 +19,16 @@ struct RunModel {
   std::vector<std::pair<std::string, double>> values;
 };
 RunModel RunModelOf(const Model& model, std::span<const double> values);
+
+struct ResultModel {
+  std::shared_ptr<const Model> model;
+  std::vector<double> values;
+};
+
+// A model by names, of this rig. `where` they come from, for errors: an effect or a parameter that the rig does not
+// have.
+Result<ResultModel> BuildRunModel(std::shared_ptr<const Rig> rig, const RunModel& named, const std::string& where,
+                                  const ScaleTable& scales);
 
 }  // namespace gapscope
 

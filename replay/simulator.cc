@@ -7,6 +7,7 @@
 #include "replay/policy.h"
 #include "replay/sensors.h"
 #include "src/core/statistics.h"
+#include "src/experiment/local_fit.h"
 #include "src/plugins/motor/history.h"
 
 namespace gapscope {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
+#include "src/experiment/local_fit.h"
 
 namespace gapscope {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "replay/simulator.h"
 #include "src/core/statistics.h"
+#include "src/experiment/local_fit.h"
 
 namespace gapscope {
 namespace {

@@ -29,6 +29,10 @@ std::string Candidate::Name() const {
   return name.empty() ? "none" : name;
 }
 
+bool Has(const std::vector<EffectUse>& set, const EffectUse& use) {
+  return std::find(set.begin(), set.end(), use) != set.end();
+}
+
 FitOptions Workbench::Options(const Model& model, bool train) const {
   FitOptions options{.window_s = window_s,
                      .max_windows = train ? max_windows : (max_windows + 1) / 2,

@@ -88,6 +88,8 @@ struct Workbench {
   bool TimeIsOver() const { return !(journal && journal->replaying()) && IsLate(deadline); }
 };
 
+bool Has(const std::vector<EffectUse>& set, const EffectUse& use);
+
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
 // Cost on the training logs.

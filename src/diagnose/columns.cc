@@ -10,6 +10,7 @@
 #include "src/core/dense.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
+#include "src/experiment/local_fit.h"
 
 namespace gapscope {
 namespace {
@@ -285,7 +286,7 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
   Wanted wanted = WantedOf(parent);
   std::vector<std::unique_ptr<Candidate>> children;  // until the columns are made
   for (std::size_t u = 0; u < uses.size(); ++u) {
-    if (std::find(parent.effects.begin(), parent.effects.end(), uses[u]) != parent.effects.end()) continue;
+    if (Has(parent.effects, uses[u])) continue;
     std::vector<EffectUse> effects = parent.effects;
     effects.push_back(uses[u]);
     auto made = MakeCandidate(bench, effects);

@@ -15,6 +15,7 @@
 #include "src/diagnose/policy.h"
 #include "src/diagnose/remainder.h"
 #include "src/diagnose/sizes.h"
+#include "src/experiment/local_fit.h"
 
 namespace gapscope {
 namespace {
@@ -217,7 +218,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(bench, chosen, *base.model);
   say("designing the next experiment");
-  result.next = DesignNext(FindOpenQuestions(bench, found, judgement), bench, noise);
+  result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
   result.where = Locate(PredictHeldOut(bench, base), bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(predicted, bench.data.held_out, seed);
   result.cut = found.cut;

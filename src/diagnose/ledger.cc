@@ -154,7 +154,7 @@ void Ledger::Continue(Candidate* candidate, Effort effort, double reach) {
 void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort) {
   constexpr double kLeft = 0.05;  // of the size that another shape took over
   for (const EffectUse& use : candidate->effects) {
-    if (std::find(from.effects.begin(), from.effects.end(), use) != from.effects.end()) continue;
+    if (Has(from.effects, use)) continue;
     const auto& parameters = EffectOf(use, *bench_.rig).parameters;
     const auto shape = std::find_if(parameters.begin(), parameters.end(), [](const auto& p) { return p.takes_over; });
     const auto scales = bench_.scales.find(use.on);
@@ -188,7 +188,7 @@ const Candidate* Ledger::BestSubset(const Candidate& candidate) const {
 Ledger::Start Ledger::StartFromSubset(const Candidate& candidate, const Candidate& part) const {
   std::vector<double> values = bench_.Nominal(*candidate.model);
   for (const auto& use : candidate.effects) {
-    if (std::find(part.effects.begin(), part.effects.end(), use) != part.effects.end()) continue;
+    if (Has(part.effects, use)) continue;
     for (const auto& p : PlacedParameters(use, *bench_.rig, bench_.scales)) {
       constexpr double kSmall = 0.1;
       double& value = values[candidate.model->IndexOf(p.name)];

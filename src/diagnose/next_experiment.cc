@@ -162,21 +162,20 @@ Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit) {
           .if_absent = at(absent, question.nested ? clear * kept : -0.5 * std::sqrt(count * misfit.not_there))};
 }
 
-NextExperiment DesignNext(const std::vector<OpenQuestion>& questions, const Workbench& bench,
-                          const std::vector<double>& noise) {
-  NextExperiment first;
-  for (const OpenQuestion& question : questions) {
-    auto designed = Design(question, bench, noise);
-    NextExperiment next = question.next;
+NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise) {
+  std::optional<NextExperiment> first;
+  while (const auto question = ask()) {
+    auto designed = Design(*question, bench, noise);
+    NextExperiment next = question->next;
     if (designed.ok()) {
       next = std::move(designed).value();
     } else {
       next.problem = designed.error().Text();
     }
     if (next.problem.empty()) return next;
-    if (&question == questions.data()) first = std::move(next);
+    if (!first) first = std::move(next);
   }
-  return first;
+  return first.value_or(NextExperiment{});
 }
 
 }  // namespace gapscope

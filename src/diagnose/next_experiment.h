@@ -4,6 +4,9 @@
 #ifndef GAPSCOPE_DIAGNOSE_NEXT_EXPERIMENT_H_
 #define GAPSCOPE_DIAGNOSE_NEXT_EXPERIMENT_H_
 
+#include <functional>
+#include <optional>
+
 #include "src/diagnose/judge.h"
 
 namespace gapscope {
@@ -18,9 +21,12 @@ struct OpenQuestion {
   double remaining = 1;  // squared residual over the sensors' noise that the likeliest one leaves
 };
 
+// The next question, which is fitted for only when it is asked; nothing: there are no more.
+using AskNext = std::function<std::optional<OpenQuestion>()>;
 // One question of each kind, the one most worth an experiment first: effects that are told together; one that is not
-// sure; one that a single log shows; one that these logs cannot show. Of several the largest gain's.
-std::vector<OpenQuestion> FindOpenQuestions(const Workbench& bench, SearchResult& found, const Judgement& judgement);
+// sure; one that a single log shows; one that these logs cannot show. Of several the largest gain's. All that is given
+// must outlive it.
+AskNext OpenQuestions(const Workbench& bench, SearchResult& found, const Judgement& judgement);
 
 // An input's length, and the squared residuals that the second explanation leaves where the first one holds (`there`)
 // and the other way round, both over what the likeliest one leaves of these logs.
@@ -35,8 +41,7 @@ Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit);
 
 // The first question that an input of the library would settle, with that input; else the first one, and why there is
 // none. `noise`: of each measured signal, SI. Limits that the experiment does not state are what the logs reached.
-NextExperiment DesignNext(const std::vector<OpenQuestion>& questions, const Workbench& bench,
-                          const std::vector<double>& noise);
+NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise);
 
 }  // namespace gapscope
 

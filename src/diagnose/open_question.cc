@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "src/core/collect.h"
@@ -20,12 +21,12 @@ class Asking {
   Asking(const Workbench& bench, SearchResult& found, const Judgement& judgement)
       : bench_(bench), found_(found), judgement_(judgement) {}
 
-  std::vector<OpenQuestion> Ask() {
-    std::vector<OpenQuestion> questions;
-    for (const auto& ask : {&Asking::Together, &Asking::Unsure, &Asking::OfOneLog, &Asking::Unseen}) {
-      if (auto question = (this->*ask)()) questions.push_back(*std::move(question));
+  std::optional<OpenQuestion> Next() {
+    constexpr std::array kKinds{&Asking::Together, &Asking::Unsure, &Asking::OfOneLog, &Asking::Unseen};
+    while (kind_ < kKinds.size()) {
+      if (auto question = (this->*kKinds[kind_++])()) return question;
     }
-    return questions;
+    return std::nullopt;
   }
 
  private:
@@ -43,7 +44,7 @@ class Asking {
     OpenQuestion question = Empty(why);
     EffectSet members;
     for (const EffectUse& use : uses) {
-      if (HasMember(use)) members = With(members, use);
+      if (Has(found_.chosen->effects, use)) members = With(members, use);
     }
     std::vector<const Candidate*> tried;
     for (const EffectUse& use : uses) {
@@ -131,20 +132,16 @@ class Asking {
     return std::nullopt;
   }
 
-  bool HasMember(const EffectUse& use) const {
-    const auto& effects = found_.chosen->effects;
-    return std::find(effects.begin(), effects.end(), use) != effects.end();
-  }
-
   const Workbench& bench_;
   SearchResult& found_;
   const Judgement& judgement_;
+  std::size_t kind_ = 0;
 };
 
 }  // namespace
 
-std::vector<OpenQuestion> FindOpenQuestions(const Workbench& bench, SearchResult& found, const Judgement& judgement) {
-  return Asking(bench, found, judgement).Ask();
+AskNext OpenQuestions(const Workbench& bench, SearchResult& found, const Judgement& judgement) {
+  return [asking = Asking(bench, found, judgement)]() mutable { return asking.Next(); };
 }
 
 }  // namespace gapscope

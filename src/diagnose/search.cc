@@ -186,19 +186,51 @@ class Searcher {
     return 2 * candidate.train_cost < static_cast<double>(candidate.problem->residuals());
   }
 
+  // What gains much alone is tried beside the leader too, as large as it was alone: the leader's columns do not see
+  // what begins to show only where both are large.
+  void AddFromAlone(const Candidate& leader) {
+    std::vector<Candidate*> alone = result_.ledger.All();
+    std::erase_if(alone, [&](const Candidate* one) {
+      if (one->effects.size() != 1 || Gain(*result_.base, *one) < kPolicy.promise) return true;
+      const EffectUse& use = one->effects.front();
+      const EffectSet both = With(leader.effects, use);
+      return Has(leader.effects, use) || result_.ledger.Find(both) ||
+             std::any_of(leader.effects.begin(), leader.effects.end(), [&](const EffectUse& member) {
+               return Contains(use, member, *bench_.rig) || Contains(member, use, *bench_.rig) ||
+                      AreOneMotion(use, member, *result_.base->model, result_.logged);
+             });
+    });
+    std::stable_sort(alone.begin(), alone.end(),
+                     [](const auto* a, const auto* b) { return a->train_cost < b->train_cost; });
+    if (alone.size() > kPolicy.alone) alone.resize(kPolicy.alone);
+    std::vector<Candidate*> tasted;
+    for (const Candidate* one : alone) {
+      if (Late(until_, "sets of effects")) return;
+      const EffectSet both = With(leader.effects, one->effects.front());
+      std::map<std::string, double> values;
+      for (const auto& p : PlacedParameters(one->effects.front(), *bench_.rig, bench_.scales))
+        values[p.name] = one->values[static_cast<std::size_t>(one->model->IndexOf(p.name))];
+      say_("refitting " + NameOfSet(both));
+      if (Candidate* candidate = result_.ledger.Refit(both, leader, values, {}, Effort::kTaste))
+        tasted.push_back(candidate);
+    }
+    GoOn(std::move(tasted), 1);
+  }
+
   // Additions to these, then to what leads, as long as it is another one.
   void Grow(std::vector<Candidate*> leaders) {
     for (std::size_t round = 0; round < kPolicy.most_effects; ++round) {
       bool again = false;
       for (Candidate* leader : leaders) {
-        if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) ||
-            !grown_.insert(leader->effects).second)
+        if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) || grown_.contains(leader->effects))
           continue;
         if (Late(until_, "additions")) return;
+        grown_.insert(leader->effects);
         say_("what could be added to " + NameOfSet(leader->effects));
         ColumnTable table = MakeColumns(bench_, *leader, result_.uses, {}, &result_.columns);
         if (!table.valid) continue;
         RefitSets(*leader, table, {kPolicy.additions, 1});
+        AddFromAlone(*leader);
         if (bench_.Late(until_)) grown_.erase(leader->effects);
         again = true;
       }
@@ -258,9 +290,7 @@ class Searcher {
     const ColumnTable& table = result_.columns;
     std::vector<std::pair<double, EffectUse>> ranked;
     for (const EffectUse& use : result_.uses) {
-      if (std::find(result_.chosen->effects.begin(), result_.chosen->effects.end(), use) !=
-          result_.chosen->effects.end())
-        continue;
+      if (Has(result_.chosen->effects, use)) continue;
       const bool one = AreOneMotion(use, member.use, *result_.base->model, result_.logged) ||
                        Contains(member.use, use, *bench_.rig) || Contains(use, member.use, *bench_.rig);
       double most = one ? 1 : 0;

@@ -1,6 +1,5 @@
 #include "src/experiment/recording.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -156,69 +155,6 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
   }
   recording.timeline = std::move(timeline);
   return recording;
-}
-
-namespace {
-
-// A log that begins at rest: nothing leaves the first sample's count for the first 10 ms, or so much more of the way is
-// made in the 40 ms after them (24 times at a constant acceleration from rest, 4 times at a constant speed) that the
-// motion had only begun.
-bool StartsAtRest(const Recording& recording, const Recording::Measured& measured) {
-  constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
-  const auto& t = recording.time_s;
-  const auto& values = measured.values;
-  std::size_t k = 1;
-  bool stays = true;
-  for (; k < t.size() && (k < 3 || t[k] - t[0] <= kBegin_s); ++k)
-    stays = stays && std::abs(values[k] - values[0]) <= 1.01 * measured.spec.resolution;
-  if (stays) return true;
-  std::size_t begin = 1, end = 1;
-  while (begin + 1 < t.size() && t[begin] - t[0] < kBegin_s) ++begin;
-  while (end + 1 < t.size() && t[end] - t[0] < kEnd_s) ++end;
-  return kFarther * std::abs(values[begin] - values[0]) <= std::abs(values[end] - values[begin]);
-}
-
-}  // namespace
-
-LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
-                    double half_width_s) {
-  if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured))
-    return {measured.values[0], 0};
-  const auto& t = recording.time_s;
-  std::size_t first = row, last = row;
-  while (first > 0 && t[row] - t[first - 1] <= half_width_s) --first;
-  while (last + 1 < t.size() && t[last + 1] - t[row] <= half_width_s) ++last;
-  // At least seven samples where there are, so that the quadratic does not follow single counts.
-  while (last - first < 6 && (first > 0 || last + 1 < t.size())) {
-    if (last + 1 < t.size()) ++last;
-    if (last - first < 6 && first > 0) --first;
-  }
-  // Normal equations of y = a + b s + c s^2 with s = (t - t[row]) / scale.
-  const double scale = std::max(t[last] - t[row], t[row] - t[first]);
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  double squares = 0;
-  int count = 0;
-  for (std::size_t k = first; k <= last; ++k) {
-    const double y = measured.values[k], s = scale > 0 ? (t[k] - t[row]) / scale : 0;
-    if (!std::isfinite(y)) continue;
-    const Eigen::Vector3d basis(1, s, s * s);
-    normal += basis * basis.transpose();
-    right += basis * y;
-    squares += y * y;
-    ++count;
-  }
-  if (count < 4) return {std::isfinite(measured.values[row]) ? measured.values[row] : 0, 0};
-  const Eigen::Matrix3d inverse = normal.inverse();
-  const Eigen::Vector3d fit = inverse * right;
-  const double scatter = std::max(squares - fit.dot(right), 0.0) / (count - 3);
-  const double quantisation = measured.spec.resolution * measured.spec.resolution / 12;
-  const double slope_error = std::sqrt(std::max(scatter, quantisation) * inverse(1, 1));
-  // A slope that the samples cannot tell from rest is rest: at a log's first row the fit is one-sided and weak.
-  constexpr double kSignificant = 2;
-  if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(measured.values[row]))
-    return {measured.values[row], 0, std::sqrt(scatter), scale};
-  return {fit[0], fit[1] / scale, std::sqrt(scatter), scale};
 }
 
 }  // namespace gapscope

@@ -43,18 +43,6 @@ struct Recording {
 // name); no scored signal at all; fewer than two rows.
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path);
 
-// The value and slope of a measured signal at `row`, from a local quadratic least-squares fit over +-`half_width_s`
-// (one-sided at the ends): the initial state of a replay. Slope in SI per second; a slope within two standard errors of
-// zero is zero, and the value then the sample itself; so is that of a first row that is followed by 10 ms within one
-// count, or by so little way beside the next 40 ms that motion had only begun.
-struct LocalFit {
-  double value = 0, slope = 0;
-  // Standard deviation of the samples about it, and how far they lie to either side; 0: there is no fit.
-  double scatter = 0, half_width_s = 0;
-};
-LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
-                    double half_width_s);
-
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_EXPERIMENT_RECORDING_H_

@@ -204,6 +204,7 @@ ordered_json JsonPolicy() {
           {"search.scanned", policy.search.scanned},
           {"search.leaders", policy.search.leaders},
           {"search.additions", policy.search.additions},
+          {"search.alone", policy.search.alone},
           {"search.most_effects", policy.search.most_effects},
           {"search.promise", policy.search.promise},
           {"search.member", policy.search.member},

@@ -71,7 +71,7 @@ TEST_F(ResumeTest, KilledRunEndsInTheSameBytes) {
   const std::vector<std::string> left = Killed(&whole);
   EXPECT_EQ(whole, Bytes(Run({})));
   ASSERT_GT(left.size(), 8u);
-  for (const std::size_t i : {std::size_t{0}, left.size() / 3, 2 * left.size() / 3, left.size() - 1}) {
+  for (const std::size_t i : {left.size() / 3, left.size() - 1}) {
     // Killed while a record is written: it says that more follows than does.
     std::ofstream(left[i] + "/calls.bin", std::ios::app)
         << std::string(8, 'h') << std::string("\x05\0\0\0\0\0\0\0torn", 12);

@@ -25,7 +25,6 @@ bool StartsAtRest(const Recording& recording, const Recording::Measured& measure
   return kFarther * std::abs(values[begin] - values[0]) <= std::abs(values[end] - values[begin]);
 }
 
-
 // The samples that a fit takes: those within the half width, and at least seven where there are, so that a parabola
 // does not follow single counts.
 struct Reach {
@@ -81,8 +80,7 @@ LocalFit FitLocally(const Recording& recording, const Recording::Measured& measu
                     double half_width_s) {
   if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured))
     return {measured.values[0], 0};
-  const Normal normal =
-      NormalOf(recording.time_s, measured.values, row, ReachOf(recording.time_s, row, half_width_s));
+  const Normal normal = NormalOf(recording.time_s, measured.values, row, ReachOf(recording.time_s, row, half_width_s));
   const LocalFit rest{std::isfinite(measured.values[row]) ? measured.values[row] : 0, 0};
   if (normal.count < 4) return rest;
   const double quantisation = measured.spec.resolution * measured.spec.resolution / 12;

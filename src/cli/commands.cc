@@ -1,11 +1,45 @@
 #include "src/cli/commands.h"
 
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "src/model/plugin_library.h"
+
 namespace gapscope::cli {
+namespace {
+
+// A command that builds models, or those below it: plugins of the user's are loaded before it runs.
+Command WithPlugins(Command command) {
+  for (Command& below : command.commands) below = WithPlugins(std::move(below));
+  if (!command.run) return command;
+  auto files = std::make_shared<std::vector<std::string>>();
+  command.options.push_back({.flag = "--plugin",
+                             .value = files.get(),
+                             .help = "Library of MuJoCo plugins, loaded first; more than once",
+                             .more = "For plugins of your own in the MJCF, or as candidates of the experiment file "
+                                     "(docs/candidates.md). It runs in this program: load only what you trust. One "
+                                     "that does not load is left out, and stderr says so"});
+  command.run = [files, run = command.run]() -> Result<int> {
+    GS_ASSIGN(const std::vector<std::string> left_out, LoadPluginLibraries(*files));
+    for (const std::string& text : left_out) fmt::print(stderr, "warning: {}\n", text);
+    return run();
+  };
+  return command;
+}
+
+}  // namespace
 
 std::vector<Command> AllCommands() {
-  return {InitCommand(),    InspectCommand(), ReplayCommand(),   TuneCommand(),   DiagnoseCommand(),
-          ExplainCommand(), ApplyCommand(),   IdentifyCommand(), DesignCommand(), RenderCommand(),
-          PlanCommand(),    RunCommand(),     MergeCommand()};
+  std::vector<Command> all;
+  for (Command (*make)() : {InitCommand, ReplayCommand, TuneCommand, DiagnoseCommand, ExplainCommand, ApplyCommand,
+                            DesignCommand, RenderCommand, PlanCommand, RunCommand})
+    all.push_back(WithPlugins(make()));
+  all.insert(all.begin() + 1, InspectCommand());
+  all.insert(all.begin() + 7, IdentifyCommand());
+  all.push_back(MergeCommand());
+  return all;
 }
 
 }  // namespace gapscope::cli

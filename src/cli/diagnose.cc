@@ -200,6 +200,7 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   auto diagnosed = Diagnose(experiment, data, options, pool);
   if (live) fmt::print(stderr, "\r\033[K");
   if (!diagnosed.ok()) return diagnosed.error();
+  PrintLeftOut(*diagnosed.value().model->rig());
   const DiagnoseRun run{.info = {.seed = flags.common.seed}, .diagnosis = std::move(diagnosed).value()};
   if (!flags.common.out.empty()) {
     GS_RETURN_IF_ERROR(WriteDiagnosis(flags.common.out, experiment, data, log_values, run, pool));

@@ -184,6 +184,7 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
   if (!flags.while_column.empty()) session.experiment.replay.while_column = flags.while_column;
   GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
   GS_ASSIGN(session.model, Model::Load(session.experiment));
+  PrintLeftOut(*session.model->rig());
   if (!flags.with.empty()) {
     session.scales = EstimateScales(*session.model, session.recordings);
     GS_ASSIGN(const std::vector<EffectUse> uses, ParseEffects(flags.with, *session.model->rig()));
@@ -218,6 +219,10 @@ Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const s
                  .cure = "add logs before --hold-out"};
   }
   return result;
+}
+
+void PrintLeftOut(const Rig& rig) {
+  for (const LeftOutCandidate& candidate : rig.left_out()) fmt::print(stderr, "warning: {}\n", candidate.Text());
 }
 
 void PrintFindings(const std::vector<Recording>& recordings, bool quiet) {

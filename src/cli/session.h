@@ -81,6 +81,9 @@ struct HeldOutLogs {
 };
 Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const std::vector<std::string>& hold_out);
 
+// Candidates that are left out, on stderr.
+void PrintLeftOut(const Rig& rig);
+
 // Every finding of the logs on stderr, one line each, unless quiet.
 void PrintFindings(const std::vector<Recording>& recordings, bool quiet);
 

@@ -82,6 +82,10 @@ std::string Explain(const Diagnosis& d) {
   if (d.data_s < kDiagnosePolicy.evidence.least_data_s)
     text +=
         fmt::format(" The logs hold {:.0f} s in all: on so little, what is absent may only not have shown.", d.data_s);
+  if (d.model) {
+    for (const LeftOutCandidate& candidate : d.model->rig()->left_out())
+      text += " Not asked about: " + candidate.Text() + ".";
+  }
   if (!d.cut.empty()) text += " The budget ended the search early.";
   return text;
 }

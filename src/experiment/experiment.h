@@ -119,13 +119,17 @@ struct OwnParameter {
   std::optional<ParameterRole> role = std::nullopt;  // none: as the expression shows
 };
 
-// An effect of the experiment's own: a torque on a joint, or other expressions for fields of the model.
+// An effect of the experiment's own: a torque on a joint by a formula or by a plugin, or other expressions for fields
+// of the model. One of torque, plugin and settings is not empty.
 struct OwnEffect {
   std::string name, meaning = "";
-  std::string joint = "", torque = "";      // an expression as gapscope.expression reads it, N m; empty: `settings`
+  std::string joint = "";                          // of a torque
+  std::string torque = "";                         // an expression as gapscope.expression reads it, N m
+  std::string plugin = "";                         // the name that its library registers
+  std::map<std::string, std::string> config = {};  // of the plugin
   std::vector<FieldSetting> settings = {};  // expressions of its own and the experiment's parameters, and log values
   std::vector<OwnParameter> parameters = {};
-  std::string where = "", torque_where = "";  // file:line:column, for errors
+  std::string where = "", torque_where = "";  // file:line:column, for errors; torque_where: of the plugin too
 };
 
 // An effect that is not asked about, on one place or (empty) on all.

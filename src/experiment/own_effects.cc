@@ -23,6 +23,7 @@ bool IsPlainName(const std::string& name) {
 
 // What the expressions of a candidate may name beside its own parameters.
 std::vector<std::string> OtherNames(const OwnEffect& effect, const Experiment& experiment) {
+  if (!effect.plugin.empty()) return Collect(effect.config, [](const auto& pair) { return pair.first; });
   if (!effect.torque.empty()) {
     return {plugins::kFormulaInputs.begin(), plugins::kFormulaInputs.end()};
   }
@@ -96,7 +97,9 @@ Status ReadOwnParameters(const YAML::Node& node, const std::string& path, const 
   return map.Finish();
 }
 
+// What a plugin reads shows only where it runs.
 Status CheckExpressions(const OwnEffect& effect, std::vector<std::string> names) {
+  if (!effect.plugin.empty()) return Ok();
   std::vector<FieldSetting> all = effect.settings;
   if (!effect.torque.empty())
     all.push_back({.field = "", .expressions = {effect.torque}, .where = effect.torque_where});
@@ -122,13 +125,36 @@ Status CheckExpressions(const OwnEffect& effect, std::vector<std::string> names)
   return Ok();
 }
 
+void ReadConfig(YamlMap& map, const YAML::Node& config, OwnEffect* effect) {
+  if (!config.IsDefined()) return;
+  if (effect->plugin.empty()) map.Fail(config, {.what = "'config' is of a plugin, and the candidate has none"});
+  if (!config.IsMap()) map.Fail(config, {.what = "'config' is not a map", .allowed = "KEY: text"});
+  for (const auto& pair : config) {
+    if (!pair.first.IsScalar() || !pair.second.IsScalar() || !IsPlainName(pair.first.Scalar()) ||
+        pair.first.Scalar() == "joint") {
+      map.Fail(pair.first, {.what = "not an attribute of a plugin",
+                            .allowed = "KEY: text, KEY of letters, digits and '_'; 'joint' is the candidate's"});
+      return;
+    }
+    effect->config[pair.first.Scalar()] = pair.second.Scalar();
+  }
+}
+
+// A torque by a formula, a torque by a plugin, or a change of fields.
+bool IsOneOfThem(const OwnEffect& effect, bool sets) {
+  const int of_joint = (effect.torque.empty() ? 0 : 1) + (effect.plugin.empty() ? 0 : 1);
+  return of_joint + (sets ? 1 : 0) == 1 && effect.joint.empty() == sets;
+}
+
 Status ReadOwnEffect(const YAML::Node& item, const std::string& path, Experiment* experiment) {
   YamlMap map(item, path, "a candidate");
   OwnEffect effect{.name = map.Text("name"), .where = YamlPlace(path, item)};
   effect.meaning = map.Text("doc", "");
   effect.joint = map.Text("joint", "");
   effect.torque = map.Text("torque", "");
+  effect.plugin = map.Text("plugin", "");
   const YAML::Node set = map.Child("set"), parameters = map.Child("parameters");
+  ReadConfig(map, map.Child("config"), &effect);
   if (!IsPlainName(effect.name)) {
     map.Fail(item, {.what = "not a name of a candidate", .actual = "'" + effect.name + "'", .allowed = kNameRule});
   }
@@ -136,9 +162,9 @@ Status ReadOwnEffect(const YAML::Node& item, const std::string& path, Experiment
     if (other.name == effect.name)
       map.Fail(item, {.what = "the candidate '" + effect.name + "' stands twice", .cure = "rename one"});
   }
-  if (effect.torque.empty() == !set.IsDefined() || effect.torque.empty() != effect.joint.empty()) {
+  if (!IsOneOfThem(effect, set.IsDefined())) {
     map.Fail(item, {.what = "the candidate '" + effect.name + "' is neither a torque nor a change of fields",
-                    .allowed = "'joint' and 'torque', or 'set'"});
+                    .allowed = "'joint' and 'torque', 'joint' and 'plugin', or 'set'"});
   }
   if (!parameters.IsDefined()) {
     map.Fail(item, {.what = "the candidate '" + effect.name + "' has no 'parameters'",
@@ -146,7 +172,9 @@ Status ReadOwnEffect(const YAML::Node& item, const std::string& path, Experiment
   }
   GS_RETURN_IF_ERROR(map.Finish());
   if (set.IsDefined()) GS_RETURN_IF_ERROR(ReadFieldSettings(set, path, &effect.settings));
-  if (const YAML::Node torque = item["torque"]; torque) effect.torque_where = YamlPlace(path, torque);
+  for (const char* key : {"torque", "plugin"}) {
+    if (const YAML::Node torque = item[key]; torque) effect.torque_where = YamlPlace(path, torque);
+  }
   const std::vector<std::string> others = OtherNames(effect, *experiment);
   GS_RETURN_IF_ERROR(ReadOwnParameters(parameters, path, others, &effect));
   GS_RETURN_IF_ERROR(CheckExpressions(effect, others));

@@ -204,6 +204,9 @@ Result<EffectUse> ParseEffectUse(const std::string& text, const Rig& rig) {
     for (const auto& place : Places(effect, rig)) places.push_back(place);
   }
   if (std::find(names.begin(), names.end(), name) == names.end()) {
+    for (const LeftOutCandidate& candidate : rig.left_out()) {
+      if (candidate.name == name) return Error{.what = candidate.Text(), .where = "--with " + text};
+    }
     return NoSuch("unknown effect", name, names, "--with " + text);
   }
   if (IsOff(name, on, rig)) {

@@ -138,6 +138,13 @@ struct EffectUse {
 // Scales by joint and by actuator.
 using ScaleTable = std::map<std::string, Scales>;
 
+// A candidate of the experiment that is not asked about: no library registers its plugin, or that refuses the model or
+// crashes.
+struct LeftOutCandidate {
+  std::string name, why;
+  std::string Text() const { return "the candidate '" + name + "' is left out: " + why; }
+};
+
 // A program's own effect, beside the files of effects/: before the catalogue is first read.
 void AddToCatalogue(Effect effect);
 

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/core/apart.h"
 #include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/experiment/expression.h"
 #include "src/model/fields.h"
+#include "src/model/own_probe.h"
 #include "src/model/rig.h"
 #include "src/model/structure.h"
 #include "src/plugins/common/parser.h"
@@ -15,7 +17,7 @@
 namespace gapscope {
 namespace {
 
-using Values = std::vector<double>;
+using Values = OwnProbe::Values;
 
 bool IsSame(const Values& a, const Values& b) {
   constexpr double kRounding = 1e-9;
@@ -35,83 +37,13 @@ Values Sum(const Values& a, double factor, const Values& b) {
   return sum;
 }
 
-// A candidate's expressions at values of its parameters: a torque at a dozen motions, fields at the base model's
-// nominal parameters.
-class Probe {
- public:
-  Probe(const OwnEffect& own, const Experiment& experiment) : own_(own) {
-    std::vector<std::string> names, texts = {own.torque};
-    if (own.torque.empty()) {
-      for (const Parameter& p : experiment.parameters) names.push_back(p.name), variables_.push_back(p.nominal);
-      for (const LogValue& v : experiment.values) names.push_back(v.name), variables_.push_back(v.fallback.value_or(1));
-      texts.clear();
-      for (const FieldSetting& s : own.settings) texts.insert(texts.end(), s.expressions.begin(), s.expressions.end());
-    } else {
-      names.assign(plugins::kFormulaInputs.begin(), plugins::kFormulaInputs.end());
-      variables_.assign(names.size(), 0);
-    }
-    first_ = names.size();
-    for (const OwnParameter& p : own.parameters) names.push_back(p.key), variables_.push_back(p.neutral);
-    for (const std::string& text : texts)
-      expressions_.push_back(Expression::Parse(text, names, variables_.data(), own.where).value());
-  }
-  Probe(const Probe&) = delete;
-  Probe& operator=(const Probe&) = delete;
-
-  Values At(const Values& parameters) {
-    std::copy(parameters.begin(), parameters.end(), variables_.begin() + static_cast<std::ptrdiff_t>(first_));
-    Values values;
-    const int motions = own_.torque.empty() ? 1 : kMotions;
-    for (int k = 0; k < motions; ++k) {
-      if (!own_.torque.empty()) Move(k + 1);
-      for (const Expression& expression : expressions_) values.push_back(expression.Evaluate());
-    }
-    return values;
-  }
-  Values AtNeutral() { return At(Collect(own_.parameters, &OwnParameter::neutral)); }
-  // Parameter i moved from there alone.
-  Values Alone(std::size_t i) {
-    Values values = Collect(own_.parameters, &OwnParameter::neutral);
-    values[i] = Moved(own_.parameters[i]);
-    return At(values);
-  }
-  // All moved, i to this value.
-  Values Beside(std::size_t i, double value) {
-    Values values = Collect(own_.parameters, Moved);
-    values[i] = value;
-    return At(values);
-  }
-  // A value at which the parameter does something.
-  static double Moved(const OwnParameter& p) {
-    Values values = p.trials;
-    values.insert(values.begin(), p.start);
-    values.insert(values.end(), {p.high, p.low});
-    return *std::find_if(values.begin(), values.end(), [&](double value) { return value != p.neutral; });
-  }
-
- private:
-  static constexpr int kMotions = 12;
-  // Nothing about these motions is special: no zero, both signs.
-  void Move(int k) {
-    variables_[plugins::kAngle] = 1.9 * std::sin(1.7 * k);
-    variables_[plugins::kSpeed] = 5.3 * std::sin(2.3 * k + 0.4);
-    variables_[plugins::kCommand] = 3.1 * std::cos(1.1 * k);
-    variables_[plugins::kTime] = 0.83 * k;
-  }
-
-  const OwnEffect& own_;
-  Values variables_;
-  std::size_t first_ = 0;  // of the candidate's parameters in variables_
-  std::vector<Expression> expressions_;
-};
-
-bool IsLinear(Probe& probe, std::size_t i, double value) {
+bool IsLinear(OwnProbe& probe, std::size_t i, double value) {
   const Values none = probe.Beside(i, 0), once = probe.Beside(i, value), twice = probe.Beside(i, 2 * value);
   return IsSame(Sum(twice, -1, none), Sum(Sum(once, -1, none), 1, Sum(once, -1, none)));
 }
 
 // How the torque's parameter acts with its first one, the only size: an angle, a rest, or otherwise.
-Parameter::With ActsWith(Probe& probe, std::size_t i, const OwnParameter& p) {
+Parameter::With ActsWith(OwnProbe& probe, std::size_t i, const OwnParameter& p) {
   const Values at_zero = probe.Beside(i, 0), at_one = probe.Beside(i, 1),
                at_quarter = probe.Beside(i, std::numbers::pi / 2);
   bool angle = p.low <= -std::numbers::pi && p.high >= std::numbers::pi;
@@ -125,14 +57,14 @@ Parameter::With ActsWith(Probe& probe, std::size_t i, const OwnParameter& p) {
 }
 
 // The sizes first, those that act linearly before the others: results show the first one.
-std::vector<EffectParameter> ParametersOf(const OwnEffect& own, Probe& probe) {
+std::vector<EffectParameter> ParametersOf(const OwnEffect& own, OwnProbe& probe) {
   const Values neutral = probe.AtNeutral();
   std::vector<std::pair<int, EffectParameter>> ranked;
   for (std::size_t i = 0; i < own.parameters.size(); ++i) {
     const OwnParameter& p = own.parameters[i];
     const auto role = p.role.value_or(IsSame(probe.Alone(i), neutral) ? ParameterRole::kPlace : ParameterRole::kSize);
     const bool size = role == ParameterRole::kSize,
-               linear = size && p.neutral == 0 && IsLinear(probe, i, Probe::Moved(p));
+               linear = size && p.neutral == 0 && IsLinear(probe, i, OwnProbe::Moved(p));
     const int rank = linear ? 0 : size ? 1 : 2;
     ranked.push_back({rank,
                       {.key = p.key,
@@ -143,14 +75,14 @@ std::vector<EffectParameter> ParametersOf(const OwnEffect& own, Probe& probe) {
                        .high = p.high,
                        .trials = p.trials,
                        .start = p.start,
-                       .of_torque = linear && !own.torque.empty()}});
+                       .of_torque = linear && !own.joint.empty()}});
   }
   std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   return Collect(ranked, [](const auto& entry) { return entry.second; });
 }
 
 // Which parameters the catalogue would call an angle or a rest of the first one.
-void Couple(const OwnEffect& own, Probe& probe, std::vector<EffectParameter>* parameters) {
+void Couple(const OwnEffect& own, OwnProbe& probe, std::vector<EffectParameter>* parameters) {
   const auto index = [&](const std::string& key) {
     const auto found =
         std::find_if(own.parameters.begin(), own.parameters.end(), [&](const OwnParameter& p) { return p.key == key; });
@@ -164,20 +96,7 @@ void Couple(const OwnEffect& own, Probe& probe, std::vector<EffectParameter>* pa
   }
 }
 
-// Forces of a joint that its own motion makes.
-bool IsOfMotion(const OwnEffect& own) {
-  if (!own.torque.empty()) {
-    return !Mentions(own.torque, plugins::kFormulaInputs[plugins::kCommand]) &&
-           !Mentions(own.torque, plugins::kFormulaInputs[plugins::kTime]);
-  }
-  return std::all_of(own.settings.begin(), own.settings.end(), [](const FieldSetting& s) {
-    const std::string last = s.field.substr(s.field.rfind('/') + 1);
-    return s.field.starts_with("joint/") &&
-           (last.starts_with("damping") || last.starts_with("stiffness") || last == "springref");
-  });
-}
-
-Status CheckTorque(const OwnEffect& own, Probe& probe, const Rig& rig) {
+Status CheckJoint(const OwnEffect& own, const Rig& rig) {
   const std::vector<std::string> joints = rig.Joints();
   if (std::find(joints.begin(), joints.end(), own.joint) == joints.end())
     return NoSuch("a candidate acts on a joint that the MJCF lacks", own.joint, joints, own.where);
@@ -186,6 +105,10 @@ Status CheckTorque(const OwnEffect& own, Probe& probe, const Rig& rig) {
                  .where = own.torque_where,
                  .allowed = "angle, speed, time and parameters"};
   }
+  return Ok();
+}
+
+Status CheckTorque(const OwnEffect& own, OwnProbe& probe) {
   for (const double torque : probe.AtNeutral()) {
     if (torque == 0) continue;
     return Error{.what = "the torque of '" + own.name + "' is not zero at the neutral values of its parameters",
@@ -219,7 +142,7 @@ Result<Values> BaseValues(const FieldSetting& own, const Rig& rig) {
   return values;
 }
 
-Status CheckFields(const OwnEffect& own, Probe& probe, const Rig& rig) {
+Status CheckFields(const OwnEffect& own, OwnProbe& probe, const Rig& rig) {
   const Values neutral = probe.AtNeutral();
   auto at = neutral.begin();
   for (const FieldSetting& setting : own.settings) {
@@ -266,6 +189,11 @@ Status Apply(const OwnEffect& own, Structure& structure, const std::map<std::str
                             .parameters = names});
     return Ok();
   }
+  if (!own.plugin.empty()) {
+    structure.AddOwnPlugin(
+        {.name = own.name, .joint = own.joint, .plugin = own.plugin, .config = own.config, .parameters = names});
+    return Ok();
+  }
   for (const FieldSetting& setting : own.settings) {
     GS_RETURN_IF_ERROR(structure.Replace(
         setting.field, Collect(setting.expressions, [&](const auto& text) { return WithNames(text, names); })));
@@ -273,22 +201,47 @@ Status Apply(const OwnEffect& own, Structure& structure, const std::map<std::str
   return Ok();
 }
 
+Status CheckEnters(const OwnEffect& own, OwnProbe& probe) {
+  for (std::size_t i = 0; i < own.parameters.size(); ++i) {
+    const OwnParameter& p = own.parameters[i];
+    if (p.role || probe.Beside(i, OwnProbe::Moved(p)) != probe.Beside(i, p.neutral)) continue;
+    return Error{.what = "the parameter '" + p.key + "' does nothing in the plugin '" + own.plugin + "'",
+                 .where = p.where,
+                 .allowed = "numerics that it reads on each compute: " + OwnInstance(own.joint, own.name) + "." + p.key,
+                 .cure = "delete it; where it acts only over time, say its 'role'"};
+  }
+  return Ok();
+}
+
+Result<std::unique_ptr<OwnProbe>> MakeProbe(const OwnEffect& own, const Rig& rig) {
+  if (!own.plugin.empty()) return MakePluginProbe(own, rig);
+  return MakeFormulaProbe(own, rig.experiment());
+}
+
+std::string SignatureOf(const OwnEffect& own) {
+  if (!own.plugin.empty()) return "torque of the plugin " + own.plugin;
+  if (!own.torque.empty()) return "torque " + own.torque;
+  return own.settings.front().field + " = " + Join(own.settings.front().expressions);
+}
+
 Result<Effect> MakeEffect(const OwnEffect& own, const Rig& rig) {
-  Probe probe(own, rig.experiment());
-  const bool torque = !own.torque.empty();
+  const bool torque = !own.joint.empty();
+  if (torque) GS_RETURN_IF_ERROR(CheckJoint(own, rig));
+  GS_ASSIGN(const std::unique_ptr<OwnProbe> made, MakeProbe(own, rig));
+  OwnProbe& probe = *made;
   if (torque) {
-    GS_RETURN_IF_ERROR(CheckTorque(own, probe, rig));
+    GS_RETURN_IF_ERROR(CheckTorque(own, probe));
   } else {
     GS_RETURN_IF_ERROR(CheckFields(own, probe, rig));
   }
+  if (!own.plugin.empty()) GS_RETURN_IF_ERROR(CheckEnters(own, probe));
   Effect effect{.name = own.name,
                 .place = EffectPlace::kNamed,
                 .parameters = ParametersOf(own, probe),
                 .meaning = own.meaning.empty() ? "a candidate of the experiment file" : own.meaning,
-                .of_motion = IsOfMotion(own),
+                .signature = SignatureOf(own),
+                .of_motion = probe.IsOfMotion(),
                 .on = torque ? own.joint : ElementOfField(own.settings.front().field)};
-  effect.signature =
-      torque ? "torque " + own.torque : own.settings.front().field + " = " + Join(own.settings.front().expressions);
   Couple(own, probe, &effect.parameters);
   GS_RETURN_IF_ERROR(CheckTrials(own, effect));
   effect.apply = [own, keys = Collect(effect.parameters, &EffectParameter::key)](
@@ -300,10 +253,25 @@ Result<Effect> MakeEffect(const OwnEffect& own, const Rig& rig) {
   return effect;
 }
 
+// Empty: the plugin runs. Else why it cannot be asked about: it is not there, refuses the model, or crashes.
+std::string FaultOfPlugin(const OwnEffect& own, const Rig& rig) {
+  return TryApart([&]() -> std::string {
+    const auto probe = MakePluginProbe(own, rig);
+    if (!probe.ok()) return probe.error().what;
+    for (std::size_t i = 0; i < own.parameters.size(); ++i) {
+      const OwnParameter& p = own.parameters[i];
+      Values values = p.trials;
+      values.insert(values.end(), {p.low, p.high});
+      for (const double value : values) probe.value()->Beside(i, value);
+    }
+    return "";
+  });
+}
+
 }  // namespace
 
-Result<std::vector<Effect>> OwnCandidates(const Rig& rig) {
-  std::vector<Effect> effects;
+Result<OwnEffects> OwnCandidates(const Rig& rig) {
+  OwnEffects own_effects;
   const std::vector<std::string> known = EffectNames();
   for (const OwnEffect& own : rig.experiment().candidates) {
     if (std::find(known.begin(), known.end(), own.name) != known.end()) {
@@ -312,10 +280,17 @@ Result<std::vector<Effect>> OwnCandidates(const Rig& rig) {
                    .actual = "'" + own.name + "'",
                    .cure = "rename the candidate"};
     }
+    if (!own.plugin.empty()) {
+      GS_RETURN_IF_ERROR(CheckJoint(own, rig));
+      if (const std::string fault = FaultOfPlugin(own, rig); !fault.empty()) {
+        own_effects.left_out.push_back({own.name, fault});
+        continue;
+      }
+    }
     GS_ASSIGN(Effect effect, MakeEffect(own, rig));
-    effects.push_back(std::move(effect));
+    own_effects.effects.push_back(std::move(effect));
   }
-  return effects;
+  return own_effects;
 }
 
 }  // namespace gapscope

@@ -9,10 +9,15 @@
 
 namespace gapscope {
 
+struct OwnEffects {
+  std::vector<Effect> effects;
+  std::vector<LeftOutCandidate> left_out;
+};
+
 // Errors, with their place in the experiment file: a name that the catalogue has; a joint or a field that the MJCF
 // lacks; a command of a joint without drive; a candidate that does something at its neutral values, or has no values to
-// be tried at.
-Result<std::vector<Effect>> OwnCandidates(const Rig& rig);
+// be tried at; a parameter that its plugin does not read.
+Result<OwnEffects> OwnCandidates(const Rig& rig);
 
 }  // namespace gapscope
 

@@ -46,8 +46,9 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
                  .where = experiment.model_path};
   }
   rig->effects_ = Catalogue();
-  GS_ASSIGN(std::vector<Effect> own, OwnCandidates(*rig));
-  std::move(own.begin(), own.end(), std::back_inserter(rig->effects_));
+  GS_ASSIGN(OwnEffects own, OwnCandidates(*rig));
+  std::move(own.effects.begin(), own.effects.end(), std::back_inserter(rig->effects_));
+  rig->left_out_ = std::move(own.left_out);
   std::stable_sort(rig->effects_.begin(), rig->effects_.end(),
                    [](const Effect& a, const Effect& b) { return a.name < b.name; });
   GS_RETURN_IF_ERROR(CheckSwitchedOff(*rig));

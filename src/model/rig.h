@@ -28,6 +28,7 @@ class Rig {
   const mjModel& compiled() const { return *compiled_; }
   // What the model may lack: the catalogue and the experiment's own candidates, sorted by name.
   const std::vector<Effect>& effects() const { return effects_; }
+  const std::vector<LeftOutCandidate>& left_out() const { return left_out_; }
   // The MJCF to be changed: this one stays as it was read.
   SpecPtr CopySpec() const;
 
@@ -47,6 +48,7 @@ class Rig {
 
   Experiment experiment_;
   std::vector<Effect> effects_;
+  std::vector<LeftOutCandidate> left_out_;
   SpecPtr spec_;
   mutable std::mutex copying_;  // MuJoCo does not say that one spec may be copied twice at a time
   ModelPtr compiled_;

@@ -16,6 +16,11 @@
 
 namespace gapscope {
 
+// The plugin instance of a candidate of the experiment's own.
+inline std::string OwnInstance(const std::string& joint, const std::string& candidate) {
+  return joint + ".own." + candidate;
+}
+
 class Structure {
  public:
   // key of a plugin's live parameter -> expression of parameters
@@ -43,6 +48,13 @@ class Structure {
     Terms parameters;
   };
   void AddOwnTorque(OwnTorque torque) { own_torques_.push_back(std::move(torque)); }
+  // The same by a passive plugin of the user's, which reads numerics and texts INSTANCE.KEY as gapscope's do.
+  struct OwnPlugin {
+    std::string name, joint, plugin;
+    std::map<std::string, std::string> config;
+    Terms parameters;
+  };
+  void AddOwnPlugin(OwnPlugin plugin) { own_plugins_.push_back(std::move(plugin)); }
   // Other expressions in the place of what the experiment or the MJCF says of a field. Error: two effects do it.
   Status Replace(const std::string& field, std::vector<std::string> expressions);
   void Set(const std::string& field, std::vector<std::string> expressions);
@@ -76,6 +88,7 @@ class Structure {
   Status FinishFriction(const std::string& name, Terms terms);
   void FinishSpring(const std::string& joint, const Terms& terms);
   void FinishOwnTorque(const OwnTorque& torque);
+  void FinishOwnPlugin(const OwnPlugin& plugin);
   // A passive plugin acts from a body of its own, without mass, since a body carries one plugin.
   void HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance);
   void AddNumeric(const std::string& name, double value);
@@ -86,6 +99,7 @@ class Structure {
   const Rig& rig_;
   std::map<std::string, Terms> motor_, friction_, spring_;  // by joint
   std::vector<OwnTorque> own_torques_;
+  std::vector<OwnPlugin> own_plugins_;
   std::vector<std::string> replaced_;  // fields
 };
 

@@ -281,6 +281,11 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   json["at_bounds"] = ordered_json::array();
   for (const auto& p : d.at_bounds)
     json["at_bounds"].push_back({{"name", p.name}, {"value", JsonNumber(p.value)}, {"unit", p.unit}});
+  json["left_out"] = ordered_json::array();
+  if (d.model) {
+    for (const LeftOutCandidate& candidate : d.model->rig()->left_out())
+      json["left_out"].push_back({{"name", candidate.name}, {"why", candidate.why}});
+  }
   json["next_experiment"] = Json(d.next);
   json["explanation"] = d.explanation;
   if (d.refit_model) {

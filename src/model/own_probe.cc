@@ -183,9 +183,9 @@ Result<std::unique_ptr<OwnProbe>> MakePluginProbe(const OwnEffect& own, const Ri
   GS_RETURN_IF_ERROR(structure.Finish());
   ModelPtr model(mj_compile(structure.spec.get(), nullptr));
   if (!model) {
-    return Error{.what = "the plugin '" + own.plugin + "' refuses the model: " +
-                         OneLine(mjs_getError(structure.spec.get())),
-                 .where = own.torque_where};
+    return Error{
+        .what = "the plugin '" + own.plugin + "' refuses the model: " + OneLine(mjs_getError(structure.spec.get())),
+        .where = own.torque_where};
   }
   return std::unique_ptr<OwnProbe>(std::make_unique<PluginProbe>(own, rig, std::move(model)));
 }

@@ -21,11 +21,10 @@ void Idle(const mjModel*, mjData*, int, int) {}
 }  // namespace
 
 mjPLUGIN_LIB_INIT(faulty) {
-  const mjpPlugin crashes = Plugin(
-      "faulty.crashes", +[](const mjModel*, mjData*, int, int) { raise(SIGSEGV); });
+  const mjpPlugin crashes = Plugin("faulty.crashes", +[](const mjModel*, mjData*, int, int) { raise(SIGSEGV); });
   mjp_registerPlugin(&crashes);
-  const mjpPlugin fatal = Plugin(
-      "faulty.fatal", +[](const mjModel*, mjData*, int, int) { mju_error("the table is empty"); });
+  const mjpPlugin fatal =
+      Plugin("faulty.fatal", +[](const mjModel*, mjData*, int, int) { mju_error("the table is empty"); });
   mjp_registerPlugin(&fatal);
   mjpPlugin refuses = Plugin("faulty.refuses", Idle);
   refuses.init = +[](const mjModel*, mjData*, int) { return -1; };
@@ -35,7 +34,7 @@ mjPLUGIN_LIB_INIT(faulty) {
   mjpPlugin drives = Plugin("faulty.drives", Idle);
   drives.capabilityflags = mjPLUGIN_ACTUATOR;
   mjp_registerPlugin(&drives);
-  const mjpPlugin pushes = Plugin(
-      "faulty.pushes", +[](const mjModel*, mjData* d, int, int) { d->qfrc_passive[0] += 1; });
+  const mjpPlugin pushes =
+      Plugin("faulty.pushes", +[](const mjModel*, mjData* d, int, int) { d->qfrc_passive[0] += 1; });
   mjp_registerPlugin(&pushes);
 }

@@ -67,7 +67,8 @@ class OwnPluginTest : public ::testing::Test {
 
 TEST_F(OwnPluginTest, MovesAsTheSameFormula) {
   const Experiment experiment = MakeExperiment(scratch_, kRobot, kYaml);
-  const Recording recording = MakeRecording(experiment, 400, 0.001, [](int, double t) { return 0.2 * std::sin(9 * t); });
+  const Recording recording =
+      MakeRecording(experiment, 400, 0.001, [](int, double t) { return 0.2 * std::sin(9 * t); });
   const auto with = [&](const std::string& name, double amplitude) {
     return Predict(*MakeModel(experiment, {{name, "hinge"}}), recording,
                    {{name + "@hinge.amplitude_n_m", amplitude}, {name + "@hinge.phase_rad", 0.7}})[0];
@@ -98,9 +99,10 @@ TEST_F(OwnPluginTest, IsInTheExportedModel) {
   char message[1000] = "";
   const ModelPtr loaded(mj_loadXML(scratch_.Write("out.xml", xml.value()).c_str(), nullptr, message, sizeof message));
   ASSERT_TRUE(loaded) << message;
-  EXPECT_EQ(loaded->numeric_data[loaded->numeric_adr[mj_name2id(loaded.get(), mjOBJ_NUMERIC,
-                                                                "hinge.own.gear.amplitude_n_m")]],
-            0.25);
+  EXPECT_EQ(
+      loaded
+          ->numeric_data[loaded->numeric_adr[mj_name2id(loaded.get(), mjOBJ_NUMERIC, "hinge.own.gear.amplitude_n_m")]],
+      0.25);
   const int text = mj_name2id(loaded.get(), mjOBJ_TEXT, "hinge.own.gear.table");
   ASSERT_GE(text, 0);
   EXPECT_STREQ(loaded->text_data + loaded->text_adr[text], "1 2 3");

@@ -47,7 +47,8 @@ class Judging {
   }
 
   // What a richer description does beyond a simpler one is a finding of its own: where that is not sure, the simpler
-  // one takes its place. One size for all places is simpler than one each, and so is an effect that another contains.
+  // one takes its place, and where it is open, they are told together. One size for all places is simpler than one
+  // each, and so is an effect that another contains.
   std::vector<Statement> Simplify() {
     std::vector<Statement> dropped;
     for (const EffectUse& use : found_.uses) {
@@ -81,12 +82,14 @@ class Judging {
     Statement beyond{.rule = "what it does beyond " + simple.Text() + " is not sure"};
     evidence_.Of(members, simpler, &beyond);
     Weigh(members, &beyond);
-    if (beyond.probability >= kDiagnosePolicy.probability.present) return;
+    const Told told = ToldBeyond(beyond.probability);
+    if (told == Told::kRicher) return;
+    const bool open = members.size() == 1 && told == Told::kTogether;
     const double rise = std::log(simpler->train_cost / found_.chosen->train_cost);
     Member joined{.use = simple};
     for (const EffectUse& use : members) {
       beyond.use = use;
-      dropped->push_back(beyond);
+      if (!open) dropped->push_back(beyond);
       const auto gone = std::find_if(found_.members.begin(), found_.members.end(),
                                      [&](const Member& member) { return member.use == use; });
       if (members.size() == 1) joined.rivals = gone->rivals;
@@ -94,6 +97,7 @@ class Judging {
     }
     for (Rival& rival : joined.rivals) rival.behind -= rise;
     std::erase_if(joined.rivals, [&](const Rival& rival) { return rival.use == simple; });
+    if (open) joined.rivals.push_back({.use = members.front(), .behind = -rise});
     found_.members.push_back(joined);
     evidence_.Choose(simpler);
   }
@@ -355,6 +359,11 @@ bool AreComplements(double gain_a, double gain_b, double together) {
   const double a = std::expm1(gain_a), b = std::expm1(gain_b), both = std::expm1(together);
   const double alone = kDiagnosePolicy.evidence.alone;
   return a > 0 && b > 0 && both - b <= alone * a && both - a <= alone * b;
+}
+
+Told ToldBeyond(double probability) {
+  if (probability >= kDiagnosePolicy.probability.present) return Told::kRicher;
+  return probability >= kDiagnosePolicy.next.absent ? Told::kTogether : Told::kSimpler;
 }
 
 Verdict VerdictOf(const VerdictFacts& facts) {

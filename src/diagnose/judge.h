@@ -15,6 +15,10 @@ bool AreOneFinding(double gain_a, double gain_b, double together);
 // of what it gains beside it. Gains are ln(cost without / cost with); what distinct effects gain adds up in costs.
 bool AreComplements(double gain_a, double gain_b, double together);
 
+// Of an effect and a simpler one that it contains, by the probability of what it does beyond that one.
+enum class Told { kSimpler, kTogether, kRicher };
+Told ToldBeyond(double probability);
+
 struct Judgement {
   std::vector<Statement> statements;           // the surest first; sizes are left to whoever describes them
   std::vector<std::vector<EffectUse>> groups;  // by Statement::group

@@ -32,6 +32,14 @@ TEST(ProbabilityTest, GrowsWithEachKindOfEvidence) {
   EXPECT_LT(ProbabilityOf({}), 0.05);
 }
 
+// What a richer effect does beyond a simpler one: an open question is not answered by naming the simpler one.
+TEST(ToldBeyondTest, AnOpenQuestionIsToldTogether) {
+  EXPECT_EQ(ToldBeyond(0.19), Told::kSimpler);
+  EXPECT_EQ(ToldBeyond(0.21), Told::kTogether);
+  EXPECT_EQ(ToldBeyond(0.49), Told::kTogether);
+  EXPECT_EQ(ToldBeyond(0.5), Told::kRicher);
+}
+
 // Logs that do not reach the effect, and windows too short for it to add up, do not speak against what others show.
 TEST(ProbabilityTest, TheLargestGainCounts) {
   StatementNumbers numbers = kClear;

@@ -270,8 +270,8 @@ std::string FaultOfPlugin(const OwnEffect& own, const Rig& rig) {
 
 }  // namespace
 
-Result<OwnEffects> OwnCandidates(const Rig& rig) {
-  OwnEffects own_effects;
+Result<CandidateEffects> OwnCandidates(const Rig& rig) {
+  CandidateEffects own_effects;
   const std::vector<std::string> known = EffectNames();
   for (const OwnEffect& own : rig.experiment().candidates) {
     if (std::find(known.begin(), known.end(), own.name) != known.end()) {

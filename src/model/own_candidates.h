@@ -9,7 +9,7 @@
 
 namespace gapscope {
 
-struct OwnEffects {
+struct CandidateEffects {
   std::vector<Effect> effects;
   std::vector<LeftOutCandidate> left_out;
 };
@@ -17,7 +17,7 @@ struct OwnEffects {
 // Errors, with their place in the experiment file: a name that the catalogue has; a joint or a field that the MJCF
 // lacks; a command of a joint without drive; a candidate that does something at its neutral values, or has no values to
 // be tried at; a parameter that its plugin does not read.
-Result<OwnEffects> OwnCandidates(const Rig& rig);
+Result<CandidateEffects> OwnCandidates(const Rig& rig);
 
 }  // namespace gapscope
 

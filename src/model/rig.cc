@@ -46,7 +46,7 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
                  .where = experiment.model_path};
   }
   rig->effects_ = Catalogue();
-  GS_ASSIGN(OwnEffects own, OwnCandidates(*rig));
+  GS_ASSIGN(CandidateEffects own, OwnCandidates(*rig));
   std::move(own.effects.begin(), own.effects.end(), std::back_inserter(rig->effects_));
   rig->left_out_ = std::move(own.left_out);
   std::stable_sort(rig->effects_.begin(), rig->effects_.end(),

@@ -32,14 +32,19 @@ Command WithPlugins(Command command) {
 }  // namespace
 
 std::vector<Command> AllCommands() {
-  std::vector<Command> all;
-  for (Command (*make)() : {InitCommand, ReplayCommand, TuneCommand, DiagnoseCommand, ExplainCommand, ApplyCommand,
-                            DesignCommand, RenderCommand, PlanCommand, RunCommand})
-    all.push_back(WithPlugins(make()));
-  all.insert(all.begin() + 1, InspectCommand());
-  all.insert(all.begin() + 7, IdentifyCommand());
-  all.push_back(MergeCommand());
-  return all;
+  return {WithPlugins(InitCommand()),
+          InspectCommand(),
+          WithPlugins(ReplayCommand()),
+          WithPlugins(TuneCommand()),
+          WithPlugins(DiagnoseCommand()),
+          WithPlugins(ExplainCommand()),
+          WithPlugins(ApplyCommand()),
+          WithPlugins(IdentifyCommand()),
+          WithPlugins(DesignCommand()),
+          WithPlugins(RenderCommand()),
+          WithPlugins(PlanCommand()),
+          WithPlugins(RunCommand()),
+          MergeCommand()};
 }
 
 }  // namespace gapscope::cli

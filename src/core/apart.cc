@@ -60,7 +60,7 @@ std::string TryApart(const std::function<std::string()>& work, unsigned most_s) 
     close(ends[0]);
     return std::string("it cannot be tried: ") + strerror(errno);
   }
-  const std::string said = ReadAll(ends[0]);
+  std::string said = ReadAll(ends[0]);
   close(ends[0]);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {

@@ -66,9 +66,8 @@ const std::vector<double>& GapShares::Errors(const EffectSet& set) {
 }
 
 ShareOfGap GapShares::Of(const EffectUse& use) {
-  const auto own = std::find_if(players_.begin(), players_.end(), [&](const EffectSet& player) {
-    return std::find(player.begin(), player.end(), use) != player.end();
-  });
+  const auto own =
+      std::find_if(players_.begin(), players_.end(), [&](const EffectSet& player) { return Has(player, use); });
   if (own == players_.end()) return {};
   std::vector<const EffectSet*> others;
   for (auto player = players_.begin(); player != players_.end(); ++player) {

@@ -223,9 +223,8 @@ class Judging {
   // Whether it could be in the place of a member that the set leaves out: it then gains what that one gained.
   bool StandsIn(const EffectUse& use, const EffectSet& set) const {
     return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& member) {
-      return std::find(set.begin(), set.end(), member.use) == set.end() &&
-             (AreOneMotion(use, member.use, *found_.base->model, found_.logged) ||
-              ImitatedBy(member.use, use) >= kDiagnosePolicy.search.imitates);
+      return !Has(set, member.use) && (AreOneMotion(use, member.use, *found_.base->model, found_.logged) ||
+                                       ImitatedBy(member.use, use) >= kDiagnosePolicy.search.imitates);
     });
   }
 
@@ -246,14 +245,14 @@ class Judging {
   std::vector<Rival> RivalsOf(const Member& member, const EffectSet& present) {
     std::vector<Rival> rivals;
     for (const EffectUse& use : found_.uses) {
-      if (std::count(found_.chosen->effects.begin(), found_.chosen->effects.end(), use) > 0) continue;
+      if (Has(found_.chosen->effects, use)) continue;
       double behind = AreOneMotion(use, member.use, *found_.base->model, found_.logged) ? 0 : kInfinity;
       for (const Rival& tried : member.rivals) {
         if (tried.use == use) behind = std::min(behind, tried.behind);
       }
       const bool same = Contains(use, member.use, *bench_.rig, true) || Contains(member.use, use, *bench_.rig, true);
       if (!same) behind = std::min(behind, BehindIn(found_.chosen->effects, member.use, use));
-      const bool is_sure = std::find(present.begin(), present.end(), member.use) != present.end();
+      const bool is_sure = Has(present, member.use);
       if (!same && is_sure && !StandsIn(use, present)) behind = std::min(behind, BehindIn(present, member.use, use));
       if (std::isfinite(behind)) rivals.push_back({.use = use, .behind = behind});
     }
@@ -331,8 +330,7 @@ class Judging {
       const bool present = s.answer == Answer::kPresent;
       if (present && s.group >= 0) facts.told = false;
       facts.present = facts.present || present;
-      if (std::any_of(chosen.effects.begin(), chosen.effects.end(), [&](const EffectUse& use) { return use == s.use; }))
-        right *= present ? s.probability : 1 - s.probability;
+      if (Has(chosen.effects, s.use)) right *= present ? s.probability : 1 - s.probability;
     }
     facts.retuned = found_.nominal->held_out_cost > 0
                         ? (found_.nominal->held_out_cost - base.held_out_cost) / found_.nominal->held_out_cost

@@ -55,8 +55,7 @@ class Searcher {
     ScoreCandidate(bench_, result_.base);
     result_.chosen = result_.base;
     for (const auto& use : AllUses(*bench_.rig)) {
-      const bool known = std::find(bench_.known.begin(), bench_.known.end(), use) != bench_.known.end();
-      if (known || IsOfMissingSensor(use, *bench_.rig, result_.logged)) continue;
+      if (Has(bench_.known, use) || IsOfMissingSensor(use, *bench_.rig, result_.logged)) continue;
       if (IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
     }
     return Ok();

@@ -125,19 +125,19 @@ Status CheckExpressions(const OwnEffect& effect, std::vector<std::string> names)
   return Ok();
 }
 
-void ReadConfig(YamlMap& map, const YAML::Node& config, OwnEffect* effect) {
-  if (!config.IsDefined()) return;
-  if (effect->plugin.empty()) map.Fail(config, {.what = "'config' is of a plugin, and the candidate has none"});
-  if (!config.IsMap()) map.Fail(config, {.what = "'config' is not a map", .allowed = "KEY: text"});
-  for (const auto& pair : config) {
-    if (!pair.first.IsScalar() || !pair.second.IsScalar() || !IsPlainName(pair.first.Scalar()) ||
-        pair.first.Scalar() == "joint") {
+Status ReadConfig(const YAML::Node& node, const std::string& path, OwnEffect* effect) {
+  YamlMap map(node, path, "'config' of the candidate '" + effect->name + "'");
+  for (const auto& pair : node) {
+    if (!pair.first.IsScalar()) break;
+    const std::string key = pair.first.Scalar();
+    if (key == "joint" || !IsPlainName(key)) {
       map.Fail(pair.first, {.what = "not an attribute of a plugin",
-                            .allowed = "KEY: text, KEY of letters, digits and '_'; 'joint' is the candidate's"});
-      return;
+                            .actual = "'" + key + "'",
+                            .allowed = "letters, digits and '_', a letter first; 'joint' is the candidate's"});
     }
-    effect->config[pair.first.Scalar()] = pair.second.Scalar();
+    effect->config[key] = map.Text(key.c_str());
   }
+  return map.Finish();
 }
 
 // A torque by a formula, a torque by a plugin, or a change of fields.
@@ -153,8 +153,9 @@ Status ReadOwnEffect(const YAML::Node& item, const std::string& path, Experiment
   effect.joint = map.Text("joint", "");
   effect.torque = map.Text("torque", "");
   effect.plugin = map.Text("plugin", "");
-  const YAML::Node set = map.Child("set"), parameters = map.Child("parameters");
-  ReadConfig(map, map.Child("config"), &effect);
+  const YAML::Node set = map.Child("set"), parameters = map.Child("parameters"), config = map.Child("config");
+  if (config.IsDefined() && effect.plugin.empty())
+    map.Fail(config, {.what = "'config' is of a plugin, and the candidate has none"});
   if (!IsPlainName(effect.name)) {
     map.Fail(item, {.what = "not a name of a candidate", .actual = "'" + effect.name + "'", .allowed = kNameRule});
   }
@@ -171,6 +172,7 @@ Status ReadOwnEffect(const YAML::Node& item, const std::string& path, Experiment
                     .cure = "add 'parameters: {NAME: {unit: ..., bounds: [low, high], trials: [...]}}'"});
   }
   GS_RETURN_IF_ERROR(map.Finish());
+  if (config.IsDefined()) GS_RETURN_IF_ERROR(ReadConfig(config, path, &effect));
   if (set.IsDefined()) GS_RETURN_IF_ERROR(ReadFieldSettings(set, path, &effect.settings));
   for (const char* key : {"torque", "plugin"}) {
     if (const YAML::Node torque = item[key]; torque) effect.torque_where = YamlPlace(path, torque);

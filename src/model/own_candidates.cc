@@ -181,17 +181,8 @@ Status CheckTrials(const OwnEffect& own, const Effect& effect) {
 }
 
 Status Apply(const OwnEffect& own, Structure& structure, const std::map<std::string, std::string>& names) {
-  if (!own.torque.empty()) {
-    structure.AddOwnTorque({.name = own.name,
-                            .joint = own.joint,
-                            .formula = own.torque,
-                            .of_command = Mentions(own.torque, plugins::kFormulaInputs[plugins::kCommand]),
-                            .parameters = names});
-    return Ok();
-  }
-  if (!own.plugin.empty()) {
-    structure.AddOwnPlugin(
-        {.name = own.name, .joint = own.joint, .plugin = own.plugin, .config = own.config, .parameters = names});
+  if (!own.joint.empty()) {
+    structure.AddOwnTorque(TorqueOf(own, names));
     return Ok();
   }
   for (const FieldSetting& setting : own.settings) {
@@ -226,7 +217,6 @@ std::string SignatureOf(const OwnEffect& own) {
 
 Result<Effect> MakeEffect(const OwnEffect& own, const Rig& rig) {
   const bool torque = !own.joint.empty();
-  if (torque) GS_RETURN_IF_ERROR(CheckJoint(own, rig));
   GS_ASSIGN(const std::unique_ptr<OwnProbe> made, MakeProbe(own, rig));
   OwnProbe& probe = *made;
   if (torque) {
@@ -280,8 +270,8 @@ Result<CandidateEffects> OwnCandidates(const Rig& rig) {
                    .actual = "'" + own.name + "'",
                    .cure = "rename the candidate"};
     }
+    if (!own.joint.empty()) GS_RETURN_IF_ERROR(CheckJoint(own, rig));
     if (!own.plugin.empty()) {
-      GS_RETURN_IF_ERROR(CheckJoint(own, rig));
       if (const std::string fault = FaultOfPlugin(own, rig); !fault.empty()) {
         own_effects.left_out.push_back({own.name, fault});
         continue;

@@ -7,8 +7,8 @@
 #include "src/core/collect.h"
 #include "src/experiment/expression.h"
 #include "src/model/rig.h"
-#include "src/model/structure.h"
 #include "src/plugins/common/parser.h"
+#include "src/plugins/expression/expression.h"
 
 namespace gapscope {
 namespace {
@@ -153,6 +153,16 @@ double OwnProbe::Moved(const OwnParameter& p) {
   return *std::find_if(values.begin(), values.end(), [&](double value) { return value != p.neutral; });
 }
 
+Structure::OwnTorque TorqueOf(const OwnEffect& own, const std::map<std::string, std::string>& names) {
+  const bool formula = own.plugin.empty();
+  return {.name = own.name,
+          .joint = own.joint,
+          .plugin = formula ? plugins::Expression::kName : own.plugin,
+          .config = formula ? std::map<std::string, std::string>{{"torque", own.torque}} : own.config,
+          .of_command = Mentions(own.torque, plugins::kFormulaInputs[plugins::kCommand]),
+          .parameters = names};
+}
+
 std::unique_ptr<OwnProbe> MakeFormulaProbe(const OwnEffect& own, const Experiment& experiment) {
   return std::make_unique<FormulaProbe>(own, experiment);
 }
@@ -175,11 +185,7 @@ Result<std::unique_ptr<OwnProbe>> MakePluginProbe(const OwnEffect& own, const Ri
     structure.AddParameter({.name = p.key, .unit = p.unit, .nominal = p.neutral, .low = p.low, .high = p.high});
     parameters[p.key] = p.key;
   }
-  structure.AddOwnPlugin({.name = own.name,
-                          .joint = own.joint,
-                          .plugin = own.plugin,
-                          .config = own.config,
-                          .parameters = std::move(parameters)});
+  structure.AddOwnTorque(TorqueOf(own, parameters));
   GS_RETURN_IF_ERROR(structure.Finish());
   ModelPtr model(mj_compile(structure.spec.get(), nullptr));
   if (!model) {

@@ -3,15 +3,16 @@
 #ifndef GAPSCOPE_MODEL_OWN_PROBE_H_
 #define GAPSCOPE_MODEL_OWN_PROBE_H_
 
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "src/core/result.h"
 #include "src/experiment/experiment.h"
+#include "src/model/structure.h"
 
 namespace gapscope {
-
-class Rig;
 
 class OwnProbe {
  public:
@@ -38,6 +39,9 @@ class OwnProbe {
   explicit OwnProbe(const OwnEffect& own) : own_(own) {}
   const OwnEffect& own_;
 };
+
+// What enters the structure, by the names of the parameters.
+Structure::OwnTorque TorqueOf(const OwnEffect& own, const std::map<std::string, std::string>& names);
 
 // The candidate, which must have been read without error, must outlive it.
 std::unique_ptr<OwnProbe> MakeFormulaProbe(const OwnEffect& own, const Experiment& experiment);

@@ -27,7 +27,8 @@ Result<std::vector<std::string>> LoadPluginLibraries(const std::vector<std::stri
       return Error{.what = "no such plugin library", .where = "--plugin", .actual = "'" + file + "'"};
     std::string fault = TryApart([&] { return Open(path); });
     if (fault.empty()) fault = Open(path);
-    if (!fault.empty()) left_out.push_back("the plugin library '" + file + "' is left out: " + fault);
+    if (!fault.empty())
+      left_out.push_back(std::string("the plugin library '").append(file).append("' is left out: ").append(fault));
   }
   return left_out;
 }

@@ -41,20 +41,15 @@ class Structure {
     std::string joint, share, stiffness, damping, gap;  // expressions
   };
   Status AddSplit(Split split);
-  // A torque of the experiment's own on a joint: a formula as gapscope.expression reads it.
+  // A torque of the experiment's own on a joint, by a passive plugin that reads numerics and texts INSTANCE.KEY:
+  // gapscope.expression, or one of the user's.
   struct OwnTorque {
-    std::string name, joint, formula;
+    std::string name, joint, plugin;
+    std::map<std::string, std::string> config;
     bool of_command;  // it reads the command of the joint's drive
     Terms parameters;
   };
   void AddOwnTorque(OwnTorque torque) { own_torques_.push_back(std::move(torque)); }
-  // The same by a passive plugin of the user's, which reads numerics and texts INSTANCE.KEY as gapscope's do.
-  struct OwnPlugin {
-    std::string name, joint, plugin;
-    std::map<std::string, std::string> config;
-    Terms parameters;
-  };
-  void AddOwnPlugin(OwnPlugin plugin) { own_plugins_.push_back(std::move(plugin)); }
   // Other expressions in the place of what the experiment or the MJCF says of a field. Error: two effects do it.
   Status Replace(const std::string& field, std::vector<std::string> expressions);
   void Set(const std::string& field, std::vector<std::string> expressions);
@@ -88,7 +83,6 @@ class Structure {
   Status FinishFriction(const std::string& name, Terms terms);
   void FinishSpring(const std::string& joint, const Terms& terms);
   void FinishOwnTorque(const OwnTorque& torque);
-  void FinishOwnPlugin(const OwnPlugin& plugin);
   // A passive plugin acts from a body of its own, without mass, since a body carries one plugin.
   void HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance);
   void AddNumeric(const std::string& name, double value);
@@ -99,7 +93,6 @@ class Structure {
   const Rig& rig_;
   std::map<std::string, Terms> motor_, friction_, spring_;  // by joint
   std::vector<OwnTorque> own_torques_;
-  std::vector<OwnPlugin> own_plugins_;
   std::vector<std::string> replaced_;  // fields
 };
 

@@ -93,7 +93,6 @@ Status Structure::Finish() {
   for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(FinishFriction(joint, terms));
   for (const auto& [joint, terms] : spring_) FinishSpring(joint, terms);
   for (const OwnTorque& torque : own_torques_) FinishOwnTorque(torque);
-  for (const OwnPlugin& plugin : own_plugins_) FinishOwnPlugin(plugin);
   return Ok();
 }
 
@@ -323,19 +322,10 @@ void Structure::HoldPlugin(const mjsJoint* joint, const std::string& plugin, con
   Attach(&holder->plugin, plugin, instance);
 }
 
-void Structure::FinishOwnPlugin(const OwnPlugin& own) {
-  const std::string instance = OwnInstance(own.joint, own.name);
-  std::map<std::string, std::string> attributes = own.config;
-  attributes["joint"] = own.joint;
-  AddInstance(spec.get(), own.plugin, instance, attributes);
-  HoldPlugin(FindJoint(own.joint), own.plugin, instance);
-  AddLive(instance, own.parameters);
-}
-
 void Structure::FinishOwnTorque(const OwnTorque& torque) {
-  using plugins::Expression;
   const std::string instance = OwnInstance(torque.joint, torque.name);
-  std::map<std::string, std::string> attributes = {{"joint", torque.joint}, {"torque", torque.formula}};
+  std::map<std::string, std::string> attributes = torque.config;
+  attributes["joint"] = torque.joint;
   Terms live = torque.parameters;
   if (torque.of_command) {
     attributes["actuator"] = rig_.ActuatorOf(torque.joint);
@@ -344,8 +334,8 @@ void Structure::FinishOwnTorque(const OwnTorque& torque) {
     const auto drive = motor_.find(MotorSide(torque.joint));
     if (drive != motor_.end() && drive->second.contains(delay)) live[delay] = drive->second.at(delay);
   }
-  AddInstance(spec.get(), Expression::kName, instance, attributes);
-  HoldPlugin(FindJoint(torque.joint), Expression::kName, instance);
+  AddInstance(spec.get(), torque.plugin, instance, attributes);
+  HoldPlugin(FindJoint(torque.joint), torque.plugin, instance);
   AddLive(instance, live);
 }
 

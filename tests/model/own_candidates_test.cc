@@ -5,21 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/model/own_robot.h"
 #include "tests/model/synthetic.h"
 
 namespace gapscope::testing {
 namespace {
 
-constexpr const char* kRobot = R"(<mujoco>
-  <option timestep="0.001" integrator="RK4"><flag contact="disable"/></option>
-  <worldbody>
-    <body name="bar"><joint name="hinge" axis="0 1 0" damping="0.05"/>
-      <inertial pos="0.1 0 0" mass="0.2" diaginertia="0.001 0.001 0.001"/>
-      <body name="tip" pos="0.2 0 0"><joint name="wrist" axis="0 1 0" stiffness="0.3" damping="0.01"/>
-        <inertial pos="0.05 0 0" mass="0.02" diaginertia="0.0001 0.0001 0.0001"/></body></body>
-  </worldbody>
-  <actuator><motor name="motor" joint="hinge"/></actuator>
-</mujoco>)";
 const std::string kYaml = R"(commands:
   - {actuator: motor, column: u, unit: N m}
 measured:
@@ -61,14 +52,14 @@ without: [cogging, quadratic_drag@wrist]
 class OwnCandidatesTest : public ::testing::Test {
  protected:
   OwnCandidatesTest()
-      : experiment_(MakeExperiment(scratch_, kRobot, kYaml + kCandidates)),
+      : experiment_(MakeExperiment(scratch_, kOwnRobot, kYaml + kCandidates)),
         recording_(MakeRecording(experiment_, 400, 0.001,
                                  [](int, double t) { return 0.2 * std::sin(9 * t) + (t > 0.2 ? 0.1 : 0); })) {}
   std::vector<double> With(const std::vector<EffectUse>& uses, const std::map<std::string, double>& set) {
     return Predict(*MakeModel(experiment_, uses), recording_, set)[0];
   }
   std::vector<double> Native(const std::string& from, const std::string& to) {
-    std::string robot = kRobot;
+    std::string robot = kOwnRobot;
     robot.replace(robot.find(from), from.size(), to);
     const Scratch scratch;
     return Predict(*MakeModel(MakeExperiment(scratch, robot, kYaml)), recording_)[0];
@@ -230,7 +221,7 @@ TEST(OwnCandidateErrorsTest, SayWhatAndWhere) {
     ASSERT_NE(at, std::string::npos) << c.from;
     yaml.replace(at, std::string(c.from).size(), c.to);
     const Scratch scratch;
-    scratch.Write("robot.xml", kRobot);
+    scratch.Write("robot.xml", kOwnRobot);
     const auto experiment = LoadExperiment(scratch.Write("experiment.yaml", yaml));
     std::string message = experiment.ok() ? "" : experiment.error().Text();
     if (experiment.ok()) {

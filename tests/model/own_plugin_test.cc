@@ -5,19 +5,12 @@
 #include <cmath>
 
 #include "src/model/plugin_library.h"
+#include "tests/model/own_robot.h"
 #include "tests/model/synthetic.h"
 
 namespace gapscope::testing {
 namespace {
 
-constexpr const char* kRobot = R"(<mujoco>
-  <option timestep="0.001" integrator="RK4"><flag contact="disable"/></option>
-  <worldbody>
-    <body name="bar"><joint name="hinge" axis="0 1 0" damping="0.05"/>
-      <inertial pos="0.1 0 0" mass="0.2" diaginertia="0.001 0.001 0.001"/></body>
-  </worldbody>
-  <actuator><motor name="motor" joint="hinge"/></actuator>
-</mujoco>)";
 const std::string kYaml = R"yaml(commands:
   - {actuator: motor, column: u, unit: N m}
 measured:
@@ -50,11 +43,11 @@ class OwnPluginTest : public ::testing::Test {
   }
   // The rig's error, or "".
   std::string ErrorOf(const std::string& yaml) {
-    const auto rig = Rig::Load(MakeExperiment(scratch_, kRobot, yaml));
+    const auto rig = Rig::Load(MakeExperiment(scratch_, kOwnRobot, yaml));
     return rig.ok() ? "" : rig.error().Text();
   }
   std::string WhyLeftOut(const std::string& plugin) {
-    const auto rig = Rig::Load(MakeExperiment(scratch_, kRobot, kYaml + Faulty(plugin)));
+    const auto rig = Rig::Load(MakeExperiment(scratch_, kOwnRobot, kYaml + Faulty(plugin)));
     if (!rig.ok()) return "error: " + rig.error().Text();
     const auto& effects = rig.value()->effects();
     EXPECT_TRUE(std::any_of(effects.begin(), effects.end(), [](const Effect& e) { return e.name == "gear"; }));
@@ -66,7 +59,7 @@ class OwnPluginTest : public ::testing::Test {
 };
 
 TEST_F(OwnPluginTest, MovesAsTheSameFormula) {
-  const Experiment experiment = MakeExperiment(scratch_, kRobot, kYaml);
+  const Experiment experiment = MakeExperiment(scratch_, kOwnRobot, kYaml);
   const Recording recording =
       MakeRecording(experiment, 400, 0.001, [](int, double t) { return 0.2 * std::sin(9 * t); });
   const auto with = [&](const std::string& name, double amplitude) {
@@ -80,7 +73,7 @@ TEST_F(OwnPluginTest, MovesAsTheSameFormula) {
 
 // What a formula's text says of its parameters shows in the torques that a plugin makes.
 TEST_F(OwnPluginTest, SaysWhatTheSameFormulaSays) {
-  const auto rig = Rig::Load(MakeExperiment(scratch_, kRobot, kYaml)).value();
+  const auto rig = Rig::Load(MakeExperiment(scratch_, kOwnRobot, kYaml)).value();
   const Effect &gear = EffectOf({"gear", "hinge"}, *rig), &formula = EffectOf({"formula", "hinge"}, *rig);
   ASSERT_EQ(gear.parameters.size(), 2u);
   for (std::size_t i = 0; i < 2; ++i) {
@@ -93,7 +86,7 @@ TEST_F(OwnPluginTest, SaysWhatTheSameFormulaSays) {
 }
 
 TEST_F(OwnPluginTest, IsInTheExportedModel) {
-  const auto model = MakeModel(MakeExperiment(scratch_, kRobot, kYaml), {{"gear", "hinge"}});
+  const auto model = MakeModel(MakeExperiment(scratch_, kOwnRobot, kYaml), {{"gear", "hinge"}});
   const auto xml = model->ToXml(ValuesWith(*model, {{"gear@hinge.amplitude_n_m", 0.25}}), {}, {});
   ASSERT_TRUE(xml.ok()) << xml.error().Text();
   char message[1000] = "";
@@ -115,7 +108,7 @@ TEST_F(OwnPluginTest, OneThatFailsIsLeftOut) {
   EXPECT_NE(WhyLeftOut("drives").find("is not passive"), std::string::npos);
   EXPECT_NE(WhyLeftOut("absent").find("no library that is loaded registers the plugin 'faulty.absent'"),
             std::string::npos);
-  const auto rig = Rig::Load(MakeExperiment(scratch_, kRobot, kYaml + Faulty("crashes"))).value();
+  const auto rig = Rig::Load(MakeExperiment(scratch_, kOwnRobot, kYaml + Faulty("crashes"))).value();
   const auto asked = ParseEffects({"crashes"}, *rig);
   ASSERT_FALSE(asked.ok());
   EXPECT_NE(asked.error().Text().find("'crashes' is left out: it crashes"), std::string::npos);
@@ -131,7 +124,7 @@ TEST_F(OwnPluginTest, ErrorsSayWhatAndWhere) {
   says(kYaml + Faulty("pushes"), "the torque of 'pushes' is not zero at the neutral values");
   const auto refused = [&](std::string yaml, const std::string& from, const std::string& to, const std::string& text) {
     yaml.replace(yaml.find(from), from.size(), to);
-    scratch_.Write("robot.xml", kRobot);
+    scratch_.Write("robot.xml", kOwnRobot);
     const auto read = LoadExperiment(scratch_.Write("experiment.yaml", "model: robot.xml\n" + yaml));
     ASSERT_FALSE(read.ok()) << to;
     EXPECT_NE(read.error().Text().find(text), std::string::npos) << read.error().Text();

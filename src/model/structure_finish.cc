@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kTinyFriction = 1e-9;  // keeps the solver's friction row alive at zero friction
 constexpr double kTinyInertia = 1e-9;   // of the motor side's body before its armature is written
-constexpr const char* kMaxDelay_s = "0.13";
 constexpr double kGapTimeConstant_s = 0.004;  // how stiff the flanks of a gap are
 
 std::string NameOf(mjsElement* element) { return mjs_getString(mjs_getName(element)); }
@@ -223,14 +222,8 @@ Status Structure::FinishMotor(const std::string& joint, const Terms& terms) {
   }
   // Lags and the sag keep their state in activations of the first actuator.
   drive->actdim = std::max(0, drive->actdim);  // MuJoCo's default, -1, counts as none
-  bool history = false;
-  for (const auto& [key, expression] : terms) {
-    const plugins::Needs needs = plugins::FindSpec(plugins::kMotorSpecs, key)->needs;
-    drive->actdim += needs == plugins::Needs::kActivation ? 1 : 0;
-    history = history || needs == plugins::Needs::kHistory;
-  }
-  // Room for the longest delays that the catalogue allows, both together; a <config> of the model's own goes first.
-  if (history) AddText(spec.get(), instance + ".max_delay_s", kMaxDelay_s);
+  for (const auto& [key, expression] : terms)
+    drive->actdim += plugins::FindSpec(plugins::kMotorSpecs, key)->needs == plugins::Needs::kActivation ? 1 : 0;
   AddLive(instance, terms);
   return Ok();
 }

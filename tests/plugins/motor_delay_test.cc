@@ -65,6 +65,16 @@ TEST(MotorDelayTest, FractionalCommandDelayIsTheExactShift) {
   }
 }
 
+TEST(MotorDelayTest, TheLongestDelaysOfTheEffectsFitIntoTheDefaultHistory) {
+  const Rig rig{.config = {{"law", "torque"}}, .live = {{"command_delay_s", "0"}}, .option = "timestep='0.001'"};
+  const ModelPtr m = rig.Compile();
+  constexpr double kHalfStep = 0.0005;  // as a host may refine the model's own
+  m->opt.timestep = kHalfStep;
+  m->opt.integrator = mjINT_RK4;
+  const int steps = 800;
+  EXPECT_NEAR(Replay(m.get(), 0.1204, kHalfStep, steps), ExactInertia(steps * kHalfStep, 0.1204, kHalfStep), kExact);
+}
+
 TEST(MotorDelayTest, WholeStepsEqualTheNativeDelay) {
   // Not RK4: there the native buffer is read at each stage's time, so that one step mixes two commands.
   for (const std::string integrator : {"Euler", "implicitfast"}) {

@@ -28,7 +28,6 @@ enum class Combine { kSum, kLower };
 // What a stage needs of the model beside its numbers.
 enum class Needs {
   kNothing,
-  kHistory,     // room for past inputs: max_delay_s
   kActivation,  // one of the first actuator's
   kTurn,        // a computation after the drive's: an actuator of its own
 };

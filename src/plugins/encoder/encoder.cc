@@ -9,8 +9,6 @@
 namespace gapscope::plugins {
 namespace {
 
-constexpr double kDefaultMaxDelay_s = 0.05;
-
 bool Flag(std::string_view text, bool* value) {
   *value = text == "true" || text == "1";
   return *value || text.empty() || text == "false" || text == "0";

@@ -10,7 +10,7 @@
 namespace gapscope::plugins {
 namespace {
 
-constexpr double kLongestDelay_s = 10, kDefaultMaxDelay_s = 0.13;
+constexpr double kLongestDelay_s = 10;
 
 std::string GivenMaxDelay(const mjModel* m, int instance) {
   const char* text = mj_getPluginConfig(m, instance, "max_delay_s");

@@ -26,7 +26,7 @@ class Expression {
   static constexpr const char* kName = "gapscope.expression";
   enum Key { kLateCommand, kKeyCount };
   static constexpr std::array<ParameterSpec, kKeyCount> kSpecs = {{
-      {kFormulaDelay, "s", 0, 0, 10, Combine::kSum, Needs::kHistory, "", true},
+      {kFormulaDelay, "s", 0, 0, 10, Combine::kSum, Needs::kNothing, "", true},
   }};
 
   // Null when `init` must fail (see refusal.h); an instance that was refused on a finished model does nothing.

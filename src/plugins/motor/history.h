@@ -22,6 +22,10 @@
 
 namespace gapscope::plugins {
 
+// How long a history is where nothing else is said: as the longest delays that gapscope's effects may have, a late
+// command and a late torque together.
+inline constexpr double kDefaultMaxDelay_s = 0.13;
+
 struct Motion {
   double q, qdot;
 };

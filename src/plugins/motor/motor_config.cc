@@ -10,8 +10,7 @@
 namespace gapscope::plugins {
 namespace {
 
-// The default of `max_delay_s`, and how much finer than the model's own a time step may be by default.
-constexpr double kDefaultMaxDelay_s = 0.05;
+// How much finer than the model's own a time step may be by default.
 constexpr double kStepRefinement = 2;
 
 std::string Problem(const mjModel* m, int instance, const std::string& text) {
@@ -183,7 +182,7 @@ std::string CheckNeeds(const mjModel* m, int instance, MotorConfig* config) {
 std::string ParseDelays(const mjModel* m, int instance, MotorConfig* config) {
   const std::string_view max_text = ConfigText(m, instance, "max_delay_s");
   if (double value; !max_text.empty() && (!ParseNumber(max_text, &value) || value < 0 || value > 10)) {
-    return Bad(m, instance, "max_delay_s", max_text, "0 to 10 s", "leave it out for 0.05");
+    return Bad(m, instance, "max_delay_s", max_text, "0 to 10 s", "leave it out for " + std::to_string(kDefaultMaxDelay_s));
   }
   const std::string_view step_text = ConfigText(m, instance, "min_timestep_s");
   if (double value; !step_text.empty() && (!ParseNumber(step_text, &value) || !(value >= 1e-6) || value > 1)) {

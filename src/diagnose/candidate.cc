@@ -16,6 +16,11 @@ namespace {
 // beforehand.
 constexpr double kCorrelated = 10;
 
+// Of residuals that cost so much, in units of the noise's.
+double VarianceAt(const FitProblem& problem, double cost) {
+  return 2 * cost / static_cast<double>(std::max<std::size_t>(1, problem.residuals()));
+}
+
 SolveResult Recorded(const Workbench& bench, const std::string& call, const FitPoint& start, double keep_below,
                      const std::function<SolveResult()>& solve) {
   return bench.journal ? bench.journal->Solve(call, start, keep_below, solve) : solve();
@@ -90,11 +95,12 @@ double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint
   const Evaluation there =
       bench.journal ? bench.journal->Evaluate("cost " + candidate.Name(), point, evaluate) : evaluate();
   *bench.work += there.work;
-  return there.cost;
+  return candidate.problem->CostOfAnyVariance(there.cost, point.y);
 }
 
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, const FitLimits& limits,
                   GiveUp give_up, const Candidate* from) {
+  candidate->problem->CountKnown(VarianceAt(*candidate->problem, limits.least_known));
   const auto solve = [&] {
     SolveOptions options{.max_iterations = limits.iterations,
                          .tolerance = limits.tolerance,
@@ -110,6 +116,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
     }
     SolveResult result = Solve(*candidate->problem, start, options);
     result.work += inheriting;
+    result.cost = candidate->problem->CostOfAnyVariance(result.cost, result.point.y);
     return result;
   };
   // A fit that ends above the candidate's is not kept (Ledger), nor is its Jacobian.
@@ -129,11 +136,9 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   FitOptions fit = bench.Options(*candidate->model, true);
   fit.linear_terms = false;
   fit.logarithmic_effects = true;
-  // What is known lies around nominal; a model that leaves more than the noise has residuals that lie, and count for
-  // less.
   fit.prior_centre = bench.Nominal(*candidate->model);
-  fit.prior_scale *= std::max(1.0, candidate->held_out_floors * candidate->held_out_floors);
   auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
+  problem->CountKnown(VarianceAt(*problem, candidate->train_cost));
   const FitPoint start = CarryOver(*candidate->problem, candidate->point, *problem, candidate->values);
   const SolveOptions options{.max_iterations = 8,
                              .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0),
@@ -151,7 +156,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   candidate->problem = std::move(problem);
   candidate->derivatives.reset();
   candidate->point = solved.point;
-  candidate->train_cost = solved.cost;
+  candidate->train_cost = candidate->problem->CostOfAnyVariance(solved.cost, solved.point.y);
   candidate->values = candidate->problem->Values(solved.point);
   candidate->shift_s = candidate->problem->Shift(solved.point);
 }

@@ -98,6 +98,7 @@ double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint
 struct FitLimits {
   int iterations = 0;
   double tolerance = 0;
+  double least_known = 0;  // a cost that the effects are known to reach
 };
 // Fits from `start` on the training logs, until `give_up` says to. `from`: whose Jacobian, if it has one, the first
 // steps are made with; null: none.

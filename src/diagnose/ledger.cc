@@ -78,12 +78,21 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   const bool converged = candidate->converged, scored = candidate->scored;
   const double shift_s = candidate->shift_s;
   const auto derivatives = candidate->derivatives;
-  const FitLimits limits = LimitsOf(effort);
+  FitLimits limits = LimitsOf(effort);
+  // An effect that is not there costs nothing more, so that a part's cost is within reach.
+  const Candidate* part = BestSubset(*candidate);
+  limits.least_known = std::min({start.cost, known, part ? part->train_cost : kInfinity});
   const double goal = std::min(known, reach);
   FitCandidate(bench_, candidate, start.point, limits, start.cost > goal ? TooSlow(goal, limits.iterations) : GiveUp{},
                start.from);
   Remember(candidate);
-  if (candidate->train_cost < known) return;
+  if (candidate->train_cost < known) {
+    // To the end with what is known counted as against the residuals that are left.
+    constexpr double kMuchLess = 0.5;
+    if (effort == Effort::kFinish && candidate->train_cost < kMuchLess * limits.least_known)
+      Try(candidate, {.point = candidate->point, .cost = candidate->train_cost}, effort, reach);
+    return;
+  }
   candidate->point = before;
   candidate->values = values;
   candidate->train_cost = known;

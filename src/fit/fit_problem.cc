@@ -50,7 +50,8 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       space_(parameters_, options_.free, std::move(values), options_.logarithmic_effects, options_.linear_terms),
       layout_(MakeLayout(model, recordings, options_, space_)),
       windows_(MakeFitWindows(model, recordings, options_, layout_, space_.start())),
-      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), CountResiduals(layout_, windows_))),
+      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), CountResiduals(layout_, windows_),
+                       model.parameters())),
       workers_(static_cast<std::size_t>(pool.workers())) {}
 
 std::size_t FitProblem::residuals() const { return CountResiduals(layout_, windows_); }
@@ -68,6 +69,12 @@ FitPoint FitProblem::At(const std::vector<double>& values, FitPoint point) const
 
 double FitProblem::Shift(const FitPoint& point) const {
   return layout_.shift_scale_s == 0 ? options_.shift_s : point.y[layout_.shift()] * layout_.shift_scale_s;
+}
+
+double FitProblem::CostOfAnyVariance(double cost, const Eigen::VectorXd& y) const {
+  const double surprise = prior_.Surprise(y), data = cost - prior_.scale * surprise;
+  const double count = static_cast<double>(std::max<std::size_t>(1, residuals()));
+  return data * std::exp(2 * options_.prior_scale * surprise / count);
 }
 
 FitProblem::Worker& FitProblem::GetWorker(int index) {

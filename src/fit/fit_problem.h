@@ -78,6 +78,15 @@ class FitProblem {
   std::vector<double> Values(const FitPoint& point) const { return space_.Values(point.y); }
   double Shift(const FitPoint& point) const;  // s
 
+  // What is known beforehand counts as against residuals of this variance, in units of the noise's: 2 cost / residuals
+  // of a model that is left with much more than noise.
+  void CountKnown(double variance) { prior_.SetScale(options_.prior_scale * variance); }
+  // The cost of a point that needs no such variance: that of the data, D, and K (Prior::Surprise) where the variance
+  // is unknown too, D exp(2 scale K / residuals). It has its least value where D + scale (2 D / residuals) K has it:
+  // n/2 ln D + scale K is the negative logarithm of the likelihood at its best variance (Seber and Wild, Nonlinear
+  // Regression, 1989, sec. 2.2).
+  double CostOfAnyVariance(double cost, const Eigen::VectorXd& y) const;
+
   // `mask`: windows that are left out cost nothing and have no residuals.
   Evaluation Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask = {});
   // `base`: the point's residuals where they are known.

@@ -9,13 +9,16 @@ namespace gapscope {
 namespace {
 
 // Inverse variances of what is known beforehand. Only meaningful with weights of 1 / noise.
-Eigen::VectorXd Knowledge(const SearchSpace& space, const FitLayout& layout, const FitOptions& options) {
+Eigen::VectorXd Knowledge(const SearchSpace& space, const FitLayout& layout, const FitOptions& options,
+                          const std::vector<Parameter>& stated) {
   Eigen::VectorXd weight = Eigen::VectorXd::Zero(layout.low.size());
   for (std::size_t i = 0; i < space.coordinates().size() && options.prior_share > 0; ++i) {
     // An effect's parameters are what is asked for.
-    if (space.parameter(space.coordinates()[i]).owner != Parameter::Owner::kBase) continue;
+    const Coordinate& c = space.coordinates()[i];
+    const Parameter& p = stated[static_cast<std::size_t>(c.parameter)];
+    if (p.owner != Parameter::Owner::kBase) continue;
     const auto k = static_cast<Eigen::Index>(i);
-    const double deviation = options.prior_share * (layout.high[k] - layout.low[k]);
+    const double deviation = options.prior_share * (c.ToSearch(p.high) - c.ToSearch(p.low));
     weight[k] = 1 / (deviation * deviation);
   }
   for (const auto& log : layout.signals) {
@@ -32,10 +35,10 @@ Eigen::VectorXd Knowledge(const SearchSpace& space, const FitLayout& layout, con
 }  // namespace
 
 Prior MakePrior(const SearchSpace& space, const FitLayout& layout, const FitOptions& options,
-                const Eigen::VectorXd& start, std::size_t residuals) {
+                const Eigen::VectorXd& start, std::size_t residuals, const std::vector<Parameter>& stated) {
   // In units of the signals' standard deviations, as without weights.
   const double unit = options.weights.empty() ? 1 : layout.UnitCost();
-  const Eigen::VectorXd range = layout.high - layout.low, knowledge = Knowledge(space, layout, options);
+  const Eigen::VectorXd range = layout.high - layout.low, knowledge = Knowledge(space, layout, options, stated);
   Prior prior{.centre = start,
               .weight = kFitPolicy.anchor * unit * static_cast<double>(residuals) *
                         range.cwiseAbs2().cwiseMax(1e-12).cwiseInverse(),

@@ -13,15 +13,24 @@ namespace gapscope {
 struct Prior {
   Eigen::VectorXd centre, weight;  // of y; weight: on the hessian's diagonal
   Eigen::VectorXd known;  // what is known beforehand: inverse variances, `scale` times of which are in `weight`
-  double scale = 1;       // FitOptions::prior_scale
+  double scale = 1;       // FitOptions::prior_scale, times the misfit's variance (FitProblem::CountKnown)
 
   double Cost(const Eigen::VectorXd& y) const { return 0.5 * weight.cwiseProduct((y - centre).cwiseAbs2()).sum(); }
   Eigen::VectorXd Gradient(const Eigen::VectorXd& y) const { return weight.cwiseProduct(y - centre); }
+  // Half the squares of what is known, in its standard deviations.
+  double Surprise(const Eigen::VectorXd& y) const {
+    return 0.5 * known.cwiseProduct((y - centre).cwiseAbs2()).sum();
+  }
+  void SetScale(double to) {
+    weight += (to - scale) * known;
+    scale = to;
+  }
 };
 
-// `start`: y of the start; `residuals`: how many scored numbers the problem has.
+// `start`: y of the start; `residuals`: how many scored numbers the problem has; `stated`: parameters with the bounds
+// that they have of themselves, which say what is known of them even where a search may go beyond.
 Prior MakePrior(const SearchSpace& space, const FitLayout& layout, const FitOptions& options,
-                const Eigen::VectorXd& start, std::size_t residuals);
+                const Eigen::VectorXd& start, std::size_t residuals, const std::vector<Parameter>& stated);
 
 }  // namespace gapscope
 

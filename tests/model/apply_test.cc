@@ -56,7 +56,7 @@ class ApplyTest : public ::testing::Test {
   Result<AppliedMjcf> Apply(const std::string& mjcf, const std::vector<std::string>& effects,
                             const std::map<std::string, double>& set,
                             const std::map<std::string, std::string>& notes = {}, const std::string& out = "out.xml") {
-    const Experiment experiment = MakeExperiment(scratch_, mjcf, kExperiment);
+    const Experiment experiment = MakeExperiment(scratch_, mjcf, experiment_);
     const auto base = MakeModel(experiment);
     const auto model = MakeModel(experiment, ParseEffects(effects, *base->rig()).value());
     return ApplyToMjcf(*model, ValuesWith(*model, set), {.out = scratch_.Path(out), .notes = notes});
@@ -68,6 +68,7 @@ class ApplyTest : public ::testing::Test {
     EXPECT_FALSE(applied.error().cure.empty());
   }
   Scratch scratch_;
+  std::string experiment_ = kExperiment;
 };
 
 std::string With(std::string text, const std::string& from, const std::string& to) {
@@ -137,9 +138,33 @@ TEST_F(ApplyTest, WhatAnIncludedFileHoldsTakesItsPlace) {
   EXPECT_NE(applied.value().text.find("axis=\"0 0 1\" damping=\"0.25\""), std::string::npos) << applied.value().text;
 }
 
+TEST_F(ApplyTest, WhatStandsInAFrameIsChangedThere) {
+  const std::string framed =
+      With(With(kRobot, "<body name=\"arm\">", "<frame pos=\"0 0 0.1\" euler=\"0 0 90\"><body name=\"arm\">"),
+           "  </worldbody>", "  </frame></worldbody>");
+  const auto applied = Apply(framed, {}, {{"arm.damping", 0.25}}, {{"arm.damping", "less damping"}});
+  ASSERT_TRUE(applied.ok()) << applied.error().Text();
+  EXPECT_EQ(With(applied.value().text, "<!-- gapscope: less damping --> ", ""),
+            With(framed, "axis=\"0 0 1\"", "axis=\"0 0 1\" damping=\"0.25\""));
+}
+
 TEST_F(ApplyTest, WhatTextCannotFollowIsRefused) {
   // The masses are those of the geoms, whatever <inertial> says.
   ExpectRefused(With(kRobot, "autolimits='true'", "inertiafromgeom='true'"), {{"tip.mass", 0.3}}, "another model");
+  // Elements that no text has, as MuJoCo makes them.
+  const std::string tip = "<body name=\"tip\" pos=\"0.2 0 0\">";
+  const std::size_t begin = std::string(kRobot).find(tip), end = std::string(kRobot).find("    </body>\n  </world");
+  scratch_.Write("hand.xml", "<mujoco model=\"hand\"><worldbody>" + std::string(kRobot).substr(begin, end - begin) +
+                                 "</worldbody></mujoco>");
+  std::string attached = kRobot;
+  attached.replace(begin, end - begin, "<attach model=\"hand\" body=\"tip\" prefix=\"\"/>\n");
+  attached = With(attached, "  <worldbody>",
+                  "  <asset><model name=\"hand\" file=\"hand.xml\"/></asset>\n  <worldbody>");
+  ExpectRefused(attached, {{"tip.mass", 0.3}}, "the MJCF's text has no");
+  const std::string copied = With(With(kRobot, tip, "<replicate count=\"1\" sep=\"\">" + tip),
+                                  "      </body>\n    </body>", "      </body></replicate>\n    </body>");
+  experiment_ = With(With(experiment_, "joint: tip,", "joint: tip0,"), "body/tip/", "body/tip0/");
+  ExpectRefused(copied, {{"tip.mass", 0.3}}, "the MJCF's text has no");
 }
 
 }  // namespace

@@ -42,9 +42,10 @@ Parts Motor(const std::string& custom, int actdim) {
           .custom = custom};
 }
 
-Parts OnBody(const std::string& plugin, const std::string& custom, const std::string& joint) {
-  return {.extension = "<plugin plugin='" + plugin +
-                       "'><instance name='p'><config key='joint' value='joint'/></instance></plugin>",
+Parts OnBody(const std::string& plugin, const std::string& custom, const std::string& joint,
+             const std::string& config = "") {
+  return {.extension = "<plugin plugin='" + plugin + "'><instance name='p'><config key='joint' value='joint'/>" +
+                       config + "</instance></plugin>",
           .body = "<plugin plugin='" + plugin + "' instance='p'/>",
           .joint = joint,
           .actuator = kServo,
@@ -130,6 +131,10 @@ Result<std::vector<Row>> PluginRows(const BenchOptions& options) {
                              {"cogging_n_m", 0.1},
                              {"cogging_periods_per_rev", 12}}),
               ""),
+       servo},
+      {"plugin_cost.expression", 1.6,
+       OnBody("gapscope.expression", Numerics("p", {{"amplitude_n_m", 0.1}, {"phase_rad", 0.2}}), "",
+              "<config key='torque' value='amplitude_n_m * sin(12 * angle + phase_rad)'/>"),
        servo},
   };
   std::vector<Row> rows;

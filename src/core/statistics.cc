@@ -32,6 +32,14 @@ Moments MomentsOf(std::span<const double> values) {
   return {mean, std::sqrt(squares / count)};
 }
 
+double LargestMagnitude(std::span<const double> values) {
+  double largest = 0;
+  for (const double value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
+}
+
 double Quantile(std::vector<double> values, double share) {
   if (values.empty()) return kNaN;
   return OfRank(&values, static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1))));

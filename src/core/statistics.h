@@ -19,6 +19,9 @@ struct Moments {
 };
 Moments MomentsOf(std::span<const double> values);
 
+// Of the values that are finite; 0 of none.
+double LargestMagnitude(std::span<const double> values);
+
 // The value of nearest rank `share` (0 the least, 1 the greatest) of finite values; NaN of none. O(n), on a copy.
 double Quantile(std::vector<double> values, double share);
 

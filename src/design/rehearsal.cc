@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -27,15 +26,6 @@ MeasuredSpec LimitSignal(const std::string& name, SignalKind kind, const std::st
 }
 
 bool IsLimitSignal(const MeasuredSpec& spec) { return spec.signal.starts_with(kPrefix); }
-
-double LargestMagnitude(const std::vector<double>& values) {
-  double largest = 0;
-  for (const double value : values) {
-    if (!std::isfinite(value)) return kInfinity;
-    largest = std::max(largest, std::abs(value));
-  }
-  return largest;
-}
 
 }  // namespace
 

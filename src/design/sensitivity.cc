@@ -5,6 +5,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/dense.h"
+#include "src/core/statistics.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -68,11 +69,7 @@ double FloorOf(const MeasuredSpec& spec, const std::vector<double>& values) {
     case SignalKind::kTorque:
       break;
   }
-  double largest = 0;
-  for (const double value : values) {
-    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
-  }
-  return std::sqrt(std::pow(std::max(kTorqueShare * largest, 1e-9), 2) + quantisation);
+  return std::sqrt(std::pow(std::max(kTorqueShare * LargestMagnitude(values), 1e-9), 2) + quantisation);
 }
 
 std::vector<double> FloorsOf(const Recording& predicted) {

@@ -18,14 +18,6 @@ namespace {
 // Residuals that say something, in so many seconds.
 double CountOf(double seconds) { return kDiagnosePolicy.evidence.per_block * seconds / kFitPolicy.block_s; }
 
-double LargestMagnitude(const std::vector<double>& values) {
-  double largest = 0;
-  for (const double value : values) {
-    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
-  }
-  return largest;
-}
-
 // The entry of a joint or an actuator, with whatever is stated of it.
 Limit& LimitOf(const std::string& joint, const std::string& actuator, std::vector<Limit>* limits) {
   for (Limit& limit : *limits) {

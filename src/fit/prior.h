@@ -18,9 +18,7 @@ struct Prior {
   double Cost(const Eigen::VectorXd& y) const { return 0.5 * weight.cwiseProduct((y - centre).cwiseAbs2()).sum(); }
   Eigen::VectorXd Gradient(const Eigen::VectorXd& y) const { return weight.cwiseProduct(y - centre); }
   // Half the squares of what is known, in its standard deviations.
-  double Surprise(const Eigen::VectorXd& y) const {
-    return 0.5 * known.cwiseProduct((y - centre).cwiseAbs2()).sum();
-  }
+  double Surprise(const Eigen::VectorXd& y) const { return 0.5 * known.cwiseProduct((y - centre).cwiseAbs2()).sum(); }
   void SetScale(double to) {
     weight += (to - scale) * known;
     scale = to;

@@ -12,8 +12,8 @@
 namespace gapscope {
 namespace {
 
-constexpr double kTinyFriction = 1e-9;  // keeps the solver's friction row alive at zero friction
-constexpr double kTinyInertia = 1e-9;   // of the motor side's body before its armature is written
+constexpr double kTinyFriction = 1e-9;        // keeps the solver's friction row alive at zero friction
+constexpr double kTinyInertia = 1e-9;         // of the motor side's body before its armature is written
 constexpr double kGapTimeConstant_s = 0.004;  // how stiff the flanks of a gap are
 
 std::string NameOf(mjsElement* element) { return mjs_getString(mjs_getName(element)); }

@@ -490,5 +490,61 @@ TEST(FitProblemTest, BoundsOfTheOptionsGoFirst) {
   EXPECT_NEAR(gain(), 1, 1e-6);
 }
 
+// The gain is known to lie near nominal, the log says otherwise, and leaves much more than the noise that is stated.
+class KnownGainTest : public ::testing::Test {
+ protected:
+  KnownGainTest() {
+    options_.weights = {1e4};
+    options_.prior_share = 0.005;
+    options_.prior_scale = 10;
+  }
+  FitProblem Problem() { return FitProblem(*rig_.model, logs_, options_, rig_.model->Nominal(), pool_); }
+  const Rig rig_ = LoadCart();
+  const std::vector<Recording> logs_ = {CartLog(rig_, 501, 0.02)};
+  ThreadPool pool_{1};
+  FitOptions options_ = CartOptions(rig_, ObjectiveKind::kWindows);
+};
+
+TEST_F(KnownGainTest, WhatIsKnownCountsAgainstTheVarianceThatIsLeft) {
+  FitProblem problem = Problem();
+  const double count = static_cast<double>(problem.residuals());
+  FitPoint point = problem.Start();
+  // Fits with the variance that the last one left, until it stays.
+  double variance = 1;
+  for (int round = 0; round < 20; ++round) {
+    problem.CountKnown(variance);
+    point = Solve(problem, point, {.tolerance = 1e-10}).point;
+    variance = 2 * (CostOf(problem, point) - problem.prior().scale * problem.prior().Surprise(point.y)) / count;
+  }
+  EXPECT_GT(variance, 100);
+  const auto any = [&](double gain, double counted) {
+    problem.CountKnown(counted);
+    FitPoint moved = point;
+    moved.y[0] += gain;
+    moved = StatesSolved(problem, moved, 2);
+    return problem.CostOfAnyVariance(CostOf(problem, moved), moved.y);
+  };
+  EXPECT_NEAR(any(0.01, 1), any(0.01, variance), 1e-9 * any(0, 1));
+  EXPECT_LT(any(0, 1), any(0.003, 1));
+  EXPECT_LT(any(0, 1), any(-0.003, 1));
+  // The data alone lie elsewhere: that is not their optimum.
+  options_.prior_share = 0;
+  FitProblem free = Problem();
+  const double nominal = rig_.model->Nominal()[0];
+  EXPECT_LT(std::abs(problem.Values(point)[0] - nominal),
+            0.5 * std::abs(free.Values(Solve(free, free.Start(), {}).point)[0] - nominal));
+}
+
+TEST_F(KnownGainTest, AWiderSearchKnowsNoLess) {
+  const auto deviation = [&] {
+    const FitProblem problem = Problem();
+    return problem.space().coordinates()[0].scale / std::sqrt(problem.prior().known[0]);
+  };
+  const Parameter& gain = rig_.model->parameters()[0];
+  EXPECT_NEAR(deviation(), options_.prior_share * (gain.high - gain.low), 1e-12);
+  options_.bounds["cart.gain"] = {-100, 100};
+  EXPECT_NEAR(deviation(), options_.prior_share * (gain.high - gain.low), 1e-12);
+}
+
 }  // namespace
 }  // namespace gapscope::testing

@@ -158,8 +158,8 @@ TEST_F(ApplyTest, WhatTextCannotFollowIsRefused) {
                                  "</worldbody></mujoco>");
   std::string attached = kRobot;
   attached.replace(begin, end - begin, "<attach model=\"hand\" body=\"tip\" prefix=\"\"/>\n");
-  attached = With(attached, "  <worldbody>",
-                  "  <asset><model name=\"hand\" file=\"hand.xml\"/></asset>\n  <worldbody>");
+  attached =
+      With(attached, "  <worldbody>", "  <asset><model name=\"hand\" file=\"hand.xml\"/></asset>\n  <worldbody>");
   ExpectRefused(attached, {{"tip.mass", 0.3}}, "the MJCF's text has no");
   const std::string copied = With(With(kRobot, tip, "<replicate count=\"1\" sep=\"\">" + tip),
                                   "      </body>\n    </body>", "      </body></replicate>\n    </body>");

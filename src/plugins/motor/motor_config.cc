@@ -182,7 +182,8 @@ std::string CheckNeeds(const mjModel* m, int instance, MotorConfig* config) {
 std::string ParseDelays(const mjModel* m, int instance, MotorConfig* config) {
   const std::string_view max_text = ConfigText(m, instance, "max_delay_s");
   if (double value; !max_text.empty() && (!ParseNumber(max_text, &value) || value < 0 || value > 10)) {
-    return Bad(m, instance, "max_delay_s", max_text, "0 to 10 s", "leave it out for " + std::to_string(kDefaultMaxDelay_s));
+    return Bad(m, instance, "max_delay_s", max_text, "0 to 10 s",
+               "leave it out for " + std::to_string(kDefaultMaxDelay_s));
   }
   const std::string_view step_text = ConfigText(m, instance, "min_timestep_s");
   if (double value; !step_text.empty() && (!ParseNumber(step_text, &value) || !(value >= 1e-6) || value > 1)) {

@@ -222,7 +222,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   const Say say = options.progress ? options.progress : [](const std::string&) {};
   const Deadline deadline = DeadlineOf(options, begin);
   GS_ASSIGN(const auto journal, OpenJournal(*model, fine, options, deadline));
-  const auto make_bench = [&](const DataSplit& part) {
+  const auto make_bench = [&](const DataSplit& part, bool by_windows) {
     Workbench bench{.rig = model->rig(),
                     .data = part,
                     .scales = scales,
@@ -239,7 +239,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     bench.time_step_s =
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
-    ChooseFitted(*model, options.replay_steps, false, &bench);
+    ChooseFitted(*model, options.replay_steps, by_windows, &bench);
     bench.deadline = deadline;
     bench.journal = journal.get();
     bench.most_steps =
@@ -247,14 +247,13 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                                  static_cast<double>(StepsOfReplay(bench)));
     return bench;
   };
-  const Workbench bench = make_bench(data);
+  const Workbench bench = make_bench(data, false);
   GS_ASSIGN(const auto found, Search(bench, !data.asked, say));
   Diagnosis result;
   if (!data.asked && found->uneven) {
     // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
     const DataSplit blocks = InWindows(data);
-    Workbench again = make_bench(blocks);
-    ChooseFitted(*model, options.replay_steps, true, &again);
+    const Workbench again = make_bench(blocks, true);
     GS_ASSIGN(const auto second, Search(again, false, say));
     GS_ASSIGN(result, Describe(*second, again, noise, options.seed, say));
     for (const auto& recording : blocks.train) result.train_logs.push_back(recording.log_path);

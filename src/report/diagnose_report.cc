@@ -310,7 +310,9 @@ std::string ToTable(const DiagnoseRun& run) {
   for (const Sentence& sentence : SentencesOf(d)) text += Wrapped("- " + sentence.Text(), 120, "  ") + "\n";
   if (!d.effects.empty()) text += SizeTable(d);
   text += "\nheld-out error, a share of the signals' standard deviation\n";
-  for (const std::string& sentence : GapSentences(d)) text += Wrapped("- " + sentence, 120, "  ") + "\n";
+  for (const std::string& sentence : {GapInWindows(d), GapInFreeRuns(d)}) {
+    if (!sentence.empty()) text += Wrapped("- " + sentence, 120, "  ") + "\n";
+  }
   text += RemainderText(d.remainder);
   text += "\n" + Wrapped(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);

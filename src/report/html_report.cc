@@ -248,9 +248,9 @@ void AddFindings(const PageContent& content, ordered_json* data) {
     ordered_json entry = {{"title", s.title},       {"answer", s.answer}, {"why", s.why},
                           {"bound", s.bound},       {"prior", s.prior},   {"probability", JsonNumber(s.probability)},
                           {"gains", ordered_json()}};
-    if (s.numbers.gain != 0) {
-      entry["gains"] = {JsonNumber(s.numbers.gain), JsonNumber(s.numbers.gain_held_out),
-                        JsonNumber(s.numbers.gain_free)};
+    if (s.numbers) {
+      entry["gains"] = {JsonNumber(s.numbers->gain), JsonNumber(s.numbers->gain_held_out),
+                        JsonNumber(s.numbers->gain_free)};
     }
     json["statements"].push_back(std::move(entry));
   }

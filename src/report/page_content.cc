@@ -23,7 +23,7 @@ void AddStatements(const Diagnosis& d, PageContent* page) {
                                 .bound = BoundText(s),
                                 .probability = s.probability,
                                 .prior = s.prior,
-                                .numbers = s.numbers});
+                                .numbers = s.sets ? std::optional(s.numbers) : std::nullopt});
   }
   std::ranges::stable_sort(page->statements, std::ranges::greater{}, &PageContent::Looked::probability);
   const std::size_t shown = std::min(page->statements.size(), kMostStatements);
@@ -59,8 +59,7 @@ PageContent PageOf(const DiagnoseRun& run) {
         {.title = "Of what " + Listed(found) + (found.size() > 1 ? " leave" : " leaves"), .shares = First(d.remains)});
   }
   page.findings = SentencesOf(d);
-  page.gap = GapSentences(d);
-  page.gap.erase(page.gap.begin());  // which the headline says
+  page.gap = GapInFreeRuns(d);  // the headline says how it went in windows
   page.remainder = PartsOf(d.remainder);
   page.reachable = d.remainder.reachable;
   AddStatements(d, &page);

@@ -4,6 +4,7 @@
 #define GAPSCOPE_REPORT_PAGE_CONTENT_H_
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,7 +23,7 @@ struct PageContent {
     std::string title, answer, why;
     std::string bound;  // that its size stays below; empty: none is known
     double probability = 0, prior = 0;
-    StatementNumbers numbers;  // gain 0: it was not refitted
+    std::optional<StatementNumbers> numbers;  // none: it was not refitted
   };
   struct Fitted {
     std::string name;  // of the model's parameter
@@ -44,7 +45,7 @@ struct PageContent {
   std::string mapped;  // whose missing torque is mapped: "model", "nominal model"
   std::vector<Conditions> where;
   std::vector<Sentence> findings;   // what is present, the largest share of the gap first
-  std::vector<std::string> gap;     // how it went beyond what the headline says, a sentence each
+  std::string gap;                  // how it went beyond what the headline says; may be empty
   std::vector<Part> remainder;      // of the misfit that retuning leaves
   double reachable = kNaN;          // by a free-form torque, of the same
   std::vector<Looked> statements;   // the most probable first, as many as are shown

@@ -73,18 +73,18 @@ std::vector<Sentence> SentencesOf(const Diagnosis& d) {
   return sentences;
 }
 
-std::vector<std::string> GapSentences(const Diagnosis& d) {
-  std::vector<std::string> sentences = {fmt::format(
+std::string GapInWindows(const Diagnosis& d) {
+  return fmt::format(
       "in windows: nominal {} -> retuned {} -> with what was found {}, the sensors' floor {}; {:.0f} % closed",
       ShortNumber(d.nominal, 3), ShortNumber(d.refit, 3), ShortNumber(d.final, 3), ShortNumber(d.floor, 3),
-      100 * d.closed)};
+      100 * d.closed);
+}
+
+std::string GapInFreeRuns(const Diagnosis& d) {
   const VerdictEvidence& e = d.evidence;
-  if (!d.effects.empty() && std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left)) {
-    sentences.push_back(fmt::format("over whole logs in one run: retuned {} -> with what was found {}; {:.0f} % closed",
-                                    ShortNumber(e.free_run_before, 3), ShortNumber(e.free_run_left, 3),
-                                    100 * e.free_run_removed));
-  }
-  return sentences;
+  if (d.effects.empty() || !std::isfinite(e.free_run_before) || !std::isfinite(e.free_run_left)) return "";
+  return fmt::format("over whole logs in one run: retuned {} -> with what was found {}; {:.0f} % closed",
+                     ShortNumber(e.free_run_before, 3), ShortNumber(e.free_run_left, 3), 100 * e.free_run_removed);
 }
 
 std::vector<Part> PartsOf(const Remainder& remainder) {

@@ -21,8 +21,9 @@ struct Sentence {
 // The largest share first.
 std::vector<Sentence> SentencesOf(const Diagnosis& d);
 
-// How the gap went on held-out logs, in windows and in free runs: a sentence each.
-std::vector<std::string> GapSentences(const Diagnosis& d);
+// How the gap went on held-out logs. In free runs: empty where no effect was found or no free run was made.
+std::string GapInWindows(const Diagnosis& d);
+std::string GapInFreeRuns(const Diagnosis& d);
 
 // Parts of the refitted base model's misfit, those that are known, in the order of a bar.
 struct Part {

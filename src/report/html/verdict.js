@@ -59,9 +59,9 @@ function writeFindings(findings, gap) {
     );
   };
   document.getElementById("findings").append(...findings.map(line));
-  document.getElementById("gap").append(...gap.map((sentence) => element("li", {}, sentence)));
+  document.getElementById("gap").textContent = gap;
   document.getElementById("findings").hidden = !findings.length;
-  document.getElementById("gap").hidden = !gap.length;
+  document.getElementById("gap").hidden = !gap;
 }
 
 // Whose the misfit is that the retuned model leaves, as one bar; the mark is what a free-form torque would explain.

@@ -1,6 +1,7 @@
 #include "src/model/effect.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -75,6 +76,10 @@ double ScaleOf(ScaleKind kind, const Scales& s) {
       return s.command;
     case ScaleKind::kCubic:
       return s.torque_n_m / (s.angle_rad * s.angle_rad * s.angle_rad);
+    case ScaleKind::kMass:
+      return s.mass_kg;
+    case ScaleKind::kLength:
+      return s.length_m;
   }
   return 1;
 }
@@ -116,6 +121,12 @@ std::vector<std::string> PossiblePlaces(const Effect& effect, const Rig& rig) {
     case EffectPlace::kSignal:
       for (const auto& signal : rig.Signals()) places.push_back(signal);
       break;
+    case EffectPlace::kBody:
+      places = rig.Bodies();
+      break;
+    case EffectPlace::kModel:
+      if (!rig.Sets("option/gravity")) places.emplace_back(kOnModel);
+      break;
     case EffectPlace::kNamed:
       places.push_back(effect.on);
       break;
@@ -143,6 +154,7 @@ bool IsOneOf(const std::string& text, const std::vector<std::string>& list) {
 
 // Where an effect acts that all drives, or all signals, share. None: the size's key would be another on each drive.
 std::vector<std::string> SharedPlaces(const Effect& effect, const Rig& rig) {
+  if (effect.place == EffectPlace::kBody || effect.place == EffectPlace::kModel) return {};
   std::vector<std::string> places = Places(effect, rig);
   if (IsOneOf(kOnAll, places)) return {};
   const bool on_joints = effect.place != EffectPlace::kMotor && effect.place != EffectPlace::kServo &&
@@ -184,6 +196,19 @@ std::vector<EffectUse> EveryUse(const Rig& rig) {
     if (shared == &effect && all.size() > 1) uses.push_back({effect.name, kOnAll});
   }
   return uses;
+}
+
+// What the model says of a body by its own frame.
+Scales ScalesOfBody(const std::string& name, const Rig& rig) {
+  const mjModel& m = rig.compiled();
+  const int body = mj_name2id(&m, mjOBJ_BODY, name.c_str());
+  const double mass = m.body_mass[body], *inertia = m.body_inertia + 3 * body, *centre = m.body_ipos + 3 * body;
+  Scales scales;
+  if (mass > 0) {
+    scales.mass_kg = mass;
+    scales.length_m = std::hypot(mju_norm3(centre), std::sqrt(std::max({inertia[0], inertia[1], inertia[2]}) / mass));
+  }
+  return scales;
 }
 
 // The scales at a place; a motor's and its joint's are one.
@@ -284,6 +309,9 @@ std::vector<EffectUse> AllUses(const Rig& rig) {
   std::vector<EffectUse> uses = EveryUse(rig);
   std::erase_if(uses, [&](const EffectUse& use) {
     const auto [effect, places] = Placed(use, rig);
+    // What weighs on one joint alone is an unbalanced mass there.
+    if (effect->place == EffectPlace::kBody && rig.JointsAbove(use.on) < 2) return true;
+    if (effect->place == EffectPlace::kModel && rig.Joints().size() < 2) return true;
     return places.size() > 1 && !(several && HasNoScale(*effect));
   });
   return uses;
@@ -322,19 +350,23 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
       unit = volts ? "V" : IsElectric(command) ? "A" : "N m";
       if (!IsElectric(command)) kind = ScaleKind::kTorque;
     }
-    double scale = 0;
-    for (const std::string& place : places) scale = std::max(scale, ScaleOf(kind, ScalesAt(place, rig, table)));
+    double scale = 0, zero = 0;
+    for (const std::string& place : places) {
+      const bool of_body = effect.place == EffectPlace::kBody;
+      scale = std::max(scale, ScaleOf(kind, of_body ? ScalesOfBody(place, rig) : ScalesAt(place, rig, table)));
+    }
+    if (p.from_centre >= 0) zero = rig.CentreOf(places.front())[static_cast<std::size_t>(p.from_centre)];
     PlacedParameter out{.name = use.Text() + "." + key,
                         .key = key,
                         .unit = unit,
                         .role = p.role,
                         .scale = kind,
-                        .neutral = p.neutral * scale,
-                        .low = p.low * scale,
-                        .high = p.high * scale,
-                        .start = p.start * scale};
+                        .neutral = zero + p.neutral * scale,
+                        .low = zero + p.low * scale,
+                        .high = zero + p.high * scale,
+                        .start = zero + p.start * scale};
     if (p.voltage_only && !volts) out.low = out.high = out.start = out.neutral;
-    for (const double trial : p.trials) out.trials.push_back(trial * scale);
+    for (const double trial : p.trials) out.trials.push_back(zero + trial * scale);
     placed.push_back(std::move(out));
   }
   return placed;

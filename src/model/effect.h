@@ -27,6 +27,8 @@ enum class EffectPlace {
   kDrivenJoint,  // a joint with an actuator
   kSpringJoint,  // a joint that has a spring in the base model
   kSignal,       // a measured signal
+  kBody,         // a body with a joint of its own
+  kModel,        // kOnModel: all of it
   kNamed,        // Effect::on alone
 };
 
@@ -39,10 +41,12 @@ struct Scales {
   double sample_s = 0.002;     // median sample time
   double command = 1;          // largest command, in its unit
   double inertia_kg_m2 = 1;    // of the joint's driven inertia, at the initial pose
+  double mass_kg = 1;          // of a body
+  double length_m = 1;         // of a body, from its frame
 };
 
 // How a parameter scales with the rig.
-enum class ScaleKind { kOne, kTorque, kAngle, kSpeed, kStiffness, kDrag, kPower, kCommand, kCubic };
+enum class ScaleKind { kOne, kTorque, kAngle, kSpeed, kStiffness, kDrag, kPower, kCommand, kCubic, kMass, kLength };
 double ScaleOf(ScaleKind kind, const Scales& scales);
 // Whether it scales a torque, or a torque per something of the motion: stiffness, drag.
 bool IsOfTorque(ScaleKind kind);
@@ -60,6 +64,7 @@ struct EffectParameter {
   bool takes_over =
       false;  // another start of a fit: all of the first parameter's torque, at the scale, made by this one
   bool of_torque = false;  // it is one, whatever its scale says
+  int from_centre = -1;    // on a body: its numbers count from the centre of mass along this axis of the body's frame
 };
 
 // What an effect makes of the motion, whatever its formula.
@@ -127,6 +132,9 @@ std::string ScaleName(const std::string& on, RigSize size);
 // `on` of an effect that all its places share with one size: every drive, or every measured signal. A place of the rig
 // that has this name goes first.
 inline constexpr const char* kOnAll = "all";
+
+// `on` of an effect on the model as a whole.
+inline constexpr const char* kOnModel = "model";
 
 // One effect on one place, or on all.
 struct EffectUse {

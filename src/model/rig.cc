@@ -111,6 +111,34 @@ bool Rig::HasFriction(const std::string& joint) const {
   return id >= 0 && compiled_->dof_frictionloss[compiled_->jnt_dofadr[id]] > 0;
 }
 
+bool Rig::Sets(const std::string& field) const {
+  return std::ranges::any_of(experiment_.settings, [&](const FieldSetting& setting) { return setting.field == field; });
+}
+
+std::vector<std::string> Rig::Bodies() const {
+  std::vector<std::string> names;
+  for (int body = 1; body < compiled_->nbody; ++body) {
+    const std::string name = NameOf(*compiled_, mjOBJ_BODY, body);
+    if (compiled_->body_jntnum[body] > 0 && !name.empty()) names.push_back(name);
+  }
+  return names;
+}
+
+int Rig::JointsAbove(const std::string& body) const {
+  const mjModel& m = *compiled_;
+  int joints = 0;
+  for (int at = mj_name2id(&m, mjOBJ_BODY, body.c_str()); at > 0; at = m.body_parentid[at]) {
+    for (int j = m.body_jntadr[at]; j < m.body_jntadr[at] + m.body_jntnum[at]; ++j)
+      joints += m.jnt_type[j] == mjJNT_HINGE || m.jnt_type[j] == mjJNT_SLIDE;
+  }
+  return joints;
+}
+
+std::array<double, 3> Rig::CentreOf(const std::string& body) const {
+  const double* centre = compiled_->body_ipos + 3 * mj_name2id(compiled_.get(), mjOBJ_BODY, body.c_str());
+  return {centre[0], centre[1], centre[2]};
+}
+
 std::vector<std::string> Rig::Signals() const { return Collect(experiment_.measured, &MeasuredSpec::signal); }
 
 std::string Rig::JointOfSignal(const std::string& signal) const {

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_MODEL_RIG_H_
 #define GAPSCOPE_MODEL_RIG_H_
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -39,8 +40,12 @@ class Rig {
   DriveFacts FactsOf(const std::string& actuator) const;   // of no actuator: nothing
   bool HasSpring(const std::string& joint) const;
   bool HasFriction(const std::string& joint) const;
-  std::vector<std::string> Signals() const;                    // measured signals of the experiment
-  std::string JointOfSignal(const std::string& signal) const;  // empty: no such signal
+  bool Sets(const std::string& field) const;                      // the experiment does, by parameters
+  std::vector<std::string> Bodies() const;                        // named ones with a joint of their own
+  int JointsAbove(const std::string& body) const;                 // hinges and slides between the world and the body
+  std::array<double, 3> CentreOf(const std::string& body) const;  // of mass, in the body's frame; m
+  std::vector<std::string> Signals() const;                       // measured signals of the experiment
+  std::string JointOfSignal(const std::string& signal) const;     // empty: no such signal
   CommandKind KindOfCommand(const std::string& actuator) const;
 
  private:

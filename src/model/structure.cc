@@ -1,5 +1,7 @@
 #include "src/model/structure.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 
 #include "src/core/names.h"
@@ -8,6 +10,9 @@
 #include "src/plugins/spring/spring.h"
 
 namespace gapscope {
+
+std::string ExactText(double value) { return fmt::format("{:.17g}", value); }
+
 void Structure::AddTerm(std::span<const plugins::ParameterSpec> specs, Terms* terms, const std::string& key,
                         const std::string& expression) {
   const plugins::ParameterSpec* spec = plugins::FindSpec(specs, key);
@@ -58,6 +63,20 @@ Status Structure::Replace(const std::string& field, std::vector<std::string> exp
   replaced_.push_back(field);
   std::erase_if(settings, [&](const FieldSetting& setting) { return setting.field == field; });
   Set(field, std::move(expressions));
+  return Ok();
+}
+
+Status Structure::AddPointMass(const std::string& body, const std::string& mass,
+                               const std::vector<std::string>& position) {
+  mjsBody* parent = mjs_findBody(spec.get(), body.c_str());
+  if (!parent) return NoSuch("the model has no such body", body, rig_.Bodies(), "");
+  mjsBody* point = mjs_addBody(parent, nullptr);
+  const std::string name = body + ".payload";
+  mjs_setName(point->element, name.c_str());
+  point->explicitinertial = 1;
+  point->mass = 0;
+  Set("body/" + name + "/mass", {mass});
+  Set("body/" + name + "/pos", position);
   return Ok();
 }
 

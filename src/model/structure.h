@@ -16,6 +16,9 @@
 
 namespace gapscope {
 
+// A number in an expression or an attribute, to the last digit.
+std::string ExactText(double value);
+
 // The plugin instance of a candidate of the experiment's own.
 inline std::string OwnInstance(const std::string& joint, const std::string& candidate) {
   return joint + ".own." + candidate;
@@ -41,6 +44,8 @@ class Structure {
     std::string joint, share, stiffness, damping, gap;  // expressions
   };
   Status AddSplit(Split split);
+  // A mass without extent, fixed to a body at a position in its frame.
+  Status AddPointMass(const std::string& body, const std::string& mass, const std::vector<std::string>& position);
   // A torque of the experiment's own on a joint, by a passive plugin that reads numerics and texts INSTANCE.KEY:
   // gapscope.expression, or one of the user's.
   struct OwnTorque {

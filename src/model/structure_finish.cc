@@ -18,12 +18,6 @@ constexpr double kGapTimeConstant_s = 0.004;  // how stiff the flanks of a gap a
 
 std::string NameOf(mjsElement* element) { return mjs_getString(mjs_getName(element)); }
 
-std::string TextOf(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-
 void AddText(mjSpec* spec, const std::string& name, const std::string& value) {
   mjsText* text = mjs_addText(spec);
   mjs_setName(text->element, name.c_str());
@@ -244,15 +238,15 @@ Status Structure::FinishFriction(const std::string& name, Terms terms) {
   const std::string base = "joint/" + joint + "/" + level.native;
   const auto set =
       std::find_if(settings.begin(), settings.end(), [&](const FieldSetting& s) { return s.field == base; });
-  const std::string base_level = set != settings.end() ? set->expressions.front() : TextOf(element->frictionloss);
+  const std::string base_level = set != settings.end() ? set->expressions.front() : ExactText(element->frictionloss);
   if (element->frictionloss <= 0) element->frictionloss = kTinyFriction;
   if (set != settings.end()) settings.erase(set);
   if (terms.size() == 1 && terms.begin()->first == level.key) {
     // MuJoCo's own dry friction does it.
-    Set(base, {TextOf(kTinyFriction) + "+" + base_level + "+" + terms.begin()->second});
+    Set(base, {ExactText(kTinyFriction) + "+" + base_level + "+" + terms.begin()->second});
     return Ok();
   }
-  Set(base, {TextOf(kTinyFriction)});
+  Set(base, {ExactText(kTinyFriction)});
   AddTerm(plugins::Friction::kSpecs, &terms, level.key, base_level);
   const std::string instance = joint + ".friction";
   mjsBody* body = mjs_getParent(element->element);

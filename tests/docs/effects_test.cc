@@ -25,6 +25,10 @@ const char* PlaceText(EffectPlace place) {
       return "a joint with a spring in the base model";
     case EffectPlace::kSignal:
       return "a measured signal";
+    case EffectPlace::kBody:
+      return "a body with a joint of its own";
+    case EffectPlace::kModel:
+      return "the model as a whole (`model`)";
     case EffectPlace::kNamed:
       break;
   }
@@ -49,6 +53,10 @@ const char* ScaleText(ScaleKind kind) {
       return "T W";
     case ScaleKind::kCommand:
       return "U";
+    case ScaleKind::kMass:
+      return "M";
+    case ScaleKind::kLength:
+      return "L";
     case ScaleKind::kCubic:
       return "T/A^3";
   }
@@ -74,8 +82,9 @@ std::string EffectsText() {
                                   ? "`" + p.key + "_v`, `" + p.key + "_a` or `" + p.key + "_n_m`"
                                   : "`" + p.key + "`";
       const std::string unit = p.scale == ScaleKind::kCommand ? "V, A or N m" : p.unit;
-      text += "| " + key + " | " + unit + " | " + Number(p.neutral, p.scale) + " | " + Number(p.low, p.scale) + " .. " +
-              Number(p.high, p.scale) + " |\n";
+      const std::string from = p.from_centre >= 0 ? "centre of mass + " : "";
+      text += "| " + key + " | " + unit + " | " + from + Number(p.neutral, p.scale) + " | " + from +
+              Number(p.low, p.scale) + " .. " + Number(p.high, p.scale) + " |\n";
     }
     std::string told = "Shows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
     for (std::size_t i = 0; i < effect.partners.size(); ++i) told += (i ? ", " : "") + ("`" + effect.partners[i] + "`");

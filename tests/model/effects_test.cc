@@ -91,6 +91,10 @@ TEST_P(EffectsTest, EachIsNeutralAtNeutralAndActsElsewhere) {
     }
     const double acting = Change(rig, Predict(*model, rig.recording, strong, nullptr, step_s));
     if (std::getenv("GAPSCOPE_PRINT")) std::printf(" acting %.3g\n", acting);
+    if (use.effect == "mount_tilt" && std::string(GetParam()).starts_with("flex")) {
+      EXPECT_EQ(acting, 0) << "both links turn about their centres of mass";
+      continue;
+    }
     EXPECT_GT(acting, 1e-3) << "the strongest trial does nothing";
     EXPECT_GT(acting, 3 * neutral);
   }

@@ -44,7 +44,10 @@ TEST(SpringTest, EveryTermHasItsClosedForm) {
             0.1 * std::sin(4.9 + 0.4)},
            {Config("cogging_second_n_m", 0.1) + Config("cogging_periods_per_rev", 7) +
                 Config("cogging_second_phase_rad", -1),
-            0.1 * std::sin(9.8 - 1)}}) {
+            0.1 * std::sin(9.8 - 1)},
+           {Config("stop_n_m_per_rad", 5) + Config("stop_rad", 0.5), -5 * 0.2},
+           {Config("stop_n_m_per_rad", 5) + Config("stop_rad", 0.8), 0},
+           {Config("stop_n_m_per_rad", 5) + Config("stop_rad", -0.8), 0}}) {
     const ModelPtr m = Compile(SpringModel{.config = c.config}.Xml());
     const DataPtr d(mj_makeData(m.get()));
     d->qpos[0] = kAngle;

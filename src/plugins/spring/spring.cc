@@ -26,6 +26,7 @@ std::string Spring::ResolveStructure(const mjModel* m, int instance) {
   if (std::string fault = ResolveJoint(m, instance, &joint_); !fault.empty()) return fault;
   dof_ = m->jnt_dofadr[joint_];
   angle_address_ = m->jnt_qposadr[joint_];
+  if (m->jnt_limited[joint_]) middle_ = (m->jnt_range[2 * joint_] + m->jnt_range[2 * joint_ + 1]) / 2;
   return {};
 }
 
@@ -47,6 +48,10 @@ double Spring::Torque(const mjModel* m, double q) const {
     const double angle = value_(m, kCoggingPeriods) * q;
     torque += first * std::sin(angle + value_(m, kCoggingPhase));
     if (second != 0) torque += second * std::sin(2 * angle + value_(m, kCoggingSecondPhase));
+  }
+  if (const double stiffness = value_(m, kStop); stiffness != 0) {
+    const double stop = value_(m, kStopAngle), beyond = q - stop;
+    torque -= stiffness * (stop >= middle_ ? std::max(beyond, 0.0) : std::min(beyond, 0.0));
   }
   return torque;
 }

@@ -1,10 +1,12 @@
 // gapscope.spring: torque of one hinge or slide joint that depends on where the joint is, and a little on where it was.
 //
-//   torque = -k e - k3 e^3 - H s - G sin(q - q_g) + B + A sin(P q + a) + A2 sin(2 P q + a2),   e = q - rest
+//   torque = -k e - k3 e^3 - H s - G sin(q - q_g) + B + A sin(P q + a) + A2 sin(2 P q + a2) - ks p,   e = q - rest
 //
 // with s in -1 .. 1 the bend of a Dahl bristle (../common/bristle.h), which makes a loop of half-height H that turns
-// over within a few `hysteresis_rad`. Stands for a cable, a spring that hardens, an unbalanced mass, a bias, cogging.
-// MuJoCo's own `stiffness` and `springref` do for k and k3 alone. Attributes: README.md in this folder.
+// over within a few `hysteresis_rad`, and p how far the joint is beyond a stop: above it where the stop lies above the
+// middle of the joint's range (zero without a range), else below. Stands for a cable, a spring that hardens, an
+// unbalanced mass, a bias, cogging, a stop. MuJoCo's own `stiffness` and `springref` do for k and k3 alone. Attributes:
+// README.md in this folder.
 #ifndef GAPSCOPE_PLUGINS_SPRING_SPRING_H_
 #define GAPSCOPE_PLUGINS_SPRING_SPRING_H_
 
@@ -34,6 +36,8 @@ class Spring {
     kCoggingPhase,
     kCoggingSecond,
     kCoggingSecondPhase,
+    kStop,
+    kStopAngle,
     kKeyCount
   };
   static constexpr const char* kName = "gapscope.spring";
@@ -52,6 +56,8 @@ class Spring {
       {"cogging_phase_rad", "rad", 0, -kUnlimited, kUnlimited},
       {"cogging_second_n_m", "N m", 0, -kUnlimited, kUnlimited},
       {"cogging_second_phase_rad", "rad", 0, -kUnlimited, kUnlimited},
+      {"stop_n_m_per_rad", "N m/rad", 0, 0, kUnlimited},
+      {"stop_rad", "rad", 0, -kUnlimited, kUnlimited},
   }};
   static constexpr int kStateSize = sizeof(BristleState) / sizeof(mjtNum);
 
@@ -70,6 +76,7 @@ class Spring {
 
   LiveParameters<kKeyCount> value_;
   int joint_ = -1, dof_ = -1, angle_address_ = -1, state_address_ = -1;
+  double middle_ = 0;  // of the joint's range
 };
 
 }  // namespace gapscope::plugins

@@ -76,11 +76,9 @@ class TreeEffectsTest : public ::testing::Test {
 TEST_F(TreeEffectsTest, APayloadIsAPointMassOfTheTwoLinkEquations) {
   const double m = 0.4, x = 0.05, z = -0.17, q1 = 0.6, q2 = -1.1, s = q1 + q2;
   const Dynamics without = At(q1, q2);
-  const Dynamics with = At(q1, q2, {{"payload", "lower"}},
-                           {{"payload@lower.mass_kg", m},
-                            {"payload@lower.x_m", x},
-                            {"payload@lower.y_m", 0.03},
-                            {"payload@lower.z_m", z}});
+  const Dynamics with = At(
+      q1, q2, {{"payload", "lower"}},
+      {{"payload@lower.mass_kg", m}, {"payload@lower.x_m", x}, {"payload@lower.y_m", 0.03}, {"payload@lower.z_m", z}});
   const double jx2 = -x * std::sin(s) - z * std::cos(s), jz2 = x * std::cos(s) - z * std::sin(s);
   const double jx1 = kUpper_m * std::cos(q1) + jx2, jz1 = kUpper_m * std::sin(q1) + jz2;
   EXPECT_NEAR(with.bias[0] - without.bias[0], m * kGravity * jz1, 1e-12);

@@ -14,9 +14,8 @@ TEST(RigContractTest, JointsAndMotorHaveTheContractsNames) {
     const auto& joints = FactsOfRig(rig).joints;
     ASSERT_EQ(m->njnt, static_cast<int>(joints.size())) << rig;
     for (int j = 0; j < m->njnt; ++j) EXPECT_EQ(mj_id2name(m.get(), mjOBJ_JOINT, j), joints[j]) << rig;
-    const int motor = mj_name2id(m.get(), mjOBJ_ACTUATOR, "motor");
+    const int motor = mj_name2id(m.get(), mjOBJ_ACTUATOR, FactsOfRig(rig).motor.c_str());
     ASSERT_GE(motor, 0) << rig;
-    // The motor drives the first joint.
     EXPECT_EQ(m->actuator_trnid[2 * motor], 0) << rig;
   }
 }

@@ -19,6 +19,8 @@ RigFacts ReadFacts(const std::string& rig) {
     const YAML::Node& value = entry.second;
     if (key == "joints") {
       facts.joints = value.as<std::vector<std::string>>();
+    } else if (key == "motor") {
+      facts.motor = value.as<std::string>();
     } else if (key == "spring") {
       facts.spring = value.as<std::string>();
     } else if (key == "dry_friction") {

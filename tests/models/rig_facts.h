@@ -10,7 +10,8 @@
 namespace gapscope::testing {
 
 struct RigFacts {
-  std::vector<std::string> joints;           // of the MJCF; the motor drives the first one
+  std::vector<std::string> joints;           // of the MJCF
+  std::string motor = "motor";               // the actuator on the first of them
   std::string spring;                        // the joint that has one; empty: none
   bool dry_friction = false;                 // the published base model has Coulomb friction
   std::vector<std::string> signals;          // measured

@@ -4,13 +4,8 @@ namespace gapscope {
 
 // Turned by x about the base's x axis, then by y about its y axis; gravity is seen from the base.
 Effect Effect_mount_tilt() {
-  const EffectParameter about_x = {.key = "x_rad",
-                                   .unit = "rad",
-                                   .neutral = 0,
-                                   .low = -0.5,
-                                   .high = 0.5,
-                                   .trials = {0, 0.05, -0.05},
-                                   .start = 0.02};
+  const EffectParameter about_x = {
+      .key = "x_rad", .unit = "rad", .neutral = 0, .low = -0.5, .high = 0.5, .trials = {0, 0.05, -0.05}, .start = 0.02};
   EffectParameter about_y = about_x;
   about_y.key = "y_rad";
   return {
@@ -28,9 +23,9 @@ Effect Effect_mount_tilt() {
         const std::string cx = "cos(" + names[0] + ")", sx = "sin(" + names[0] + ")";
         const std::string cy = "cos(" + names[1] + ")", sy = "sin(" + names[1] + ")";
         const std::string upright = "(" + gz + "*" + cx + "-" + gy + "*" + sx + ")";
-        return structure.Replace("option/gravity", {gx + "*" + cy + "-" + upright + "*" + sy,
-                                                    gy + "*" + cx + "+" + gz + "*" + sx,
-                                                    upright + "*" + cy + "+" + gx + "*" + sy});
+        return structure.Replace("option/gravity",
+                                 {gx + "*" + cy + "-" + upright + "*" + sy, gy + "*" + cx + "+" + gz + "*" + sx,
+                                  upright + "*" + cy + "+" + gx + "*" + sy});
       },
   };
 }

@@ -1,4 +1,5 @@
-// The double pendulum: MuJoCo against the two-link equations with rotors behind gears (models/double_pendulum/README.md).
+// The double pendulum: MuJoCo against the two-link equations with rotors behind gears
+// (models/double_pendulum/README.md).
 #include <gtest/gtest.h>
 
 #include "tests/models/rig.h"
@@ -34,7 +35,8 @@ TEST(DoublePendulumModelTest, FollowsTheEquationsSwingingWidely) {
   const Motion motion = Drive(*m, start, static_cast<int>(std::lround(2 / h)), command);
   EXPECT_LT(LargestDifference<4>(*m, motion, start, 2e-5, TwoLinks{}, command), 2e-5);
   double shoulder = 0, elbow = 0;
-  for (const auto& q : motion.q) shoulder = std::fmax(shoulder, std::abs(q[0])), elbow = std::fmax(elbow, std::abs(q[1]));
+  for (const auto& q : motion.q)
+    shoulder = std::fmax(shoulder, std::abs(q[0])), elbow = std::fmax(elbow, std::abs(q[1]));
   EXPECT_GT(shoulder, 0.8);
   EXPECT_GT(elbow, 0.8);
 }

@@ -3,6 +3,7 @@
 #include <muParser.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -23,6 +24,36 @@ std::optional<double> AsNumber(const std::string& text) {
 }
 
 bool IsOfName(char c) { return std::string_view(plugins::kNameChars).find(c) != std::string_view::npos; }
+
+// The places of a whole name in an expression; each search goes on at `from`.
+std::size_t FindName(const std::string& expression, const std::string& name, std::size_t from) {
+  for (std::size_t at = expression.find(name, from); at != std::string::npos; at = expression.find(name, at + 1)) {
+    const std::size_t end = at + name.size();
+    if ((at == 0 || !IsOfName(expression[at - 1])) && (end == expression.size() || !IsOfName(expression[end])))
+      return at;
+  }
+  return std::string::npos;
+}
+
+// How the parser reads a variable. The name of an effect's parameter holds that of a joint, in which any character may
+// stand: it has an alias where needed. Other names that the parser cannot read (columns of a log) have none: they
+// cannot be meant.
+std::string NameInParser(const std::string& name, std::size_t index) {
+  if (!name.empty() && std::ranges::all_of(name, IsOfName) && !std::isdigit(static_cast<unsigned char>(name.front())))
+    return name;
+  return name.find('@') == std::string::npos ? "" : "parameter@" + std::to_string(index);
+}
+
+std::string WithAliases(std::string text, const std::vector<std::string>& names) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string alias = NameInParser(names[i], i);
+    if (alias.empty() || alias == names[i]) continue;
+    for (std::size_t at = FindName(text, names[i], 0); at != std::string::npos;
+         at = FindName(text, names[i], at + alias.size()))
+      text.replace(at, names[i].size(), alias);
+  }
+  return text;
+}
 
 }  // namespace
 
@@ -63,8 +94,11 @@ Result<Expression> Expression::Parse(const std::string& text, const std::vector<
   }
   impl->parser = std::make_unique<mu::Parser>();
   try {
-    plugins::SetText(impl->parser.get(), text);
-    for (std::size_t i = 0; i < names.size(); ++i) impl->parser->DefineVar(names[i], variables + i);
+    plugins::SetText(impl->parser.get(), WithAliases(text, names));
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (const std::string name = NameInParser(names[i], i); !name.empty())
+        impl->parser->DefineVar(name, variables + i);
+    }
     impl->parser->Eval();
     if (impl->parser->GetNumResults() != 1)
       return Error{.what = "bad expression " + Quoted(text) + ": several values", .where = where, .allowed = "one"};
@@ -88,12 +122,7 @@ double Expression::Evaluate() const {
 }
 
 bool Mentions(const std::string& expression, const std::string& name) {
-  for (std::size_t at = expression.find(name); at != std::string::npos; at = expression.find(name, at + 1)) {
-    const std::size_t end = at + name.size();
-    if ((at == 0 || !IsOfName(expression[at - 1])) && (end == expression.size() || !IsOfName(expression[end])))
-      return true;
-  }
-  return false;
+  return FindName(expression, name, 0) != std::string::npos;
 }
 
 std::string WithNames(const std::string& expression, const std::map<std::string, std::string>& names) {

@@ -44,6 +44,18 @@ TEST(ExpressionTest, ReadsItsVariablesAnewAndSurvivesMoves) {
   EXPECT_EQ(moved.Evaluate(), 5);
 }
 
+TEST(ExpressionTest, ParametersOfJointsWithAnyName) {
+  double values[] = {2, 5, 7, 11};
+  const std::vector<std::string> names = {"load@left hip.k", "load@left-hip.k", "time (s)", "k"};
+  const auto both = Expression::Parse("min(load@left hip.k,load@left-hip.k)-k", names, values, "");
+  ASSERT_TRUE(both.ok()) << both.error().Text();
+  EXPECT_EQ(both.value().Evaluate(), 2 - 11);
+  const auto alone = Expression::Parse("load@left-hip.k", names, values, "");
+  ASSERT_TRUE(alone.ok());
+  EXPECT_EQ(alone.value().Evaluate(), 5);
+  EXPECT_FALSE(Expression::Parse("time (s)*2", names, values, "").ok());
+}
+
 TEST(ExpressionTest, UndefinedValuesAreNotFinite) {
   EXPECT_FALSE(std::isfinite(Value("1 / (x - 3)")));
   EXPECT_FALSE(std::isfinite(Value("0 / (x - 3)")));

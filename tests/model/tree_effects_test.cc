@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "tests/model/synthetic.h"
 
@@ -124,6 +125,34 @@ TEST_F(TreeEffectsTest, AreLookedForWhereTwoJointsFeelThem) {
   const auto fixed = ParseEffects({"payload@base"}, *base_->rig());
   ASSERT_FALSE(fixed.ok());
   EXPECT_NE(fixed.error().Text().find("allowed: upper, lower"), std::string::npos) << fixed.error().Text();
+}
+
+// Two effects on each place, so that expressions of several parameters are among them.
+TEST(NamesTest, JointsDrivesAndSignalsMayHaveAnyName) {
+  std::string mjcf = Arm(), yaml = kYaml;
+  for (std::string* text : {&mjcf, &yaml}) {
+    for (const auto& [plain, odd] : {std::pair{"shoulder", "left hip-1"}, std::pair{"first", "hip (yaw)"},
+                                     std::pair{"lower", "fore arm"}, std::pair{"signal: q", "signal: 'hip angle'"}}) {
+      for (std::size_t at = text->find(plain); at != std::string::npos; at = text->find(plain, at + 1))
+        text->replace(at, std::string(plain).size(), odd);
+    }
+  }
+  Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, mjcf, yaml);
+  const auto base = MakeModel(experiment);
+  ASSERT_NE(base, nullptr);
+  const std::vector<EffectUse> uses = AllUses(*base->rig());
+  std::set<std::string> places;
+  for (const EffectUse& use : uses) {
+    places.insert(use.on);
+    for (const EffectUse& other : {EffectUse{"torque_limit", "hip (yaw)"}, EffectUse{"torque_bias", "left hip-1"}}) {
+      if (use.effect == other.effect) continue;
+      const auto built = Model::Build(base->rig(), {use, other}, {});
+      EXPECT_TRUE(built.ok()) << use.Text() << ": " << built.error().Text();
+    }
+  }
+  for (const char* place : {"left hip-1", "hip (yaw)", "fore arm", "hip angle", "all", "model"})
+    EXPECT_TRUE(places.contains(place)) << place;
 }
 
 TEST(MountTiltTest, WhereTheExperimentSetsGravityItIsAParameter) {

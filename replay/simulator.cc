@@ -136,8 +136,6 @@ Simulator::Simulator(const Model& model, double max_step_s)
   apart_.resize(model.mirrored_joints().size());
   remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nactuator,
                                               [](int plugin) { return plugin >= 0; });
-  reads_forces_ = std::ranges::any_of(
-      model.sources(), [](const auto& source) { return TraitsOf(source.kind).stage == SignalStage::kForces; });
 }
 
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
@@ -168,6 +166,8 @@ double Simulator::Read(const SignalSource& source) const {
       return data_->qpos[source.qpos];
     case SignalKind::kVelocity:
       return data_->qvel[source.dof];
+    case SignalKind::kSensor:
+      return data_->sensordata[source.sensor];
     case SignalKind::kTorque:
       break;
   }
@@ -199,10 +199,26 @@ void Simulator::Begin(const Recording& recording, Window window, const InitialSt
     d->qvel[m->jnt_dofadr[joint]] += apart_[i].second;
   }
   d->time = recording.time_s[window.begin];
-  // Forces cost a pass over the actuators at each stamp: only when this log has one.
-  reads_forces_ = std::any_of(recording.measured.begin(), recording.measured.end(), [&](const auto& q) {
-    return TraitsOf(model_.source(q.index).kind).stage == SignalStage::kForces;
-  });
+  // Forces cost a pass over the actuators at each stamp, sensors all of a step's work: only when this log has one.
+  reads_ = SignalStage::kState;
+  for (const auto& measured : recording.measured)
+    reads_ = std::max(reads_, TraitsOf(model_.source(measured.index).kind).stage);
+}
+
+void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
+  if (reads_ == SignalStage::kState) return;
+  mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  SetCommands(recording, row > 0 ? row - 1 : 0, d->time, d->time);
+  if (reads_ == SignalStage::kSensors) {
+    m->opt.disableflags &= ~mjDSBL_SENSOR;
+    mj_forward(m, d);
+    m->opt.disableflags |= mjDSBL_SENSOR;
+    return;
+  }
+  mj_fwdPosition(m, d);
+  mj_fwdVelocity(m, d);
+  mj_fwdActuation(m, d);
 }
 
 int Simulator::StepToNext(const Recording& recording, std::size_t row) {
@@ -241,14 +257,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];
     d->time = now;
-    if (reads_forces_) {
-      // The drive's torque at this stamp, still under the command that went before.
-      const std::size_t before = row > 0 ? row - 1 : 0;
-      SetCommands(recording, before, now, now);
-      mj_fwdPosition(m, d);
-      mj_fwdVelocity(m, d);
-      mj_fwdActuation(m, d);
-    }
+    ComputeSignals(recording, row);
     double* out = predicted.data() + (row - window.begin) * signals;
     for (std::size_t s = 0; s < signals; ++s) out[s] = Read(model_.source(recording.measured[s].index));
     if (!qpos.empty())

@@ -91,6 +91,8 @@ class Simulator {
   void FindEarlierCommands(const Recording& recording);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;
+  // What signals beside the state are at a stamp: still under the command that went before.
+  void ComputeSignals(const Recording& recording, std::size_t row);
   // What the sensors make of the states: filter, delay, offset.
   void ApplySensors(const Recording& recording, Window window, std::span<double> predicted);
 
@@ -104,8 +106,8 @@ class Simulator {
   bool late_ = false;             // one of them does not act at its stamp
   double latest_s_ = 0;
   ProbeTorque probe_;
-  bool reads_forces_ = false;
-  bool remembers_ = false;  // has states beside position and speed
+  SignalStage reads_ = SignalStage::kState;  // the latest stage of any signal of the log
+  bool remembers_ = false;                   // has states beside position and speed
   std::vector<std::pair<double, double>>
       apart_;  // per mirrored joint: angle and speed beside its load at the start of a run
   std::vector<double> values_;

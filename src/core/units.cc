@@ -22,6 +22,7 @@ const std::map<std::string, Unit, std::less<>>& Table() {
       {"rad", {"rad", 1}},      {"mrad", {"rad", 1e-3}},    {"deg", {"rad", kDeg}},    {"rev", {"rad", 360 * kDeg}},
       {"rad/s", {"rad/s", 1}},  {"deg/s", {"rad/s", kDeg}}, {"rpm", {"rad/s", kRpm}},  {"rev/s", {"rad/s", 60 * kRpm}},
       {"rad/s^2", {"rad/s^2", 1}},
+      {"m/s^2", {"m/s^2", 1}},  {"gn", {"m/s^2", 9.80665}}, {"T", {"T", 1}},           {"mT", {"T", 1e-3}},
       {"V", {"V", 1}},          {"mV", {"V", 1e-3}},        {"dV", {"V", 0.1}},
       {"A", {"A", 1}},          {"mA", {"A", 1e-3}},
       {"N m", {"N m", 1}},      {"Nm", {"N m", 1}},         {"mN m", {"N m", 1e-3}},   {"mNm", {"N m", 1e-3}},

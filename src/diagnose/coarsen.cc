@@ -41,7 +41,7 @@ std::vector<double> Sharpened(const std::vector<double>& means, const std::vecto
 Recording Coarsen(const Recording& recording, double least_step_s) {
   // A drive's torque follows its command at once: under the mean of a few commands it would seem to be late.
   const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
-    return m.spec.scored && TraitsOf(m.spec.kind).stage == SignalStage::kForces;
+    return m.spec.scored && TraitsOf(m.spec.kind).stage != SignalStage::kState;
   });
   if (torque) return recording;
   constexpr double kSlack = 0.95;  // of the step: stamps jitter

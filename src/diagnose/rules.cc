@@ -15,7 +15,7 @@ std::string JointOf(const std::string& on, const Model& model) {
     return name ? name : "";
   }
   for (const auto& measured : model.experiment().measured) {
-    if (measured.signal == on) return TraitsOf(measured.kind).of_actuator ? JointOf(measured.on, model) : measured.on;
+    if (measured.signal == on) return model.rig()->JointOfSignal(on);
   }
   return on;
 }

@@ -123,6 +123,49 @@ Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& pat
   return Ok();
 }
 
+// Of a sensor whose numbers have a column each: a signal a column, "gyro[0]" ...
+std::vector<MeasuredSpec> EachElement(const MeasuredSpec& spec, const std::vector<std::string>& columns) {
+  if (columns.empty()) return {spec};
+  std::vector<MeasuredSpec> each(columns.size(), spec);
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    each[i].signal += "[" + std::to_string(i) + "]";
+    each[i].columns = {columns[i]};
+    each[i].element = static_cast<int>(i);
+    each[i].elements = static_cast<int>(columns.size());
+  }
+  return each;
+}
+
+// What of the model the signal is, and its unit.
+void ReadSource(YamlMap& map, const YAML::Node& item, MeasuredSpec* spec) {
+  std::vector<std::string> kinds;
+  for (const auto& row : AllSignalTraits()) kinds.emplace_back(row.name);
+  const std::string sites[] = {map.Text("joint", ""), map.Text("actuator", ""), map.Text("sensor", "")};
+  const bool of_sensor = !sites[static_cast<int>(SignalSite::kSensor)].empty();
+  const SignalTraits& traits =
+      of_sensor && !map.Has("kind") ? TraitsOf(SignalKind::kSensor) : AllSignalTraits()[map.Choice("kind", kinds, 0)];
+  spec->kind = traits.kind;
+  spec->on = sites[static_cast<int>(traits.site)];
+  if (spec->on.empty() || std::ranges::count(sites, "") != 2) {
+    map.Fail(item, {.what = "the signal '" + spec->signal +
+                            "' needs exactly one of 'joint' (position, velocity), 'actuator' (torque) or 'sensor'"});
+  }
+  if (map.Has("element")) {
+    const double element = map.Number("element");
+    if (!(element >= 0 && element < 1000 && std::floor(element) == element && of_sensor))
+      map.Fail(item, {.what = "'element' counts a sensor's numbers", .allowed = "0, 1, 2 ..., beside 'sensor'"});
+    spec->element = static_cast<int>(std::clamp(element, 0.0, 999.0));
+  }
+  spec->unit = ReadScaling(map, item, &spec->factor, &spec->offset);
+  // "1": the column is in SI already. A sensor's unit is checked where the model is known.
+  const auto& units = traits.units;
+  if (spec->unit != "1" && !of_sensor && std::ranges::find(units, spec->unit) == std::end(units)) {
+    map.Fail(item, {.what = "the unit of the signal '" + spec->signal + "' does not fit its kind",
+                    .actual = "'" + map.Text("unit", "1") + "'",
+                    .allowed = std::string("units of ") + units[0] + " or " + units[1]});
+  }
+}
+
 Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment* experiment) {
   if (!node.IsDefined() || !node.IsSequence() || node.size() == 0) {
     return Error{.what = "nothing is measured",
@@ -134,26 +177,10 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     YamlMap map(item, path, "a measured signal");
     MeasuredSpec spec;
     spec.signal = map.Text("signal");
+    spec.where = YamlPlace(path, item);
     spec.columns = ReadColumns(map, item, false);
     if (spec.columns.empty()) spec.columns = {spec.signal};
-    std::vector<std::string> kinds;
-    for (const auto& row : AllSignalTraits()) kinds.emplace_back(row.name);
-    const SignalTraits& traits = AllSignalTraits()[map.Choice("kind", kinds, 0)];
-    spec.kind = traits.kind;
-    const std::string joint = map.Text("joint", ""), actuator = map.Text("actuator", "");
-    spec.on = traits.of_actuator ? actuator : joint;
-    if (spec.on.empty() || (!joint.empty() && !actuator.empty())) {
-      map.Fail(item, {.what = "the signal '" + spec.signal +
-                              "' needs exactly one of 'joint' (position, velocity) or 'actuator' (torque)"});
-    }
-    spec.unit = ReadScaling(map, item, &spec.factor, &spec.offset);
-    // "1": the column is in SI already.
-    const auto& units = traits.units;
-    if (spec.unit != "1" && std::ranges::find(units, spec.unit) == std::end(units)) {
-      map.Fail(item, {.what = "the unit of the signal '" + spec.signal + "' does not fit its kind",
-                      .actual = "'" + map.Text("unit", "1") + "'",
-                      .allowed = std::string("units of ") + units[0] + " or " + units[1]});
-    }
+    ReadSource(map, item, &spec);
     spec.resolution = map.Number("resolution", 0);
     if (map.Has("filter")) {
       YamlMap filter(item["filter"], path, "'filter'");
@@ -169,12 +196,19 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
       if (!(spec.wrap_period > 0)) map.Fail(item, {.what = "'wrap' is the period to remove, in SI", .allowed = "> 0"});
     }
     if (spec.resolution < 0) map.Fail(item, {.what = "'resolution' is negative", .allowed = ">= 0"});
-    for (const auto& other : experiment->measured) {
-      if (other.signal == spec.signal)
-        map.Fail(item, {.what = "the signal '" + spec.signal + "' stands twice", .cure = "rename one"});
+    const std::vector<std::string> elements = map.TextList("columns_of_elements");
+    if (!elements.empty() &&
+        (spec.kind != SignalKind::kSensor || map.Has("element") || map.Has("column") || map.Has("columns")))
+      map.Fail(item, {.what = "'columns_of_elements' names a sensor's columns, one for each of its numbers",
+                      .cure = "name the 'sensor', and drop 'element' and 'column'"});
+    for (const MeasuredSpec& one : EachElement(spec, elements)) {
+      for (const auto& other : experiment->measured) {
+        if (other.signal == one.signal)
+          map.Fail(item, {.what = "the signal '" + one.signal + "' stands twice", .cure = "rename one"});
+      }
+      experiment->measured.push_back(one);
     }
     GS_RETURN_IF_ERROR(map.Finish());
-    experiment->measured.push_back(std::move(spec));
   }
   return Ok();
 }
@@ -264,7 +298,7 @@ std::span<const SignalTraits> AllSignalTraits() {
   static constexpr SignalTraits kTraits[] = {{.kind = kPosition,
                                               .name = "position",
                                               .units = {"rad", "m"},
-                                              .of_actuator = false,
+                                              .site = SignalSite::kJoint,
                                               .has_zero = true,
                                               .gives_angle = true,
                                               .gives_speed = false,
@@ -272,7 +306,7 @@ std::span<const SignalTraits> AllSignalTraits() {
                                              {.kind = kVelocity,
                                               .name = "velocity",
                                               .units = {"rad/s", "m/s"},
-                                              .of_actuator = false,
+                                              .site = SignalSite::kJoint,
                                               .has_zero = false,
                                               .gives_angle = false,
                                               .gives_speed = true,
@@ -280,11 +314,19 @@ std::span<const SignalTraits> AllSignalTraits() {
                                              {.kind = kTorque,
                                               .name = "torque",
                                               .units = {"N m", "N"},
-                                              .of_actuator = true,
+                                              .site = SignalSite::kActuator,
                                               .has_zero = false,
                                               .gives_angle = false,
                                               .gives_speed = false,
-                                              .stage = SignalStage::kForces}};
+                                              .stage = SignalStage::kForces},
+                                             {.kind = kSensor,
+                                              .name = "sensor",
+                                              .units = {"", ""},
+                                              .site = SignalSite::kSensor,
+                                              .has_zero = false,
+                                              .gives_angle = false,
+                                              .gives_speed = false,
+                                              .stage = SignalStage::kSensors}};
   return kTraits;
 }
 

@@ -39,19 +39,23 @@ struct CommandSpec {
   std::string fallback = "0";     // expression of log values
 };
 
-enum class SignalKind { kPosition, kVelocity, kTorque };
+enum class SignalKind { kPosition, kVelocity, kTorque, kSensor };
 
-// From which a simulation reads a signal: the state alone, or forces, which follow the command at once.
-enum class SignalStage { kState, kForces };
+// Of what in the model a signal is.
+enum class SignalSite { kJoint, kActuator, kSensor };
+
+// From which a simulation reads a signal: the state alone; forces, which follow the command at once; or all that
+// MuJoCo's sensors may read, accelerations among it.
+enum class SignalStage { kState, kForces, kSensors };
 
 struct SignalTraits {
   SignalKind kind;
   const char* name;      // as the experiment file says it
-  const char* units[2];  // SI, of a hinge and of a slide
-  bool of_actuator;      // measured on an actuator, else on a joint
-  bool has_zero;         // its sensor has a zero of its own, which a log may be off by
-  bool gives_angle;      // it is the joint's coordinate
-  bool gives_speed;      // it is the joint's speed
+  const char* units[2];  // SI, of a hinge and of a slide; a sensor's type says its own
+  SignalSite site;
+  bool has_zero;     // its sensor has a zero of its own, which a log may be off by
+  bool gives_angle;  // it is the joint's coordinate
+  bool gives_speed;  // it is the joint's speed
   SignalStage stage;
 };
 std::span<const SignalTraits> AllSignalTraits();
@@ -68,7 +72,9 @@ struct MeasuredSpec {
   std::string signal;                // name in results: "arm_rad"
   std::vector<std::string> columns;  // the first one that the log has
   SignalKind kind = SignalKind::kPosition;
-  std::string on;                 // joint or actuator: SignalTraits::of_actuator
+  std::string on;                 // joint, actuator or sensor: SignalTraits::site
+  int element = -1;               // of a sensor of several numbers; -1: it is not said which
+  int elements = 0;               // how many columns `columns_of_elements` gives the sensor; 0: there is no such list
   std::string unit;               // SI unit: "rad", "rad/s", "N m"
   double factor = 1, offset = 0;  // measured in SI = factor * column + offset
   double resolution = 0;          // size of one sensor count, SI; 0: unknown
@@ -78,6 +84,7 @@ struct MeasuredSpec {
   WrapRepair wrap = WrapRepair::kKeep;
   double wrap_period = 0;
   std::string offset_parameter;  // predicted = model + this parameter; empty: none
+  std::string where;             // file:line:column, for errors
 };
 
 struct Parameter {

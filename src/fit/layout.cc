@@ -22,7 +22,7 @@ bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& lay
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
       const SignalTraits& traits = TraitsOf(recordings[l].measured[s].spec.kind);
-      if (traits.stage == SignalStage::kForces && layout.signals[l][s].weight > 0) return true;
+      if (traits.stage != SignalStage::kState && layout.signals[l][s].weight > 0) return true;
     }
   }
   return false;

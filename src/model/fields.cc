@@ -4,6 +4,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
+#include "src/model/element_names.h"
 
 namespace gapscope {
 namespace {
@@ -73,19 +74,6 @@ Field Single(const mjModel& model, std::initializer_list<std::pair<const mjtNum*
 }
 
 // Of the elements that fields belong to.
-std::vector<std::string> NamesOf(const mjModel& m, mjtObj type) {
-  const auto count = type == mjOBJ_JOINT      ? m.njnt
-                     : type == mjOBJ_BODY     ? m.nbody
-                     : type == mjOBJ_TENDON   ? m.ntendon
-                     : type == mjOBJ_ACTUATOR ? m.nactuator
-                                              : m.nnumeric;
-  std::vector<std::string> names;
-  for (int i = 0; i < static_cast<int>(count); ++i) {
-    if (const char* name = mj_id2name(&m, type, i)) names.emplace_back(name);
-  }
-  return names;
-}
-
 template <class Map>
 std::vector<std::string> Keys(const Map& map) {
   return Collect(map, [](const auto& entry) { return entry.first; });
@@ -140,7 +128,7 @@ Result<Field> ActuatorField(const mjModel& m, int id, const std::string& field, 
 Result<int> IdOf(const mjModel& m, mjtObj type, const char* kind, const std::string& name, const std::string& where) {
   const int id = mj_name2id(&m, type, name.c_str());
   if (id >= 0) return id;
-  return NoSuch(std::string("no such ") + kind + " in the MJCF", name, NamesOf(m, type), where);
+  return NoSuch(std::string("no such ") + kind + " in the MJCF", name, ElementNames(m, type), where);
 }
 
 Field Gravity(const mjModel& m) {

@@ -4,7 +4,9 @@
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
+#include "src/model/element_names.h"
 #include "src/model/parameter_writer.h"
+#include "src/model/sensor_facts.h"
 #include "src/model/structure.h"
 #include "src/plugins/motor/history.h"
 #include "src/plugins/motor/motor_config.h"
@@ -18,14 +20,6 @@ int EstimateAddress(const mjModel& m, int actuator) {
   const mjpPlugin* plugin = instance < 0 ? nullptr : mjp_getPluginAtSlot(m.plugin[instance]);
   if (!plugin || std::string_view(plugin->name) != plugins::kMotorName) return -1;
   return m.plugin_stateadr[instance] + plugins::MotorState::kEstimate;
-}
-
-std::vector<std::string> ElementNames(const mjModel& m, mjtObj type, int count) {
-  std::vector<std::string> names;
-  for (int i = 0; i < count; ++i) {
-    if (const char* name = mj_id2name(&m, type, i)) names.emplace_back(name);
-  }
-  return names;
 }
 
 // Whether anything in the model could ever push, stop or rub by MuJoCo's constraint solver.
@@ -118,38 +112,41 @@ Status Model::ResolveNames() {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
     if (id < 0)
       return NoSuch("a command drives an actuator that the MJCF lacks", command.actuator,
-                    ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
+                    ElementNames(m, mjOBJ_ACTUATOR), file);
     command_ctrl_.push_back(m.actuator_ctrladr[id]);
   }
   for (const auto& measured : experiment().measured) {
     SignalSource source{.kind = measured.kind};
-    if (TraitsOf(measured.kind).of_actuator) {
+    if (TraitsOf(measured.kind).site == SignalSite::kSensor) {
+      GS_ASSIGN(source.sensor, AddressOfSensor(m, measured));
+    } else if (TraitsOf(measured.kind).site == SignalSite::kActuator) {
       source.actuator = mj_name2id(&m, mjOBJ_ACTUATOR, measured.on.c_str());
       if (source.actuator < 0)
         return NoSuch("a measured torque is of an actuator that the MJCF lacks", measured.on,
-                      ElementNames(m, mjOBJ_ACTUATOR, static_cast<int>(m.nactuator)), file);
+                      ElementNames(m, mjOBJ_ACTUATOR), measured.where);
       if (m.actuator_trntype[source.actuator] == mjTRN_JOINT) source.joint = m.actuator_trnid[2 * source.actuator];
       source.estimate = EstimateAddress(m, source.actuator);
     } else {
       source.joint = mj_name2id(&m, mjOBJ_JOINT, measured.on.c_str());
       if (source.joint < 0)
-        return NoSuch("a measured signal is of a joint that the MJCF lacks", measured.on,
-                      ElementNames(m, mjOBJ_JOINT, static_cast<int>(m.njnt)), file);
+        return NoSuch("a measured signal is of a joint that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_JOINT),
+                      file);
     }
     if (source.joint >= 0) {
       if (m.jnt_type[source.joint] != mjJNT_HINGE && m.jnt_type[source.joint] != mjJNT_SLIDE) {
         return Error{.what = "the joint of signal '" + measured.signal + "' is neither hinge nor slide",
-                     .where = file,
+                     .where = measured.where,
                      .allowed = "hinge, slide"};
       }
       source.qpos = m.jnt_qposadr[source.joint];
       source.dof = m.jnt_dofadr[source.joint];
     }
     if (!measured.offset_parameter.empty()) {
-      GS_ASSIGN(source.offset, Find(measured.offset_parameter, file + ": offset of signal '" + measured.signal + "'"));
+      GS_ASSIGN(source.offset,
+                Find(measured.offset_parameter, measured.where + ": offset of signal '" + measured.signal + "'"));
     }
     if (!measured.filter.cutoff.empty()) {
-      const std::string where = file + ": filter of signal '" + measured.signal + "'";
+      const std::string where = measured.where + ": filter of signal '" + measured.signal + "'";
       GS_ASSIGN(source.cutoff, Find(measured.filter.cutoff, where));
       GS_ASSIGN(source.damping_ratio, Find(measured.filter.damping_ratio, where));
     }

@@ -23,6 +23,7 @@ struct SignalSource {
   int joint = -1, qpos = -1, dof = -1;
   int actuator = -1;  // torque: of this actuator's joint
   int estimate = -1;  // torque: address in plugin_state of a gapscope.motor's own estimate; -1: qfrc_actuator of `dof`
+  int sensor = -1;    // address in sensordata
   int offset = -1;    // parameter that is added to the prediction
   int delay = -1;     // parameter: how late the signal is logged
   int cutoff = -1, damping_ratio = -1;  // parameters of the low-pass between mechanism and log

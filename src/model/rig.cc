@@ -14,11 +14,6 @@ namespace {
 // into the user's folder.
 void DropMujocoWarning(const char*) {}
 
-std::string NameOf(const mjModel& m, mjtObj type, int id) {
-  const char* name = id < 0 ? nullptr : mj_id2name(&m, type, id);
-  return name ? name : "";
-}
-
 }  // namespace
 
 std::string OneLine(std::string text) {
@@ -143,7 +138,9 @@ std::vector<std::string> Rig::Signals() const { return Collect(experiment_.measu
 
 std::string Rig::JointOfSignal(const std::string& signal) const {
   for (const auto& measured : experiment_.measured) {
-    if (measured.signal == signal) return TraitsOf(measured.kind).of_actuator ? JointOf(measured.on) : measured.on;
+    if (measured.signal != signal) continue;
+    const SignalSite site = TraitsOf(measured.kind).site;
+    return site == SignalSite::kJoint ? measured.on : site == SignalSite::kActuator ? JointOf(measured.on) : "";
   }
   return "";
 }

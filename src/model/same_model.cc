@@ -37,28 +37,23 @@ bool Same(const T* a, const T* b, mjtSize count) {
   });
 }
 
-std::string Named(const mjModel& m, mjtObj type, int id) {
-  const char* name = id < 0 ? nullptr : mj_id2name(&m, type, id);
-  return name ? name : "";
-}
-
 // Numbers and texts, which plugins read by name, and what is a plugin.
 std::string NamedDifference(const mjModel& a, const mjModel& b) {
   if (a.nplugin != b.nplugin) return "the number of plugins";
   for (int i = 0; i < a.nnumeric; ++i) {
-    const std::string name = Named(a, mjOBJ_NUMERIC, i);
+    const std::string name = NameOf(a, mjOBJ_NUMERIC, i);
     const int other = mj_name2id(&b, mjOBJ_NUMERIC, name.c_str());
     if (other < 0 || a.numeric_size[i] != b.numeric_size[other] ||
         !Same(a.numeric_data + a.numeric_adr[i], b.numeric_data + b.numeric_adr[other], a.numeric_size[i]))
       return "the numeric " + name;
   }
   for (int i = 0; i < a.ntext; ++i) {
-    const std::string name = Named(a, mjOBJ_TEXT, i);
+    const std::string name = NameOf(a, mjOBJ_TEXT, i);
     const int other = mj_name2id(&b, mjOBJ_TEXT, name.c_str());
     if (other < 0 || std::strcmp(a.text_data + a.text_adr[i], b.text_data + b.text_adr[other]) != 0)
       return "the text " + name;
   }
-  const auto instance = [](const mjModel& m, int id) { return Named(m, mjOBJ_PLUGIN, id); };
+  const auto instance = [](const mjModel& m, int id) { return NameOf(m, mjOBJ_PLUGIN, id); };
   for (int i = 0; i < a.nbody; ++i) {
     if (instance(a, a.body_plugin[i]) != instance(b, b.body_plugin[i])) return "the plugin of a body";
   }
@@ -68,7 +63,7 @@ std::string NamedDifference(const mjModel& a, const mjModel& b) {
     if (a.actuator_plugin[i] < 0 &&
         !(Same(a.actuator_gainprm + mjNGAIN * i, b.actuator_gainprm + mjNGAIN * i, mjNGAIN) &&
           Same(a.actuator_biasprm + mjNBIAS * i, b.actuator_biasprm + mjNBIAS * i, mjNBIAS)))
-      return "the law of actuator " + Named(a, mjOBJ_ACTUATOR, i);
+      return "the law of actuator " + NameOf(a, mjOBJ_ACTUATOR, i);
   }
   return "";
 }
@@ -77,7 +72,7 @@ std::string NameDifference(const mjModel& a, const mjModel& b) {
   for (const auto& [type, count] : {std::pair{mjOBJ_BODY, a.nbody}, std::pair{mjOBJ_JOINT, a.njnt},
                                     std::pair{mjOBJ_TENDON, a.ntendon}, std::pair{mjOBJ_ACTUATOR, a.nactuator}}) {
     for (int i = 0; i < static_cast<int>(count); ++i) {
-      if (Named(a, type, i) != Named(b, type, i)) return "the order of '" + Named(a, type, i) + "'";
+      if (NameOf(a, type, i) != NameOf(b, type, i)) return "the order of '" + NameOf(a, type, i) + "'";
     }
   }
   return "";

@@ -130,7 +130,7 @@ TEST(ExperimentTest, EveryShippedFileLoads) {
     EXPECT_TRUE(std::filesystem::exists(loaded.value().model_path)) << loaded.value().model_path;
     ++files;
   }
-  EXPECT_EQ(files, 10);
+  EXPECT_GE(files, 11);
 }
 
 // Seeded: the same mutants in every run. GAPSCOPE_MUTATION_SECONDS makes it a longer hunt.

@@ -16,6 +16,8 @@ constexpr const char* kRobot = R"(<mujoco>
       <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
   </worldbody>
   <actuator><motor name="motor" joint="hinge"/></actuator>
+  <sensor><subtreecom name="centre" body="bar"/><framequat name="turn" objtype="body" objname="bar"/>
+    <jointvel name="late" joint="hinge" delay="0.01" nsample="10"/><user name="own" dim="1"/></sensor>
 </mujoco>)";
 constexpr const char* kYaml = R"(commands:
   - {actuator: motor, column: u, unit: N m}
@@ -55,6 +57,16 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
        "unit: rad, filter: {cutoff_rad_per_s: hinge.damping, damping_ratio: hinge.ofset}",
        {"no such parameter", "filter of signal", "'hinge.ofset'"}},
       {"unit: rad", "unit: rad, offset: hinge.ofset", {"no such parameter", "'hinge.ofset'"}},
+      {"joint: hinge,", "sensor: center, element: 0,", {"experiment.yaml:5:5:", "did you mean 'centre'?"}},
+      {"joint: hinge, unit: rad", "sensor: centre, unit: m", {"experiment.yaml:5:5:", "several elements", "0 to 2"}},
+      {"joint: hinge, unit: rad", "sensor: centre, element: 3", {"no such element", "got 3", "0 to 2"}},
+      {"joint: hinge,", "sensor: centre, element: 2,", {"does not fit its sensor", "'rad'", "units of m"}},
+      {"column: q, joint: hinge, unit: rad",
+       "sensor: centre, columns_of_elements: [x, y]",
+       {"experiment.yaml:5:5:", "another number of elements", "got 2", "allowed: 3"}},
+      {"joint: hinge, unit: rad", "sensor: turn, element: 1", {"is an orientation", "framexaxis"}},
+      {"joint: hinge, unit: rad", "sensor: own", {"a program's own callback"}},
+      {"joint: hinge, unit: rad", "sensor: late", {"a delay or an interval of its own", "sensor_delay@q"}},
       {"joint/hinge/damping:", "joint/hinge/dampin:", {"experiment.yaml:9:3:", "did you mean 'damping'?"}},
       {"joint/hinge/damping:", "joint/hnge/damping:", {"experiment.yaml:9:3:", "did you mean 'hinge'?"}},
       {"joint/hinge/damping:", "hinge damping:", {"experiment.yaml:9:3:", "not a field"}},

@@ -104,6 +104,54 @@ TEST_F(SimulatorTest, HoldsCommandsByStampOnAnIrregularLog) {
   for (std::size_t k = 0; k < exact.size(); ++k) ASSERT_NEAR(predicted[1][k], exact[k].w, 1e-9) << k;
 }
 
+// An IMU and a marker at radius r on the disc under gravity g along the axis: the accelerometer reads -r w^2, r w' and
+// g in the disc's frame.
+TEST(SensorsTest, MujocosSensorsReadTheExactMotion) {
+  constexpr double kRadius = 0.3;
+  std::string mjcf = Mjcf();
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    mjcf.replace(mjcf.find(from), from.size(), to);
+  };
+  replace("gravity=\"0 0 0\"", "gravity=\"0 0 -9.81\"");
+  replace("</body></worldbody>", "<site name=\"imu\" pos=\"0.3 0 0.02\"/></body></worldbody>");
+  replace("</mujoco>", R"(<sensor><gyro name="gyro" site="imu"/><accelerometer name="imu" site="imu"/>
+    <framepos name="marker" objtype="site" objname="imu"/><jointpos name="angle" joint="hinge"/></sensor></mujoco>)");
+  Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, mjcf, R"(commands:
+  - {actuator: motor, column: u, unit: N m}
+measured:
+  - {signal: gyro, sensor: gyro, columns_of_elements: [gx, gy, gz], unit: deg/s}
+  - {signal: acc, sensor: imu, columns_of_elements: [ax, ay, az], unit: gn}
+  - {signal: y, sensor: marker, element: 1, column: y, unit: mm}
+  - {signal: angle, sensor: angle, column: angle, unit: rad}
+  - {signal: q, column: q, joint: hinge, unit: rad}
+)");
+  ASSERT_EQ(experiment.measured.size(), 9u);
+  EXPECT_EQ(experiment.measured[2].signal, "gyro[2]");
+  EXPECT_EQ(experiment.measured[2].columns, std::vector<std::string>{"gz"});
+  EXPECT_DOUBLE_EQ(experiment.measured[4].factor, 9.80665);
+  const auto model = MakeModel(experiment);
+  ASSERT_NE(model, nullptr);
+  const Recording recording = Irregular(experiment, 200);
+  const auto predicted = Predict(*model, recording);
+  const auto exact = Exact(recording);
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    const double w = exact[k].w, u = recording.commands[0].values[k > 0 ? k - 1 : 0];
+    const double turning = (u - kDamping * w) / kInertia;
+    ASSERT_NEAR(predicted[0][k], 0, 1e-12);
+    ASSERT_NEAR(predicted[2][k], w, 1e-9) << k;
+    ASSERT_NEAR(predicted[3][k], -kRadius * w * w, 1e-8) << k;
+    ASSERT_NEAR(predicted[4][k], kRadius * turning, 1e-7) << k;
+    ASSERT_NEAR(predicted[5][k], 9.81, 1e-9) << k;
+    ASSERT_NEAR(predicted[6][k], kRadius * std::sin(exact[k].q), 1e-9) << k;
+    ASSERT_NEAR(predicted[7][k], exact[k].q, kIntegration) << k;
+  }
+  // Reading sensors changes no motion.
+  Scratch other;
+  const Experiment bare = MakeExperiment(other, mjcf, kYaml);
+  EXPECT_LT(LargestDifference(Predict(*MakeModel(bare), Irregular(bare, 200))[0], predicted[8]), 1e-15);
+}
+
 TEST_F(SimulatorTest, LandsOnEveryStampWithTheFewestSteps) {
   Recording recording = MakeRecording(experiment_, 5, 1, [](int, double) { return 0.0; });
   recording.time_s = {0, 0.0005, 0.0035, 0.0055, 0.0055 + 0.00201};

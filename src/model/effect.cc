@@ -312,6 +312,7 @@ std::vector<EffectUse> AllUses(const Rig& rig) {
     // What weighs on one joint alone is an unbalanced mass there.
     if (effect->place == EffectPlace::kBody && rig.JointsAbove(use.on) < 2) return true;
     if (effect->place == EffectPlace::kModel && rig.Joints().size() < 2) return true;
+    if (effect->of_range && !std::ranges::all_of(places, [&](const auto& on) { return rig.HasRange(on); })) return true;
     return places.size() > 1 && !(several && HasNoScale(*effect));
   });
   return uses;

@@ -106,6 +106,11 @@ bool Rig::HasFriction(const std::string& joint) const {
   return id >= 0 && compiled_->dof_frictionloss[compiled_->jnt_dofadr[id]] > 0;
 }
 
+bool Rig::HasRange(const std::string& joint) const {
+  const int id = mj_name2id(compiled_.get(), mjOBJ_JOINT, joint.c_str());
+  return id >= 0 && compiled_->jnt_range[2 * id] < compiled_->jnt_range[2 * id + 1];
+}
+
 bool Rig::Sets(const std::string& field) const {
   return std::ranges::any_of(experiment_.settings, [&](const FieldSetting& setting) { return setting.field == field; });
 }

@@ -40,9 +40,10 @@ class Rig {
   DriveFacts FactsOf(const std::string& actuator) const;   // of no actuator: nothing
   bool HasSpring(const std::string& joint) const;
   bool HasFriction(const std::string& joint) const;
-  bool Sets(const std::string& field) const;                      // the experiment does, by parameters
-  std::vector<std::string> Bodies() const;                        // named ones with a joint of their own
-  int JointsAbove(const std::string& body) const;                 // hinges and slides between the world and the body
+  bool HasRange(const std::string& joint) const;   // the MJCF says one, whether it holds the joint in it or not
+  bool Sets(const std::string& field) const;       // the experiment does, by parameters
+  std::vector<std::string> Bodies() const;         // named ones with a joint of their own
+  int JointsAbove(const std::string& body) const;  // hinges and slides between the world and the body
   std::array<double, 3> CentreOf(const std::string& body) const;  // of mass, in the body's frame; m
   std::vector<std::string> Signals() const;                       // measured signals of the experiment
   std::string JointOfSignal(const std::string& signal) const;     // empty: no such signal

@@ -62,7 +62,9 @@ class EffectsTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(EffectsTest, EachIsNeutralAtNeutralAndActsElsewhere) {
   const Rig rig(GetParam());
-  const auto uses = AllUses(*rig.model->rig());
+  auto uses = AllUses(*rig.model->rig());
+  for (const auto& joint : rig.model->rig()->Joints())
+    uses.push_back({"end_stop", joint});  // which only --with adds here
   std::set<std::string> names;
   for (const EffectUse& use : uses) {
     SCOPED_TRACE(use.Text());
@@ -189,6 +191,8 @@ TEST(CatalogueTest, EveryEffectFindsAPlaceSomewhere) {
   for (const char* rig : {"joint", "qube", "flexjoint", "flexlink", "xl330"}) {
     for (const auto& use : AllUses(*MakeModel(ShippedExperiment(rig))->rig())) placed.insert(use.effect);
   }
+  EXPECT_FALSE(placed.contains("end_stop"));  // none of these joints has a range (TreeEffectsTest)
+  placed.insert("end_stop");
   for (const Effect& effect : Catalogue()) {
     all.insert(effect.name);
     EXPECT_FALSE(effect.meaning.empty() || effect.signature.empty() || effect.told_apart.empty()) << effect.name;

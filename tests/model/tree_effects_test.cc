@@ -155,6 +155,18 @@ TEST(NamesTest, JointsDrivesAndSignalsMayHaveAnyName) {
     EXPECT_TRUE(places.contains(place)) << place;
 }
 
+TEST(EndStopTest, IsLookedForOnJointsWithARange) {
+  std::string mjcf = Arm();
+  const std::string joint = "<joint name=\"elbow\"";
+  mjcf.replace(mjcf.find(joint), joint.size(), joint + " range=\"-1 2\" limited=\"false\"");
+  Scratch scratch;
+  const auto model = MakeModel(MakeExperiment(scratch, mjcf, kYaml));
+  const std::vector<EffectUse> uses = AllUses(*model->rig());
+  EXPECT_TRUE(Has(uses, {"end_stop", "elbow"}));
+  EXPECT_FALSE(Has(uses, {"end_stop", "shoulder"}));
+  EXPECT_TRUE(ParseEffects({"end_stop@shoulder"}, *model->rig()).ok());
+}
+
 TEST(MountTiltTest, WhereTheExperimentSetsGravityItIsAParameter) {
   Scratch scratch;
   const std::string set = R"yaml(parameters:

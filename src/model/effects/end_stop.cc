@@ -31,6 +31,7 @@ Effect Effect_end_stop() {
       .told_apart = "slow moves up to the end of the range and back",
       .partners = {"spring_hardening", "cable_spring"},
       .of_motion = true,
+      .of_range = true,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddSpringTerm(on, "stop_n_m_per_rad", names[0]));
         return structure.AddSpringTerm(on, "stop_rad", names[1]);

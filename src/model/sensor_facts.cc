@@ -78,8 +78,8 @@ Result<int> AddressOfSensor(const mjModel& m, const MeasuredSpec& measured) {
   const int sensor = mj_name2id(&m, mjOBJ_SENSOR, measured.on.c_str());
   const std::string of = "the sensor '" + measured.on + "' of signal '" + measured.signal + "'";
   if (sensor < 0)
-    return NoSuch("a measured signal is of a sensor that the MJCF lacks", measured.on,
-                  ElementNames(m, mjOBJ_SENSOR), measured.where);
+    return NoSuch("a measured signal is of a sensor that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_SENSOR),
+                  measured.where);
   const int type = m.sensor_type[sensor], numbers = m.sensor_dim[sensor];
   if (type == mjSENS_USER || type == mjSENS_FRAMEQUAT || type == mjSENS_BALLQUAT) {
     return Error{.what = of + (type == mjSENS_USER ? " has no model: a program's own callback gives its numbers"

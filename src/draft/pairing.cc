@@ -1,0 +1,387 @@
+#include "src/draft/pairing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "src/draft/match.h"
+#include "src/model/drive_facts.h"
+#include "src/model/element_names.h"
+
+namespace gapscope {
+namespace {
+
+constexpr double kFollows = 0.5;           // a correlation that pairs what no name pairs
+constexpr double kContradicts = 0.3;       // and one that speaks against a name
+constexpr double kIsDerivative = 0.9;      // what no name says is a speed
+constexpr std::size_t kMostNameless = 60;  // columns whose data are compared with all others'
+
+bool MayBe(const Guess& guess, Quantity quantity) {
+  return !guess.is_time && (guess.said.quantity == quantity || guess.said.quantity == Quantity::kUnknown);
+}
+
+template <class Accept>
+std::vector<int> Select(const std::vector<Guess>& guesses, const Accept& accept) {
+  std::vector<int> chosen;
+  for (int i = 0; i < static_cast<int>(guesses.size()); ++i) {
+    if (!guesses[i].is_time && !guesses[i].used && accept(guesses[i])) chosen.push_back(i);
+  }
+  return chosen;
+}
+
+std::optional<int> OwnNumber(const std::string& name) {
+  std::optional<int> number;
+  for (const std::string& word : WordsOf(name)) {
+    if (word[0] >= '0' && word[0] <= '9' && word.size() < 5) number = std::stoi(word);
+  }
+  return number;
+}
+
+// Columns of a joint alike in name, one of which may be the other's command.
+bool SameJoint(const Guess& a, const Guess& b) { return a.said.number == b.said.number; }
+
+// A nameless column that is the derivative of another is a speed; of two nameless ones that move alike the one that
+// leads is the command.
+void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
+  const std::vector<int> nameless = Select(*guesses, [&](const Guess& g) {
+    return g.said.side == Side::kUnknown && MayBe(g, Quantity::kAngle) && samples.spread(g.column) > 0;
+  });
+  if (nameless.size() > kMostNameless) return;
+  for (const int b : nameless) {
+    for (const int a : nameless) {
+      Guess &angle = (*guesses)[a], &speed = (*guesses)[b];
+      if (a == b || speed.said.quantity != Quantity::kUnknown || angle.said.quantity == Quantity::kSpeed) continue;
+      if (std::abs(LineThrough(samples.slopes(angle.column), samples.values(speed.column)).correlation) < kIsDerivative)
+        continue;
+      speed.said.quantity = Quantity::kSpeed;
+      angle.said.quantity = Quantity::kAngle;
+    }
+  }
+  for (const int a : nameless) {
+    for (const int b : nameless) {
+      Guess &leader = (*guesses)[a], &follower = (*guesses)[b];
+      if (a == b || !SameJoint(leader, follower) || leader.said.side != Side::kUnknown) continue;
+      if (!MayBe(leader, Quantity::kAngle) || !MayBe(follower, Quantity::kAngle)) continue;
+      if (follower.said.side == Side::kCommand || leader.name == follower.name) continue;
+      const Following f = samples.Follow(leader.column, follower.column);
+      if (std::abs(f.correlation) < kIsDerivative || !(f.lag_s > 0)) continue;
+      leader.said.side = Side::kCommand;
+      follower.said.side = Side::kMeasured;
+    }
+  }
+}
+
+// What an actuator of the MJCF is told.
+Quantity WantsOf(const mjModel& m, int actuator) {
+  if (FactsOf(m, actuator).feeds_back_position) return Quantity::kAngle;
+  if (m.actuator_plugin[actuator] >= 0) return Quantity::kUnknown;
+  const double gain = m.actuator_gainprm[actuator * mjNGAIN], speed = m.actuator_biasprm[actuator * mjNBIAS + 2];
+  const bool affine = m.actuator_biastype[actuator] == mjBIAS_AFFINE;
+  return affine && speed != 0 && speed == -gain ? Quantity::kSpeed : Quantity::kTorque;
+}
+
+class Pairer {
+ public:
+  Pairer(const mjModel& model, const Samples& samples, std::vector<Guess>* guesses)
+      : m_(model), samples_(samples), guesses_(*guesses) {}
+
+  Pairing Run() {
+    FindJoints();
+    FindActuators();
+    PairPositions();
+    PairVelocities();
+    if (p_.actuators.empty()) {
+      ProposeActuators();
+    } else {
+      PairCommands();
+    }
+    PairTorques();
+    return std::move(p_);
+  }
+
+ private:
+  void FindJoints() {
+    for (int j = 0; j < m_.njnt; ++j) {
+      const std::string name = NameOf(m_, mjOBJ_JOINT, j);
+      const bool slide = m_.jnt_type[j] == mjJNT_SLIDE;
+      if (name.empty() || (!slide && m_.jnt_type[j] != mjJNT_HINGE)) continue;
+      p_.joints.push_back({.joint = j, .name = name, .slide = slide, .actuators = {}});
+    }
+  }
+
+  void FindActuators() {
+    for (int a = 0; a < m_.nactuator; ++a) {
+      const std::string name = NameOf(m_, mjOBJ_ACTUATOR, a);
+      if (name.empty()) continue;
+      ActuatorSlot slot{.actuator = a, .name = name, .joint = -1, .wants = WantsOf(m_, a)};
+      if (m_.actuator_trntype[a] == mjTRN_JOINT) {
+        const auto found = std::ranges::find(p_.joints, m_.actuator_trnid[2 * a], &JointSlot::joint);
+        if (found != p_.joints.end()) {
+          slot.joint = static_cast<int>(found - p_.joints.begin());
+          found->actuators.push_back(a);
+        }
+      }
+      p_.actuators.push_back(slot);
+    }
+  }
+
+  // Ways in which numbers may count the joints.
+  std::vector<std::vector<int>> JointOrders() const {
+    std::vector<int> all, numbered, actuated, free_to_move;
+    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) {
+      all.push_back(j);
+      if (OwnNumber(p_.joints[j].name)) numbered.push_back(j);
+      if (!IsCoupled(p_.joints[j].joint)) free_to_move.push_back(j);
+    }
+    std::ranges::stable_sort(numbered, {}, [&](int j) { return *OwnNumber(p_.joints[j].name); });
+    for (const ActuatorSlot& a : p_.actuators) {
+      if (a.joint >= 0 && std::ranges::find(actuated, a.joint) == actuated.end()) actuated.push_back(a.joint);
+    }
+    return {numbered.size() == all.size() ? numbered : all, actuated, numbered, free_to_move};
+  }
+
+  // Its motion follows another joint's that comes before it.
+  bool IsCoupled(int joint) const {
+    for (int e = 0; e < m_.neq; ++e) {
+      if (m_.eq_type[e] == mjEQ_JOINT && std::max(m_.eq_obj1id[e], m_.eq_obj2id[e]) == joint) return true;
+    }
+    return false;
+  }
+
+  const Guess* PositionGuess(int joint) const {
+    return joint >= 0 && p_.positions[joint].column >= 0 ? &guesses_[p_.positions[joint].column] : nullptr;
+  }
+
+  std::vector<Slot> JointSlots(bool like_positions) const {
+    std::vector<Slot> slots;
+    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j)
+      slots.push_back({.names = {p_.joints[j].name}, .like = like_positions ? PositionGuess(j) : nullptr});
+    return slots;
+  }
+
+  void PairPositions() {
+    const std::vector<int> candidates =
+        Select(guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && MayBe(g, Quantity::kAngle); });
+    const Numbers numbers(guesses_, candidates, JointOrders());
+    p_.positions = Match(
+        JointSlots(false), candidates, numbers,
+        [&](int, int c) {
+          const ColumnName& said = guesses_[c].said;
+          return (said.side == Side::kMeasured ? 0.02 : 0) - (said.quantity == Quantity::kAngle ? 0 : 0.1);
+        },
+        &guesses_);
+    for (Pick& pick : p_.positions) {
+      const auto left = std::ranges::find_if(candidates, [&](int c) {
+        return !guesses_[c].used && samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.filtered &&
+               !IsCopy(guesses_[c].column);
+      });
+      if (pick.column >= 0 || left == candidates.end()) continue;
+      guesses_[*left].used = true;
+      pick = {.column = *left, .runner_up = -1, .certain = false, .why = "no name fits; it is the next in the file"};
+    }
+  }
+
+  // The same numbers as a column that is used already.
+  bool IsCopy(int column) const {
+    return std::ranges::any_of(guesses_, [&](const Guess& g) {
+      return g.used && g.column != column && samples_.values(g.column) == samples_.values(column);
+    });
+  }
+
+  double FollowsSpeed(int joint, int candidate) const {
+    const Guess* angle = PositionGuess(joint);
+    if (!angle) return 0;
+    return std::abs(
+        LineThrough(samples_.slopes(angle->column), samples_.values(guesses_[candidate].column)).correlation);
+  }
+
+  void PairVelocities() {
+    const std::vector<int> candidates = Select(
+        guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && g.said.quantity == Quantity::kSpeed; });
+    const Numbers numbers(guesses_, candidates, JointOrders());
+    p_.velocities = Match(
+        JointSlots(true), candidates, numbers,
+        [&](int s, int c) { return FollowsSpeed(s, c) > kContradicts ? 0.05 : -0.3; }, &guesses_);
+    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) {
+      Pick& pick = p_.velocities[j];
+      if (pick.column >= 0 && PositionGuess(j) && FollowsSpeed(j, pick.column) <= kContradicts) {
+        pick.certain = false;
+        pick.why = "it does not follow the derivative of the angle";
+      }
+    }
+    PairByData(candidates, [&](int j, int c) { return FollowsSpeed(j, c); }, &p_.velocities);
+  }
+
+  // What no name pairs: the best follower first.
+  template <class Likeness>
+  void PairByData(const std::vector<int>& candidates, const Likeness& likeness, std::vector<Pick>* picks) {
+    while (true) {
+      int slot = -1, best = -1;
+      double score = kFollows;
+      for (int s = 0; s < static_cast<int>(picks->size()); ++s) {
+        for (const int c : candidates) {
+          if ((*picks)[s].column >= 0 || guesses_[c].used) continue;
+          if (const double like = likeness(s, c); like > score) score = like, slot = s, best = c;
+        }
+      }
+      if (slot < 0) return;
+      guesses_[best].used = true;
+      (*picks)[slot] = {.column = best, .runner_up = -1, .certain = true, .why = ""};
+    }
+  }
+
+  std::vector<Slot> ActuatorSlots() const {
+    std::vector<Slot> slots;
+    for (const ActuatorSlot& a : p_.actuators) {
+      Slot slot{.names = {a.name}, .like = PositionGuess(a.joint)};
+      if (a.joint >= 0) slot.names.push_back(p_.joints[a.joint].name);
+      slots.push_back(std::move(slot));
+    }
+    return slots;
+  }
+
+  std::vector<std::vector<int>> ActuatorOrders() const {
+    std::vector<int> all, by_joint;
+    for (int a = 0; a < static_cast<int>(p_.actuators.size()); ++a) {
+      all.push_back(a);
+      if (p_.actuators[a].joint >= 0) by_joint.push_back(a);
+    }
+    std::ranges::stable_sort(by_joint, {}, [&](int a) { return p_.actuators[a].joint; });
+    return {all, by_joint};
+  }
+
+  // Columns that may be commands: those that say so, else torques and voltages of which nobody says that they are
+  // measured.
+  std::vector<int> CommandCandidates() const {
+    std::vector<int> said = Select(
+        guesses_, [](const Guess& g) { return g.said.side == Side::kCommand && g.said.quantity != Quantity::kOther; });
+    if (!said.empty()) return said;
+    return Select(guesses_, [](const Guess& g) {
+      const Quantity q = g.said.quantity;
+      return g.said.side == Side::kUnknown && (q == Quantity::kTorque || q == Quantity::kElectric);
+    });
+  }
+
+  double Likeness(int joint, int candidate) const {
+    const Guess* angle = PositionGuess(joint);
+    if (!angle) return 0;
+    return std::abs(
+        LineThrough(samples_.values(guesses_[candidate].column), samples_.values(angle->column)).correlation);
+  }
+
+  static double Fit(Quantity wants, Quantity said) {
+    if (wants == Quantity::kUnknown || said == Quantity::kUnknown) return 0;
+    return wants == said || (wants == Quantity::kTorque && said == Quantity::kElectric) ? 0.05 : -0.3;
+  }
+
+  void PairCommands() {
+    const std::vector<int> candidates = CommandCandidates();
+    const Numbers numbers(guesses_, candidates, ActuatorOrders());
+    p_.commands = Match(
+        ActuatorSlots(), candidates, numbers,
+        [&](int s, int c) { return Fit(p_.actuators[s].wants, guesses_[c].said.quantity); }, &guesses_);
+    const auto servo_follows = [&](int s, int c) {
+      const bool servo = p_.actuators[s].wants == Quantity::kAngle;
+      return servo && MayBe(guesses_[c], Quantity::kAngle) ? Likeness(p_.actuators[s].joint, c) : 0;
+    };
+    DropContradicted(candidates, servo_follows);
+    PairByData(candidates, servo_follows, &p_.commands);
+    PairByOrder(candidates);
+  }
+
+  // A servo's command that a part of a name suggests, where another column leads the joint clearly better.
+  template <class Likeness>
+  void DropContradicted(const std::vector<int>& candidates, const Likeness& likeness) {
+    for (int s = 0; s < static_cast<int>(p_.commands.size()); ++s) {
+      Pick& pick = p_.commands[s];
+      if (pick.column < 0 || pick.certain) continue;
+      const double own = likeness(s, pick.column);
+      const bool better = std::ranges::any_of(
+          candidates, [&](int c) { return !guesses_[c].used && likeness(s, c) > std::max(kFollows, own + 0.1); });
+      if (!better) continue;
+      guesses_[pick.column].used = false;
+      pick = {};
+    }
+  }
+
+  void PairByOrder(const std::vector<int>& candidates) {
+    for (std::size_t s = 0; s < p_.commands.size(); ++s) {
+      const auto left = std::ranges::find_if(candidates, [&](int c) {
+        return !guesses_[c].used && Fit(p_.actuators[s].wants, guesses_[c].said.quantity) >= 0 &&
+               samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.number;
+      });
+      if (p_.commands[s].column >= 0 || left == candidates.end()) continue;
+      guesses_[*left].used = true;
+      p_.commands[s] = {.column = *left, .runner_up = -1, .certain = false, .why = "no name fits"};
+    }
+  }
+
+  // For each joint with a command column: of angles where there are some, else torques, else speeds.
+  void ProposeActuators() {
+    const std::vector<int> all = CommandCandidates();
+    std::vector<Pick> picks(p_.joints.size());
+    std::vector<Quantity> wants(p_.joints.size(), Quantity::kUnknown);
+    for (const Quantity quantity : {Quantity::kAngle, Quantity::kTorque, Quantity::kSpeed}) {
+      std::vector<int> candidates;
+      std::ranges::copy_if(all, std::back_inserter(candidates), [&](int c) {
+        return guesses_[c].said.quantity == quantity ||
+               (quantity == Quantity::kAngle && guesses_[c].said.quantity == Quantity::kUnknown);
+      });
+      const Numbers numbers(guesses_, candidates, JointOrders());
+      std::vector<Pick> found = Match(JointSlots(true), candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
+      if (quantity == Quantity::kAngle) PairByData(candidates, [&](int j, int c) { return Likeness(j, c); }, &found);
+      for (std::size_t j = 0; j < picks.size(); ++j) {
+        if (picks[j].column >= 0 || found[j].column < 0) continue;
+        picks[j] = found[j];
+        wants[j] = quantity;
+      }
+    }
+    for (int j = 0; j < static_cast<int>(picks.size()); ++j) {
+      if (picks[j].column < 0) continue;
+      p_.actuators.push_back(
+          {.actuator = -1, .name = p_.joints[j].name, .joint = j, .wants = KindOf(j, picks[j], wants[j])});
+      p_.commands.push_back(picks[j]);
+    }
+  }
+
+  // A command that does not say what it asks for: an angle if the joint follows it.
+  Quantity KindOf(int joint, const Pick& pick, Quantity wants) const {
+    if (guesses_[pick.column].said.quantity != Quantity::kUnknown) return wants;
+    return Likeness(joint, pick.column) > kFollows ? Quantity::kAngle : Quantity::kTorque;
+  }
+
+  void PairTorques() {
+    const std::vector<int> candidates = Select(
+        guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && g.said.quantity == Quantity::kTorque; });
+    const Numbers numbers(guesses_, candidates, ActuatorOrders());
+    std::vector<Slot> slots = ActuatorSlots();
+    p_.torques = Match(slots, candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
+  }
+
+  const mjModel& m_;
+  const Samples& samples_;
+  std::vector<Guess>& guesses_;
+  Pairing p_;
+};
+
+}  // namespace
+
+std::vector<Guess> GuessColumns(const Log& log, const Timeline& timeline, const Samples& samples) {
+  const std::vector<ColumnName> said = ReadNames(log.ColumnNames());
+  std::vector<Guess> guesses;
+  for (std::size_t c = 0; c < log.columns.size(); ++c) {
+    guesses.push_back({.column = static_cast<int>(c),
+                       .name = log.columns[c].name,
+                       .said = said[c],
+                       .file_unit = log.columns[c].unit,
+                       .is_time = log.columns[c].name == timeline.time_column});
+  }
+  ClassifyByData(samples, &guesses);
+  return guesses;
+}
+
+Pairing PairColumns(const mjModel& model, const Samples& samples, std::vector<Guess>* guesses) {
+  return Pairer(model, samples, guesses).Run();
+}
+
+}  // namespace gapscope

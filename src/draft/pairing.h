@@ -1,0 +1,62 @@
+// Which column is of which joint and which actuator: by name, by number, by what the data say, by order, in this order.
+#ifndef GAPSCOPE_DRAFT_PAIRING_H_
+#define GAPSCOPE_DRAFT_PAIRING_H_
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <vector>
+
+#include "src/draft/column_name.h"
+#include "src/draft/samples.h"
+
+namespace gapscope {
+
+// A column with what its name and its data say.
+struct Guess {
+  int column = 0;  // of the log
+  std::string name;
+  ColumnName said;
+  std::string file_unit;  // as the file states it
+  bool is_time = false, used = false;
+};
+
+// A hinge or slide joint of the model that has a name.
+struct JointSlot {
+  int joint = 0;  // of the model
+  std::string name;
+  bool slide = false;
+  std::vector<int> actuators;  // of the model, on this joint
+};
+
+struct ActuatorSlot {
+  int actuator = -1;  // of the model; -1: one that the draft proposes
+  std::string name;
+  int joint = -1;  // of the slots; -1: on none of them
+  Quantity wants = Quantity::kUnknown;
+};
+
+// The column that a slot gets, and why one may doubt it.
+struct Pick {
+  int column = -1;     // of the guesses; -1: none
+  int runner_up = -1;  // the next best; -1: none came near
+  bool certain = false;
+  std::string why;  // it is not certain: "by order", "by part of its name"
+};
+
+struct Pairing {
+  std::vector<JointSlot> joints;
+  std::vector<Pick> positions, velocities;  // per joint
+  std::vector<ActuatorSlot> actuators;
+  std::vector<Pick> commands, torques;  // per actuator
+};
+
+// What each column is. Columns that never move say nothing of an angle.
+std::vector<Guess> GuessColumns(const Log& log, const Timeline& timeline, const Samples& samples);
+
+// Without actuators in the model one is proposed for each joint that a command column pairs with.
+Pairing PairColumns(const mjModel& model, const Samples& samples, std::vector<Guess>* guesses);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DRAFT_PAIRING_H_

@@ -19,12 +19,14 @@ struct InitFlags {
   bool quiet = false;
 };
 
-// "kp=K,kd=D" or "kp=K,kd=D,limit=T".
+// "kp=K,kd=D[,limit=T][,armature=A]".
 Result<ServoSaid> ParseServo(const std::string& text) {
   const Error wrong{.what = "not gains of a servo",
                     .where = "--servo",
                     .actual = "'" + text + "'",
-                    .allowed = "kp=K,kd=D[,limit=T] in N m/rad, N m s/rad, N m; kp and T above zero, kd not below"};
+                    .allowed =
+                        "kp=K,kd=D[,limit=T][,armature=A] in N m/rad, N m s/rad, N m, kg m2, above zero; kd may "
+                        "be zero"};
   ServoSaid said;
   bool has_kd = false;
   for (std::size_t at = 0; at <= text.size();) {
@@ -39,6 +41,8 @@ Result<ServoSaid> ParseServo(const std::string& text) {
       has_kd = true;
     } else if (key == "limit" && value > 0) {
       said.limit = value;
+    } else if (key == "armature" && value > 0) {
+      said.armature = value;
     } else {
       return wrong;
     }
@@ -69,29 +73,32 @@ class TemporaryFile {
 
 constexpr double kTried_s = 1;  // of the first log is replayed
 
+// The first second of a recording.
+Recording Beginning(Recording recording) {
+  std::size_t rows = 2;
+  while (rows < recording.rows() && recording.time_s[rows] < kTried_s) ++rows;
+  recording.time_s.resize(rows);
+  for (auto& command : recording.commands) command.values.resize(rows);
+  for (auto& measured : recording.measured) measured.values.resize(rows);
+  return recording;
+}
+
 // The draft must hold for every log that was given, and move.
 Status Try(const std::string& experiment_path, const std::vector<std::string>& logs) {
   GS_ASSIGN(const Experiment experiment, LoadExperiment(experiment_path));
   GS_ASSIGN(const std::shared_ptr<const Model> model, Model::Load(experiment));
-  std::size_t number = 0;
+  std::vector<Recording> first;
   for (const std::string& path : logs) {
-    GS_ASSIGN(const Recording recording, LoadRecording(experiment, path));
-    if (number++ > 0) continue;
-    Window window{.begin = 0, .end = 2};
-    while (window.end < recording.rows() && recording.time_s[window.end] < kTried_s) ++window.end;
-    Simulator simulator(*model, 0);
-    const std::vector<double> values = model->Nominal();
-    std::vector<double> predicted(window.rows() * recording.measured.size());
-    const bool is_model = simulator.SetParameters(values, recording);
-    const RunResult run = simulator.Run(recording, window, InitialStateAt(*model, recording, 0, values), predicted);
-    if (!is_model || run.outcome == Outcome::kDiverged) {
-      return Error{.what = "the drafted model diverges",
-                   .where = path,
-                   .actual = fmt::format("after {:.3g} s", run.diverged_at_s),
-                   .cure = "are units and signs right? With gains that are made up: say them by --servo kp=K,kd=D"};
-    }
+    GS_ASSIGN(Recording recording, LoadRecording(experiment, path));
+    if (first.empty()) first.push_back(Beginning(std::move(recording)));
   }
-  return Ok();
+  ThreadPool pool(1);
+  const ReplayResult replay = Replay(*model, first, {.values = model->Nominal()}, pool);
+  if (replay.logs.front().outcome != Outcome::kDiverged) return Ok();
+  return Error{.what = "the drafted model diverges",
+               .where = logs.front(),
+               .actual = fmt::format("after {:.3g} s", replay.logs.front().diverged_at_s),
+               .cure = "are units and signs right? Where gains are made up: say them by --servo kp=K,kd=D"};
 }
 
 Status TryDraft(const Draft& draft, const InitFlags& flags) {
@@ -155,8 +162,8 @@ Command InitCommand() {
                        .value = &flags->servo,
                        .unset = "by regression where the log allows it, else made up and marked",
                        .help = "Gains of the servos that are added to an MJCF without actuators: "
-                               "kp=K,kd=D[,limit=T]",
-                       .more = "N m/rad, N m s/rad, N m; of all of them alike"},
+                               "kp=K,kd=D[,limit=T][,armature=A]",
+                       .more = "N m/rad, N m s/rad, N m, kg m2; of all of them alike"},
                       {.flag = "--out",
                        .value = &flags->out,
                        .unset = "stdout",

@@ -7,6 +7,8 @@
 #include <span>
 #include <string_view>
 
+#include "src/log/text.h"
+
 namespace gapscope {
 namespace {
 
@@ -147,24 +149,51 @@ std::vector<ColumnName> ReadNames(const std::vector<std::string>& names) {
   return read;
 }
 
+std::string FamilyOf(const ColumnName& name) {
+  std::string family;
+  for (const std::string& word : name.words) {
+    const bool own = std::ranges::find(name.own, word) != name.own.end();
+    if (!own && !IsNumber(word)) family += word + " ";
+  }
+  return family;
+}
+
+std::string LabelOf(const std::string& name, const ColumnName& said) {
+  std::string label = said.number ? said.stem : name;
+  if (const std::size_t at = label.find('#'); at != std::string::npos) {
+    label[at] = '*';
+  } else if (!said.own.empty()) {
+    const std::string lower = ToLower(label);
+    const std::size_t first = lower.find(said.own.front()), last = lower.rfind(said.own.back());
+    const std::size_t end = last == std::string::npos ? last : last + said.own.back().size();
+    if (first != std::string::npos && end != std::string::npos && first < end && end - first < label.size())
+      label.replace(first, end - first, "*");
+  }
+  return "'" + label + "'";
+}
+
 double NameMatch(const std::string& name, const std::string& element) {
-  const std::vector<std::string> words = WordsOf(name), all = WordsOf(element);
-  std::vector<std::string> wanted;
-  std::ranges::copy_if(all, std::back_inserter(wanted),
-                       [](const std::string& word) { return !Holds(kSharedWords, word) && !IsNumber(word); });
-  const bool only_shared = wanted.empty();
-  // A number is part of the element's name: "joint1", "finger2".
-  std::ranges::copy_if(all, std::back_inserter(wanted),
-                       [&](const std::string& word) { return IsNumber(word) || only_shared; });
-  std::ranges::sort(wanted);
-  wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-  if (wanted.empty()) return 0;
-  double hits = 0;
-  for (const std::string& word : wanted) hits += std::ranges::find(words, word) != words.end() ? 1 : 0;
-  if (hits == static_cast<double>(wanted.size())) return 1;
-  const std::string squashed = Squashed(all);
-  if (squashed.size() > 3 && Squashed(words).find(squashed) != std::string::npos) return 0.95;
-  return 0.8 * hits / static_cast<double>(wanted.size());
+  const std::vector<std::string> words = WordsOf(name), wanted = WordsOf(element);
+  const bool only_shared =
+      std::ranges::all_of(wanted, [](const std::string& word) { return Holds(kSharedWords, word) || IsNumber(word); });
+  double hits = 0, count = 0;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (!only_shared && Holds(kSharedWords, wanted[i])) continue;
+    count += 1;
+    for (std::size_t k = 0; k < words.size(); ++k) {
+      const bool behind = !IsNumber(wanted[i]) || i == 0 || (k > 0 && words[k - 1] == wanted[i - 1]);
+      if (words[k] != wanted[i] || !behind) continue;
+      hits += 1;
+      break;
+    }
+  }
+  if (count == 0) return 0;
+  if (hits == count) return 1;
+  const std::string squashed = Squashed(wanted);
+  if (squashed.size() > 3 && !IsNumber(squashed.substr(squashed.size() - 1)) &&
+      Squashed(words).find(squashed) != std::string::npos)
+    return 0.95;
+  return 0.8 * hits / count;
 }
 
 }  // namespace gapscope

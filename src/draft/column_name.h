@@ -27,11 +27,18 @@ struct ColumnName {
   bool filtered = false;  // it says that it is a processed copy
 };
 
+// What members of a family share: the words but for the joint's name and number.
+std::string FamilyOf(const ColumnName& name);
+
+// "'q/*'" for a family: what is said of one of its members holds for all.
+std::string LabelOf(const std::string& name, const ColumnName& said);
+
 // All names of a log at once: which number of a name counts joints shows in its family.
 std::vector<ColumnName> ReadNames(const std::vector<std::string>& names);
 
 // How much a name speaks of an element: 1 all words of the element's name, less for some of them, 0 none. Words that
-// many elements share ("joint", "motor") count where the name has no others.
+// many elements share ("joint", "motor") count where the name has no others. A number counts behind its word alone:
+// "joint_pos[1]" is not of "joint1".
 double NameMatch(const std::string& name, const std::string& element);
 
 }  // namespace gapscope

@@ -74,6 +74,7 @@ class Drafter {
       const ServoGains said{.kp = options_.servo->kp,
                             .kd = options_.servo->kd,
                             .limit = options_.servo->limit.value_or(0),
+                            .armature = options_.servo->armature.value_or(0),
                             .from = "as --servo says",
                             .certain = true};
       gains_.assign(p_.actuators.size(), said);
@@ -84,6 +85,7 @@ class Drafter {
       if (p_.actuators[a].wants != Quantity::kAngle) gains_[a].kp = 0;
       if (p_.actuators[a].wants == Quantity::kTorque) gains_[a].kd = 0;
     }
+    AddArmature(m_, p_, &gains_);
   }
 
   // A comment behind a line; the same sentence is told once.
@@ -97,7 +99,12 @@ class Drafter {
   // Of a column: what makes it doubtful that it is `what`, and what its scaling leaves open.
   std::string Doubt(const Pick& pick, const Scaling& scaling, const std::string& what) {
     std::string doubt;
-    if (!pick.certain) doubt = "'" + Name(pick) + "' is taken for " + what + ": " + pick.why;
+    if (pick.by_order) {
+      doubt = "no name fits " + LabelOf(Name(pick), guesses_[pick.column].said) +
+              ": taken in the order of the file and of the model";
+    } else if (!pick.certain) {
+      doubt = "'" + Name(pick) + "' is taken for " + what + ": " + pick.why;
+    }
     if (pick.runner_up >= 0 && !SameNumbers(pick.column, pick.runner_up)) {
       doubt += (doubt.empty() ? "'" + Name(pick) + "' is taken for " + what : std::string()) + ", not '" +
                guesses_[pick.runner_up].name + "'";
@@ -132,17 +139,22 @@ class Drafter {
       if (slot.wants == Quantity::kAngle) text += ", kp: " + Num(g.kp);
       if (slot.wants != Quantity::kTorque) text += ", kd: " + Num(g.kd);
       if (g.limit > 0) text += ", force_limit_n_m: " + Num(g.limit);
-      text += "}";
-      if (slot.wants == Quantity::kTorque) {
-        text += "\n";
-      } else if (g.certain) {
-        text += "  # " + g.from + "\n";
-      } else {
-        text += Unsure("the log does not tell the gains of the servo '" + slot.name +
-                       "': kp and kd are made up; say them by --servo kp=K,kd=D") +
-                "\n";
-      }
+      if (g.armature > 0) text += ", armature_kg_m2: " + Num(g.armature);
+      text += "}" + DoubtOfGains(slot, g) + "\n";
     }
+    return text;
+  }
+
+  std::string DoubtOfGains(const ActuatorSlot& slot, const ServoGains& g) {
+    std::string text;
+    if (slot.wants != Quantity::kTorque) {
+      text = g.certain ? "  # " + g.from
+                       : Unsure(
+                             "the log does not tell the gains of every servo: some are made up; say them by --servo "
+                             "kp=K,kd=D[,limit=T][,armature=A]");
+    }
+    if (g.armature_made_up)
+      text += Unsure("the MJCF has no armature: it is made up where a servo needs it to be stable");
     return text;
   }
 

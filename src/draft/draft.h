@@ -13,8 +13,9 @@ namespace gapscope {
 
 // What the user says of all servos that the draft adds.
 struct ServoSaid {
-  double kp = 0, kd = 0;        // N m/rad, N m s/rad
-  std::optional<double> limit;  // N m
+  double kp = 0, kd = 0;           // N m/rad, N m s/rad
+  std::optional<double> limit;     // N m
+  std::optional<double> armature;  // kg m^2
 };
 
 struct DraftOptions {

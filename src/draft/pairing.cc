@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include "src/draft/match.h"
@@ -11,9 +12,10 @@
 namespace gapscope {
 namespace {
 
-constexpr double kFollows = 0.5;           // a correlation that pairs what no name pairs
-constexpr double kContradicts = 0.3;       // and one that speaks against a name
-constexpr double kIsDerivative = 0.9;      // what no name says is a speed
+constexpr double kFollows = 0.5;       // a correlation that pairs what no name pairs
+constexpr double kContradicts = 0.3;   // and one that speaks against a name
+constexpr double kIsDerivative = 0.9;  // what no name says is a speed
+constexpr std::size_t kFew = 4;
 constexpr std::size_t kMostNameless = 60;  // columns whose data are compared with all others'
 
 bool MayBe(const Guess& guess, Quantity quantity) {
@@ -37,8 +39,26 @@ std::optional<int> OwnNumber(const std::string& name) {
   return number;
 }
 
-// Columns of a joint alike in name, one of which may be the other's command.
-bool SameJoint(const Guess& a, const Guess& b) { return a.said.number == b.said.number; }
+// Two columns that may be of one joint, one of them the other's command. Those of one family are of different joints;
+// where there are few columns, names need not agree.
+bool SameJoint(const Guess& a, const Guess& b, bool few) {
+  const bool kin = FamilyOf(a.said) == FamilyOf(b.said) && !FamilyOf(a.said).empty() && a.said.own != b.said.own;
+  if (a.said.number != b.said.number || kin) return false;
+  return a.said.number ? a.said.stem != b.said.stem : a.said.own == b.said.own || few;
+}
+
+// A family is on one side: that of most of its members of which a side is known.
+void SidesByFamily(std::vector<Guess>* guesses) {
+  std::map<std::string, int> votes;
+  for (const Guess& g : *guesses) {
+    if (g.said.number && g.said.side != Side::kUnknown) votes[g.said.stem] += g.said.side == Side::kCommand ? 1 : -1;
+  }
+  for (Guess& g : *guesses) {
+    const auto vote = votes.find(g.said.stem);
+    if (g.said.number && vote != votes.end() && vote->second != 0)
+      g.said.side = vote->second > 0 ? Side::kCommand : Side::kMeasured;
+  }
+}
 
 // A nameless column that is the derivative of another is a speed; of two nameless ones that move alike the one that
 // leads is the command.
@@ -60,7 +80,8 @@ void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
   for (const int a : nameless) {
     for (const int b : nameless) {
       Guess &leader = (*guesses)[a], &follower = (*guesses)[b];
-      if (a == b || !SameJoint(leader, follower) || leader.said.side != Side::kUnknown) continue;
+      if (a == b || !SameJoint(leader, follower, nameless.size() <= kFew) || leader.said.side != Side::kUnknown)
+        continue;
       if (!MayBe(leader, Quantity::kAngle) || !MayBe(follower, Quantity::kAngle)) continue;
       if (follower.said.side == Side::kCommand || leader.name == follower.name) continue;
       const Following f = samples.Follow(leader.column, follower.column);
@@ -69,6 +90,7 @@ void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
       follower.said.side = Side::kMeasured;
     }
   }
+  SidesByFamily(guesses);
 }
 
 // What an actuator of the MJCF is told.
@@ -177,7 +199,7 @@ class Pairer {
       });
       if (pick.column >= 0 || left == candidates.end()) continue;
       guesses_[*left].used = true;
-      pick = {.column = *left, .runner_up = -1, .certain = false, .why = "no name fits; it is the next in the file"};
+      pick = {.column = *left, .runner_up = -1, .certain = false, .why = "", .by_order = true};
     }
   }
 
@@ -312,7 +334,7 @@ class Pairer {
       });
       if (p_.commands[s].column >= 0 || left == candidates.end()) continue;
       guesses_[*left].used = true;
-      p_.commands[s] = {.column = *left, .runner_up = -1, .certain = false, .why = "no name fits"};
+      p_.commands[s] = {.column = *left, .runner_up = -1, .certain = false, .why = "", .by_order = true};
     }
   }
 
@@ -336,18 +358,30 @@ class Pairer {
         wants[j] = quantity;
       }
     }
+    KindsByFamily(picks, &wants);
     for (int j = 0; j < static_cast<int>(picks.size()); ++j) {
       if (picks[j].column < 0) continue;
-      p_.actuators.push_back(
-          {.actuator = -1, .name = p_.joints[j].name, .joint = j, .wants = KindOf(j, picks[j], wants[j])});
+      p_.actuators.push_back({.actuator = -1, .name = p_.joints[j].name, .joint = j, .wants = wants[j]});
       p_.commands.push_back(picks[j]);
     }
   }
 
-  // A command that does not say what it asks for: an angle if the joint follows it.
-  Quantity KindOf(int joint, const Pick& pick, Quantity wants) const {
-    if (guesses_[pick.column].said.quantity != Quantity::kUnknown) return wants;
-    return Likeness(joint, pick.column) > kFollows ? Quantity::kAngle : Quantity::kTorque;
+  // Commands that do not say what they ask for: angles if most joints of their family follow them, else torques.
+  void KindsByFamily(const std::vector<Pick>& picks, std::vector<Quantity>* wants) const {
+    std::map<std::string, int> votes;
+    const auto family = [&](std::size_t j) { return FamilyOf(guesses_[picks[j].column].said); };
+    const auto is_open = [&](std::size_t j) {
+      return picks[j].column >= 0 && guesses_[picks[j].column].said.quantity == Quantity::kUnknown;
+    };
+    for (std::size_t j = 0; j < picks.size(); ++j) {
+      const Guess* angle = PositionGuess(static_cast<int>(j));
+      if (!is_open(j) || !angle) continue;
+      const Following f = samples_.Follow(guesses_[picks[j].column].column, angle->column);
+      votes[family(j)] += std::abs(f.correlation) > kFollows && f.lag_s >= 0 ? 1 : -1;
+    }
+    for (std::size_t j = 0; j < picks.size(); ++j) {
+      if (is_open(j)) (*wants)[j] = votes[family(j)] > 0 ? Quantity::kAngle : Quantity::kTorque;
+    }
   }
 
   void PairTorques() {

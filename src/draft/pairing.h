@@ -41,7 +41,8 @@ struct Pick {
   int column = -1;     // of the guesses; -1: none
   int runner_up = -1;  // the next best; -1: none came near
   bool certain = false;
-  std::string why;  // it is not certain: "by order", "by part of its name"
+  std::string why;        // it is not certain: "only a part of its name fits"
+  bool by_order = false;  // it is the next in the file
 };
 
 struct Pairing {

@@ -21,7 +21,10 @@ class Writer {
   Writer(const mjModel& model, const Pairing& pairing) : m_(model), p_(pairing) {}
 
   std::string Run(const std::vector<ServoGains>& gains) {
-    for (const JointSlot& joint : p_.joints) OfJoint(joint);
+    for (std::size_t a = 0; a < gains.size(); ++a) {
+      if (gains[a].armature > 0) rotors_.insert(p_.actuators[a].joint);
+    }
+    for (std::size_t j = 0; j < p_.joints.size(); ++j) OfJoint(p_.joints[j], rotors_.contains(static_cast<int>(j)));
     for (int a = 0; a < m_.nactuator; ++a) OfActuator(a);
     for (std::size_t a = 0; a < gains.size(); ++a) OfAdded(p_.actuators[a], gains[a]);
     if (parameters_.empty()) return "";
@@ -44,7 +47,8 @@ class Writer {
     if (!field.empty()) set_ += "  " + Quote(field) + ": " + Quote(name) + "\n";
   }
 
-  void OfJoint(const JointSlot& joint) {
+  // `rotor`: an added actuator makes the armature.
+  void OfJoint(const JointSlot& joint, bool rotor) {
     const int dof = m_.jnt_dofadr[joint.joint];
     const std::string &name = joint.name, field = "joint/" + name + "/";
     const std::string unit = joint.slide ? "N" : "N m", per = joint.slide ? "/m" : "/rad";
@@ -53,8 +57,9 @@ class Writer {
     const double scale = damping > 0 ? damping : 0.1 * inertia;
     Propose({name + ".damping", unit + " s" + per, damping, 0, 20 * scale, field + "damping",
              damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
-    Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, std::max(5 * armature, inertia),
-             field + "armature"});
+    if (!rotor)
+      Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, std::max(5 * armature, inertia),
+               field + "armature"});
     if (const double k = m_.jnt_stiffness[joint.joint]; k > 0)
       Propose({name + ".stiffness", unit + per, k, 0.2 * k, 5 * k, field + "stiffness"});
     if (const double f = m_.dof_frictionloss[dof]; f > 0)
@@ -76,6 +81,8 @@ class Writer {
   void OfAdded(const ActuatorSlot& slot, const ServoGains& gains) {
     const double room = gains.certain ? 2 : 10;
     if (gains.kp > 0) Propose({slot.name + ".kp", "N m/rad", gains.kp, gains.kp / room, gains.kp * room});
+    if (gains.armature > 0)
+      Propose({slot.name + ".armature_kg_m2", "kg m^2", gains.armature, 0, gains.armature * room});
     if (gains.kd > 0 || gains.kp > 0)
       Propose({slot.name + ".kd", "N m s/rad", gains.kd, 0, std::max(gains.kd * room, 0.1 * gains.kp)});
   }
@@ -84,6 +91,7 @@ class Writer {
   const Pairing& p_;
   std::string parameters_, set_;
   std::set<std::string> names_;
+  std::set<int> rotors_;  // joints
 };
 
 }  // namespace

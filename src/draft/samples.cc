@@ -23,7 +23,7 @@ struct Sums {
 
 }  // namespace
 
-Line LineThrough(const std::vector<double>& x, const std::vector<double>& y) {
+FittedLine LineThrough(const std::vector<double>& x, const std::vector<double>& y) {
   double mx = 0, my = 0, n = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (std::isfinite(x[i]) && std::isfinite(y[i])) mx += x[i], my += y[i], n += 1;
@@ -88,7 +88,7 @@ Following Samples::Follow(std::size_t leader, std::size_t follower) const {
     const long rows = std::lround(static_cast<double>(most) * i / kLags);
     if (rows == before) continue;
     before = rows;
-    const Line line = LineThrough(Shifted(leader, -rows), values_[follower]);
+    const FittedLine line = LineThrough(Shifted(leader, -rows), values_[follower]);
     if (std::abs(line.correlation) <= std::abs(best.correlation)) continue;
     best = {.correlation = line.correlation,
             .slope = line.slope,

@@ -10,11 +10,11 @@
 namespace gapscope {
 
 // y = slope x + c by least squares over the rows where both are there.
-struct Line {
+struct FittedLine {
   double slope = 0, intercept = 0;
   double correlation = 0;  // 0 where one of them does not move
 };
-Line LineThrough(const std::vector<double>& x, const std::vector<double>& y);
+FittedLine LineThrough(const std::vector<double>& x, const std::vector<double>& y);
 
 // How a column follows another.
 struct Following {

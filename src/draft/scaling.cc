@@ -6,7 +6,9 @@
 #include <numbers>
 #include <optional>
 
+#include "src/core/statistics.h"
 #include "src/core/units.h"
+#include "src/log/text.h"
 
 namespace gapscope {
 namespace {
@@ -39,21 +41,7 @@ std::optional<std::string> Snap(double factor, const std::vector<std::string>& u
   return std::nullopt;
 }
 
-// The words that a family shares: "pos meas" of pos_meas1 and pos_meas2.
-std::string FamilyOf(const Guess& guess) {
-  std::string family;
-  for (const std::string& word : guess.said.words) {
-    const bool own = std::ranges::find(guess.said.own, word) != guess.said.own.end();
-    if (!own && !(word[0] >= '0' && word[0] <= '9')) family += word + " ";
-  }
-  return family;
-}
-
-std::string LabelOf(const Guess& guess) {
-  std::string label = guess.said.number ? guess.said.stem : guess.name;
-  if (const std::size_t at = label.find('#'); at != std::string::npos) label[at] = '*';
-  return "'" + label + "'";
-}
+std::string LabelOf(const Guess& guess) { return LabelOf(guess.name, guess.said); }
 
 Scaling Of(const std::string& unit, bool certain, const std::string& doubt) {
   return {.unit = unit, .scale = 1, .add = 0, .factor = FactorOf(unit), .certain = certain, .doubt = doubt};
@@ -69,10 +57,16 @@ class Scaler {
     AnglesByTheirNeighbours();
     AnglesByFamily();
     for (std::size_t j = 0; j < p_.joints.size(); ++j) scalings_.velocities.push_back(Velocity(j));
+    ScalesOfFamily(Families(p_.velocities, [](std::size_t) { return true; }), p_.velocities, &scalings_.velocities);
     for (std::size_t a = 0; a < p_.actuators.size(); ++a) {
       scalings_.commands.push_back(Command(a));
       scalings_.torques.push_back(Torque(p_.torques[a]));
     }
+    const auto has_target = [&](std::size_t a) {
+      const int joint = p_.actuators[a].joint;
+      return p_.actuators[a].wants == Quantity::kAngle && joint >= 0 && !p_.joints[joint].slide;
+    };
+    ScalesOfFamily(Families(p_.commands, has_target), p_.commands, &scalings_.commands);
     return std::move(scalings_);
   }
 
@@ -108,7 +102,7 @@ class Scaler {
     const Guess* speed = GuessOf(p_.velocities[joint]);
     const Scaling stated = Stated(p_.velocities[joint], "rad/s");
     if (!speed || !stated.certain) return std::nullopt;
-    const Line line = LineThrough(samples_.slopes(angle.column), samples_.values(speed->column));
+    const FittedLine line = LineThrough(samples_.slopes(angle.column), samples_.values(speed->column));
     if (std::abs(line.correlation) < kClear) return std::nullopt;
     return Snap(line.slope * stated.factor, AngleUnits(), kAgree);
   }
@@ -119,7 +113,7 @@ class Scaler {
       const bool servo = p_.actuators[a].joint == static_cast<int>(joint) && p_.actuators[a].wants == Quantity::kAngle;
       const Scaling stated = Stated(p_.commands[a], "rad");
       if (!target || !servo || !stated.certain) continue;
-      const Line line = LineThrough(samples_.values(target->column), samples_.values(angle.column));
+      const FittedLine line = LineThrough(samples_.values(target->column), samples_.values(angle.column));
       if (std::abs(line.correlation) < kClear) continue;
       return Snap(stated.factor / line.slope, AngleUnits(), kServoAgrees);
     }
@@ -131,7 +125,7 @@ class Scaler {
     std::map<std::string, std::vector<std::size_t>> families;
     for (std::size_t j = 0; j < p_.joints.size(); ++j) {
       if (const Guess* guess = GuessOf(p_.positions[j]); guess && !p_.joints[j].slide)
-        families[FamilyOf(*guess)].push_back(j);
+        families[FamilyOf(guess->said)].push_back(j);
     }
     for (const auto& [family, joints] : families) {
       const auto sure = std::ranges::find_if(joints, [&](std::size_t j) { return scalings_.positions[j].certain; });
@@ -177,7 +171,7 @@ class Scaler {
     const std::string usual = p_.joints[j].slide ? "m/s" : "rad/s";
     Scaling scaling = Stated(p_.velocities[j], usual);
     if (!speed || !angle) return scaling;
-    const Line line = LineThrough(samples_.slopes(angle->column), samples_.values(speed->column));
+    const FittedLine line = LineThrough(samples_.slopes(angle->column), samples_.values(speed->column));
     if (std::abs(line.correlation) < kClear) {
       if (!scaling.certain && scaling.doubt.empty())
         scaling.doubt = "the unit of " + LabelOf(*speed) + " is not stated: " + usual + " is taken";
@@ -196,10 +190,13 @@ class Scaler {
 
   Scaling SpeedByAngle(const Guess& speed, std::size_t j, double factor, const std::string& usual) const {
     if (const auto unit = p_.joints[j].slide ? std::nullopt : Snap(factor, kSpeedUnits, 2 * kAgree)) {
-      return Of(*unit, scalings_.positions[j].certain, "");  // a doubt of the angle's is told there
+      Scaling scaling = Of(*unit, scalings_.positions[j].certain, "");  // a doubt of the angle's is told there
+      scaling.by_data = scaling.is_unit = true;
+      return scaling;
     }
-    Scaling scaling = Of(usual, false, "the scale of '" + speed.name + "' is that of the angle's derivative");
+    Scaling scaling = Of(usual, false, "the scale of " + LabelOf(speed) + " is that of the angle's derivative");
     scaling.scale = scaling.factor = std::abs(factor);
+    scaling.by_data = true;
     return scaling;
   }
 
@@ -236,26 +233,21 @@ class Scaler {
   // A servo's command against the angle that follows it.
   Scaling Target(const Guess& command, int joint, Scaling scaling) const {
     const Guess* angle = GuessOf(p_.positions[joint]);
-    const Line line = angle ? LineThrough(samples_.values(command.column), samples_.values(angle->column)) : Line{};
+    const FittedLine line =
+        angle ? LineThrough(samples_.values(command.column), samples_.values(angle->column)) : FittedLine{};
     const bool clear = std::abs(line.correlation) > kClear;
     const Scaling& of_angle = scalings_.positions[joint];
     const double factor = of_angle.factor * line.slope;
     if (!scaling.certain) {
       const auto unit = clear ? Snap(factor, AngleUnits(), kServoAgrees) : std::nullopt;
-      if (unit && of_angle.certain) {
-        scaling = Of(*unit, true, "");
-      } else if (unit) {
-        scaling = Of(*unit, false, "the unit of " + LabelOf(command) + " is that of the angle: " + *unit);
+      if (unit) {
+        scaling = Of(*unit, of_angle.certain, "");  // a doubt of the angle's is told there
+        scaling.by_data = scaling.is_unit = true;
       } else if (clear && angle) {
-        scaling =
-            Of("rad", false, "'" + command.name + "' is no angle but follows one: scale and offset by regression");
-        scaling.scale = scaling.factor = factor;
-        scaling.add = of_angle.factor * line.intercept;
-        return scaling;
+        return Action(command, factor, of_angle.factor * line.intercept);
       } else if (scaling.doubt.empty()) {
-        scaling.unit = of_angle.unit;
-        scaling.factor = of_angle.factor;
-        scaling.doubt = "the unit of " + LabelOf(command) + " is not stated: " + scaling.unit + " is taken";
+        scaling = Of(of_angle.unit, false,
+                     "the unit of " + LabelOf(command) + " is not stated: " + of_angle.unit + " is taken");
       }
     }
     if (clear && line.slope < 0) {
@@ -265,6 +257,61 @@ class Scaler {
                        command.name + "': the sign of one of them";
     }
     return scaling;
+  }
+
+  static Scaling Action(const Guess& command, double factor, double offset) {
+    Scaling scaling =
+        Of("rad", false, LabelOf(command) + " is no angle but leads one: scale and offset are by regression");
+    scaling.scale = scaling.factor = factor;
+    scaling.add = offset;
+    scaling.by_data = true;
+    return scaling;
+  }
+
+  template <class Accept>
+  std::vector<std::vector<std::size_t>> Families(const std::vector<Pick>& picks, const Accept& accept) const {
+    std::map<std::string, std::vector<std::size_t>> families;
+    for (std::size_t i = 0; i < picks.size(); ++i) {
+      if (GuessOf(picks[i]) && accept(i)) families[FamilyOf(GuessOf(picks[i])->said)].push_back(i);
+    }
+    std::vector<std::vector<std::size_t>> all;
+    for (auto& [family, members] : families) all.push_back(std::move(members));
+    return all;
+  }
+
+  // A family has one unit, or one scale: what most of its members tell by regression. The scale is the middle one.
+  void ScalesOfFamily(const std::vector<std::vector<std::size_t>>& families, const std::vector<Pick>& picks,
+                      std::vector<Scaling>* all) const {
+    for (const auto& members : families) {
+      std::vector<double> units, scales;
+      for (const std::size_t i : members) {
+        const Scaling& s = (*all)[i];
+        if (s.by_data) (s.is_unit ? units : scales).push_back(std::abs(s.factor));
+      }
+      if (units.empty() && scales.empty()) continue;
+      const bool is_unit = units.size() >= scales.size();
+      const double middle = Median(is_unit ? units : scales);
+      const auto like = std::ranges::find_if(members, [&](std::size_t i) {
+        const Scaling& s = (*all)[i];
+        return s.by_data && s.is_unit == is_unit && std::abs(s.factor) == middle;
+      });
+      const Scaling model = (*all)[*like];
+      for (const std::size_t i : members) {
+        Scaling& s = (*all)[i];
+        if (s.certain || (s.by_data && s.is_unit == is_unit && is_unit)) continue;
+        const bool against = s.factor < 0 && is_unit;
+        s = model;
+        s.factor = against ? -middle : model.factor;
+        s.scale = against ? -std::abs(model.scale) : model.scale;
+        if (s.add != 0) s.add = MeanOfAngle(i) - s.factor * MeanOf(picks[i]);
+      }
+    }
+  }
+
+  double MeanOf(const Pick& pick) const { return MomentsOf(samples_.values(GuessOf(pick)->column)).mean; }
+  double MeanOfAngle(std::size_t a) const {
+    const int joint = p_.actuators[a].joint;
+    return p_.positions[joint].column < 0 ? 0 : scalings_.positions[joint].factor * MeanOf(p_.positions[joint]);
   }
 
   Scaling Torque(const Pick& pick) const {

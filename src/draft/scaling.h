@@ -17,7 +17,9 @@ struct Scaling {
   double scale = 1, add = 0;  // SI = unit * scale * raw + add
   double factor = 1;          // of both, SI per raw unit
   bool certain = false;
-  std::string doubt;  // one sentence; empty: none
+  bool by_data = false;  // a regression gave it
+  bool is_unit = false;  // and it is a unit, not a scale of its own
+  std::string doubt;     // one sentence; empty: none
 };
 
 struct Scalings {

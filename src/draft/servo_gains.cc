@@ -59,40 +59,58 @@ std::vector<std::vector<double>> TorquesOf(const mjModel& model, const Pairing& 
 }
 
 struct Fit {
-  double kp = 0, kd = 0, explained = 0, error = 0;  // share of variance; standard error of kp
+  double kp = 0, kd = 0, armature = 0, explained = 0, error = 0;  // share of variance; standard error of kp
 };
 
-// torque = kp stretch - kd speed + c, and with `rough` less friction sign(speed).
-std::optional<Fit> FitLaw(const std::vector<double>& stretch, const std::vector<double>& speed,
-                          const std::vector<double>& torque, bool rough, bool damped) {
-  std::vector<std::size_t> rows;
-  for (std::size_t k = 0; k < torque.size(); ++k) {
-    if (std::isfinite(stretch[k] + speed[k] + torque[k])) rows.push_back(k);
+// What the torque may hold beside kp stretch + c. Of the torque that a motion takes the servo bears friction and the
+// armature too.
+enum Term { kDamping, kArmature, kFriction };
+
+struct Rows {
+  std::vector<double> stretch, speed, acceleration, torque;
+};
+
+double TermAt(const Rows& rows, Term term, std::size_t k) {
+  constexpr double kStill = 0.05;  // rad/s, below which friction has no clear sign
+  return term == kDamping    ? -rows.speed[k]
+         : term == kArmature ? -rows.acceleration[k]
+                             : -std::tanh(rows.speed[k] / kStill);
+}
+
+// By least squares; terms with the wrong sign are left out.
+std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms) {
+  std::vector<std::size_t> used;
+  for (std::size_t k = 0; k < rows.torque.size(); ++k) {
+    if (std::isfinite(rows.stretch[k] + rows.speed[k] + rows.acceleration[k] + rows.torque[k])) used.push_back(k);
   }
-  const int terms = 2 + (damped ? 1 : 0) + (rough ? 1 : 0);
-  if (rows.size() < 50) return std::nullopt;
-  Eigen::MatrixXd x(rows.size(), terms);
-  Eigen::VectorXd y(rows.size());
+  const auto columns = static_cast<Eigen::Index>(2 + terms.size());
+  if (used.size() < 50) return std::nullopt;
+  Eigen::MatrixXd x(used.size(), columns);
+  Eigen::VectorXd y(used.size());
   for (Eigen::Index i = 0; i < y.size(); ++i) {
-    const std::size_t k = rows[static_cast<std::size_t>(i)];
-    int c = 0;
-    x(i, c++) = stretch[k];
-    x(i, c++) = 1;
-    if (damped) x(i, c++) = -speed[k];
-    if (rough) x(i, c++) = -std::tanh(speed[k] / 0.05);
-    y(i) = torque[k];
+    const std::size_t k = used[static_cast<std::size_t>(i)];
+    x(i, 0) = rows.stretch[k];
+    x(i, 1) = 1;
+    for (std::size_t t = 0; t < terms.size(); ++t) x(i, static_cast<Eigen::Index>(2 + t)) = TermAt(rows, terms[t], k);
+    y(i) = rows.torque[k];
   }
   const Eigen::MatrixXd normal = x.transpose() * x;
   const Eigen::VectorXd solution = normal.ldlt().solve(x.transpose() * y);
   const double residual = (y - x * solution).squaredNorm(), total = (y.array() - y.mean()).matrix().squaredNorm();
   if (!(total > 0) || !solution.allFinite()) return std::nullopt;
-  const double variance = residual / static_cast<double>(rows.size() - static_cast<std::size_t>(terms));
-  const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(terms, terms)) * variance;
-  const Fit fit{.kp = solution(0),
-                .kd = damped ? solution(2) : 0,
-                .explained = 1 - residual / total,
-                .error = std::sqrt(std::max(0.0, covariance(0, 0)))};
-  if (damped && fit.kd < 0) return FitLaw(stretch, speed, torque, rough, false);
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    if (solution(static_cast<Eigen::Index>(2 + t)) >= 0) continue;
+    terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(t));
+    return FitLaw(rows, terms);
+  }
+  const double variance = residual / static_cast<double>(y.size() - columns);
+  const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(columns, columns)) * variance;
+  Fit fit{.kp = solution(0), .explained = 1 - residual / total, .error = std::sqrt(std::max(0.0, covariance(0, 0)))};
+  for (std::size_t t = 0; t < terms.size(); ++t) {
+    const double size = solution(static_cast<Eigen::Index>(2 + t));
+    if (terms[t] == kDamping) fit.kd = size;
+    if (terms[t] == kArmature) fit.armature = size;
+  }
   return fit;
 }
 
@@ -115,21 +133,13 @@ class Fitter {
     const ActuatorSlot& slot = p_.actuators[a];
     const bool fits = slot.wants == Quantity::kAngle && p_.commands[a].column >= 0 && !motions_[slot.joint].empty();
     if (fits && p_.torques[a].column >= 0) {
-      if (const auto fit = Of(a, InSi(p_.torques[a], s_.torques[a]), false); Counts(fit))
-        return {.kp = fit->kp,
-                .kd = fit->kd,
-                .limit = 0,
-                .from = "by regression of the measured torque, which it explains to " + Percent(fit->explained),
-                .certain = true};
+      if (const auto fit = FitLaw(Of(a, InSi(p_.torques[a], s_.torques[a])), {kDamping}); Counts(fit))
+        return Fitted(a, *fit, Armature(a), "by regression of the measured torque, which it explains to ");
     }
     if (fits) {
-      if (const auto fit = Of(a, torques_[slot.joint], true); Counts(fit))
-        return {.kp = fit->kp,
-                .kd = fit->kd,
-                .limit = 0,
-                .from = "by regression of the torque that the motion takes, which it explains to " +
-                        Percent(fit->explained),
-                .certain = true};
+      if (const auto fit = FitLaw(Of(a, torques_[slot.joint]), {kDamping, kArmature, kFriction}); Counts(fit))
+        return Fitted(a, *fit, fit->armature,
+                      "by regression of the torque that the motion takes, which it explains to ");
     }
     return MadeUp(slot.joint);
   }
@@ -141,14 +151,38 @@ class Fitter {
     return values;
   }
 
-  std::optional<Fit> Of(std::size_t a, const std::vector<double>& torque, bool rough) const {
-    const auto& motion = motions_[p_.actuators[a].joint];
-    std::vector<double> stretch = InSi(p_.commands[a], s_.commands[a]), speed;
-    for (std::size_t k = 0; k < stretch.size(); ++k) {
-      stretch[k] -= motion[k].value;
-      speed.push_back(motion[k].slope);
+  // A target that is a guess itself leaves the gains one.
+  ServoGains Fitted(std::size_t a, const Fit& fit, double armature, const std::string& from) const {
+    const bool is_angle = s_.commands[a].certain || s_.commands[a].is_unit;
+    return {.kp = fit.kp,
+            .kd = fit.kd,
+            .limit = 0,
+            .armature = armature,
+            .from = from + Percent(fit.explained),
+            .certain = is_angle};
+  }
+
+  // What the measured torque moves beside the model: a rotor. 0: it does not show.
+  double Armature(std::size_t a) const {
+    Rows rows = Of(a, InSi(p_.torques[a], s_.torques[a]));
+    const std::vector<double>& needed = torques_[p_.actuators[a].joint];
+    for (std::size_t k = 0; k < needed.size(); ++k) {
+      rows.torque[k] = needed[k] - rows.torque[k];
+      rows.stretch[k] = -rows.acceleration[k];
     }
-    return FitLaw(stretch, speed, torque, rough, true);
+    const auto fit = FitLaw(rows, {kDamping, kFriction});
+    return fit && fit->kp > 0 && fit->error < kKnown * fit->kp ? fit->kp : 0;
+  }
+
+  Rows Of(std::size_t a, const std::vector<double>& torque) const {
+    Rows rows{.stretch = InSi(p_.commands[a], s_.commands[a]), .speed = {}, .acceleration = {}, .torque = torque};
+    const auto& motion = motions_[p_.actuators[a].joint];
+    for (std::size_t k = 0; k < motion.size(); ++k) {
+      rows.stretch[k] -= motion[k].value;
+      rows.speed.push_back(motion[k].slope);
+      rows.acceleration.push_back(motion[k].curvature);
+    }
+    return rows;
   }
 
   ServoGains MadeUp(int slot) const {
@@ -157,7 +191,7 @@ class Fitter {
     const DataPtr data(mj_makeData(&m_));
     mj_forward(&m_, data.get());
     const double kp = std::max(inertia * w * w, std::abs(data->qfrc_bias[dof]) / kDroop_rad);
-    return {.kp = kp, .kd = 2 * std::sqrt(kp * inertia), .limit = 0, .from = "made up", .certain = false};
+    return {.kp = kp, .kd = 2 * std::sqrt(kp * inertia), .limit = 0, .armature = 0, .from = "made up"};
   }
 
   const mjModel& m_;
@@ -177,6 +211,27 @@ std::vector<ServoGains> FitServos(const mjModel& model, const Samples& samples, 
   std::vector<ServoGains> gains;
   for (std::size_t a = 0; a < pairing.actuators.size(); ++a) gains.push_back(fitter.Gains(a));
   return gains;
+}
+
+void AddArmature(const mjModel& model, const Pairing& pairing, std::vector<ServoGains>* gains) {
+  constexpr double kStiffest = 0.06, kDampest = 0.5;  // of kp h^2 and kd h in inertias
+  const DataPtr data(mj_makeData(&model));
+  mj_forward(&model, data.get());
+  std::vector<double> unit(static_cast<std::size_t>(model.nv)), moved(unit.size());
+  for (std::size_t a = 0; a < gains->size(); ++a) {
+    ServoGains& g = (*gains)[a];
+    const int dof = model.jnt_dofadr[pairing.joints[pairing.actuators[a].joint].joint];
+    if (g.armature > 0 || model.dof_armature[dof] > 0) continue;
+    // What the joint feels while the others are free to give way.
+    std::ranges::fill(unit, 0);
+    unit[static_cast<std::size_t>(dof)] = 1;
+    mj_solveM(&model, data.get(), moved.data(), unit.data(), 1);
+    const double inertia = 1 / moved[static_cast<std::size_t>(dof)], h = model.opt.timestep;
+    const double needed = std::max(g.kp * h * h / kStiffest, g.kd * h / kDampest);
+    if (needed <= inertia) continue;
+    g.armature = needed - inertia;
+    g.armature_made_up = true;
+  }
 }
 
 }  // namespace gapscope

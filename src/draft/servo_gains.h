@@ -15,16 +15,23 @@ namespace gapscope {
 struct ServoGains {
   double kp = 0, kd = 0;  // N m/rad, N m s/rad
   double limit = 0;       // N m; 0: none is known
+  double armature = 0;    // kg m^2; 0: the MJCF's
   std::string from;       // where they come from, for a comment
   bool certain = false;
+  bool armature_made_up = false;
 };
 
 // One for each actuator of the pairing; of those that are proposed as position servos, else of velocity servos kd
-// alone. torque = kp (target - angle) - kd speed + c is fitted by least squares. A fit counts that explains 80 % of the
-// torque's variance with kp known to a fifth. Else gains are made up: 5 Hz, critically damped, and stiff enough that
-// gravity bends the joint by less than 0.1 rad.
+// alone. torque = kp (target - angle) - kd speed + c is fitted by least squares; of the torque that the motion takes
+// friction and an armature are left to the servo. A fit counts that explains 80 % of the torque's variance with kp
+// known to a fifth. Else gains are made up: 5 Hz, critically damped, and stiff enough that gravity bends the joint by
+// less than 0.1 rad.
 std::vector<ServoGains> FitServos(const mjModel& model, const Samples& samples, const std::vector<Guess>& guesses,
                                   const Pairing& pairing, const Scalings& scalings);
+
+// A servo turns a rotor that an MJCF of bodies alone leaves out. Without it, light links under stiff servos are more
+// than a time step can follow: such joints get as much armature as makes them slow enough.
+void AddArmature(const mjModel& model, const Pairing& pairing, std::vector<ServoGains>* gains);
 
 }  // namespace gapscope
 

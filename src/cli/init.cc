@@ -84,16 +84,16 @@ Recording Beginning(Recording recording) {
 }
 
 // The draft must hold for every log that was given, and move.
-Status Try(const std::string& experiment_path, const std::vector<std::string>& logs) {
+Status Try(const std::string& experiment_path, const Log& log, const std::vector<std::string>& logs) {
   GS_ASSIGN(const Experiment experiment, LoadExperiment(experiment_path));
   GS_ASSIGN(const std::shared_ptr<const Model> model, Model::Load(experiment));
-  std::vector<Recording> first;
-  for (const std::string& path : logs) {
-    GS_ASSIGN(Recording recording, LoadRecording(experiment, path));
-    if (first.empty()) first.push_back(Beginning(std::move(recording)));
+  GS_ASSIGN(Recording first, BindLog(experiment, log));
+  for (std::size_t i = 1; i < logs.size(); ++i) {
+    const auto loads = LoadRecording(experiment, logs[i]);
+    if (!loads.ok()) return loads.error();
   }
   ThreadPool pool(1);
-  const ReplayResult replay = Replay(*model, first, {.values = model->Nominal()}, pool);
+  const ReplayResult replay = Replay(*model, {Beginning(std::move(first))}, {.values = model->Nominal()}, pool);
   if (replay.logs.front().outcome != Outcome::kDiverged) return Ok();
   return Error{.what = "the drafted model diverges",
                .where = logs.front(),
@@ -101,10 +101,10 @@ Status Try(const std::string& experiment_path, const std::vector<std::string>& l
                .cure = "are units and signs right? Where gains are made up: say them by --servo kp=K,kd=D"};
 }
 
-Status TryDraft(const Draft& draft, const InitFlags& flags) {
+Status TryDraft(const Draft& draft, const Log& log, const InitFlags& flags) {
   const TemporaryFile file(".yaml");
   GS_RETURN_IF_ERROR(WriteFile(file.path(), draft.Yaml(std::filesystem::absolute(flags.model).string())));
-  const Status tried = Try(file.path(), flags.logs);
+  const Status tried = Try(file.path(), log, flags.logs);
   if (tried.ok()) return tried;
   Error error = tried.error();
   error.what = "the draft does not replay: " + error.what;
@@ -123,7 +123,7 @@ Result<int> RunInit(const InitFlags& flags) {
   GS_ASSIGN(const Log log, ReadLog(flags.logs.front(), {}));
   GS_ASSIGN(const Timeline timeline, BuildTimeline(log, {}));
   GS_ASSIGN(const Draft draft, DraftExperiment(flags.model, log, timeline, options));
-  GS_RETURN_IF_ERROR(TryDraft(draft, flags));
+  GS_RETURN_IF_ERROR(TryDraft(draft, log, flags));
   // The experiment names the model as seen from its own folder.
   const std::filesystem::path folder =
       flags.out.empty() ? std::filesystem::current_path() : std::filesystem::absolute(flags.out).parent_path();

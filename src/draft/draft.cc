@@ -8,6 +8,7 @@
 #include "src/draft/scaling.h"
 #include "src/draft/servo_gains.h"
 #include "src/draft/yaml_text.h"
+#include "src/model/drive_facts.h"
 #include "src/model/element_names.h"
 #include "src/model/rig.h"
 
@@ -165,8 +166,9 @@ class Drafter {
       const Pick& pick = p_.commands[a];
       text += "  - {actuator: " + Quote(name);
       if (pick.column < 0) {
-        text += ", default: \"0\"}" + Unsure("no column looks like the command of actuator '" + name + "': it gets 0") +
-                "\n";
+        const std::string value = DefaultOf(p_.actuators[a]);
+        text += ", default: \"" + value + "\"}" +
+                Unsure("no column looks like the command of actuator '" + name + "': it gets " + value) + "\n";
         continue;
       }
       ++draft_.commanded;
@@ -174,6 +176,12 @@ class Drafter {
               Doubt(pick, s_.commands[a], "the command of actuator '" + name + "'") + "\n";
     }
     return text;
+  }
+
+  // Without a column a drive is on, at a supply that is made up; other commands are zero.
+  std::string DefaultOf(const ActuatorSlot& slot) const {
+    if (slot.wants != Quantity::kOther) return "0";
+    return FactsOf(m_, slot.actuator).enables ? "1" : "12";
   }
 
   std::string PositionText() {

@@ -69,7 +69,7 @@ std::vector<Pick> Match(const std::vector<Slot>& slots, const std::vector<int>& 
   for (int s = 0; s < static_cast<int>(slots.size()); ++s) {
     for (const int c : candidates) {
       const double score = Score((*guesses)[c], slots[s], s, numbers);
-      if (score > 0) pairs.emplace_back(score + bonus(s, c), s, c);
+      if (const double all = score + bonus(s, c); score > 0 && all > 0) pairs.emplace_back(all, s, c);
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return get<0>(a) > get<0>(b); });

@@ -95,7 +95,13 @@ void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
 
 // What an actuator of the MJCF is told.
 Quantity WantsOf(const mjModel& m, int actuator) {
-  if (FactsOf(m, actuator).feeds_back_position) return Quantity::kAngle;
+  static const std::map<std::string, Quantity> inputs = {
+      {"target", Quantity::kAngle},       {"velocity", Quantity::kSpeed},   {"torque", Quantity::kTorque},
+      {"feedforward", Quantity::kTorque}, {"current", Quantity::kElectric}, {"voltage", Quantity::kElectric},
+      {"supply", Quantity::kOther},       {"enable", Quantity::kOther}};
+  const DriveFacts facts = FactsOf(m, actuator);
+  if (const auto found = inputs.find(facts.input); found != inputs.end()) return found->second;
+  if (facts.feeds_back_position) return Quantity::kAngle;
   if (m.actuator_plugin[actuator] >= 0) return Quantity::kUnknown;
   const double gain = m.actuator_gainprm[actuator * mjNGAIN], speed = m.actuator_biasprm[actuator * mjNBIAS + 2];
   const bool affine = m.actuator_biastype[actuator] == mjBIAS_AFFINE;
@@ -192,14 +198,16 @@ class Pairer {
           return (said.side == Side::kMeasured ? 0.02 : 0) - (said.quantity == Quantity::kAngle ? 0 : 0.1);
         },
         &guesses_);
+    const auto is_left = [&](int c) {
+      return !guesses_[c].used && samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.filtered &&
+             !IsCopy(guesses_[c].column);
+    };
+    const bool only_one = p_.joints.size() == 1 && std::ranges::count_if(candidates, is_left) == 1;
     for (Pick& pick : p_.positions) {
-      const auto left = std::ranges::find_if(candidates, [&](int c) {
-        return !guesses_[c].used && samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.filtered &&
-               !IsCopy(guesses_[c].column);
-      });
+      const auto left = std::ranges::find_if(candidates, is_left);
       if (pick.column >= 0 || left == candidates.end()) continue;
       guesses_[*left].used = true;
-      pick = {.column = *left, .runner_up = -1, .certain = false, .why = "", .by_order = true};
+      pick = {.column = *left, .runner_up = -1, .certain = only_one, .why = "", .by_order = !only_one};
     }
   }
 
@@ -292,12 +300,17 @@ class Pairer {
   }
 
   static double Fit(Quantity wants, Quantity said) {
+    if (wants == Quantity::kOther || said == Quantity::kOther) return wants == said ? 0.05 : -10;
     if (wants == Quantity::kUnknown || said == Quantity::kUnknown) return 0;
     return wants == said || (wants == Quantity::kTorque && said == Quantity::kElectric) ? 0.05 : -0.3;
   }
 
   void PairCommands() {
-    const std::vector<int> candidates = CommandCandidates();
+    std::vector<int> candidates = CommandCandidates();
+    // Supplies and switches, for the inputs that are called so.
+    const std::vector<int> others =
+        Select(guesses_, [](const Guess& g) { return g.said.quantity == Quantity::kOther; });
+    candidates.insert(candidates.end(), others.begin(), others.end());
     const Numbers numbers(guesses_, candidates, ActuatorOrders());
     p_.commands = Match(
         ActuatorSlots(), candidates, numbers,
@@ -332,7 +345,7 @@ class Pairer {
         return !guesses_[c].used && Fit(p_.actuators[s].wants, guesses_[c].said.quantity) >= 0 &&
                samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.number;
       });
-      if (p_.commands[s].column >= 0 || left == candidates.end()) continue;
+      if (p_.commands[s].column >= 0 || left == candidates.end() || p_.actuators[s].wants == Quantity::kOther) continue;
       guesses_[*left].used = true;
       p_.commands[s] = {.column = *left, .runner_up = -1, .certain = false, .why = "", .by_order = true};
     }

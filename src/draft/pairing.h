@@ -32,8 +32,8 @@ struct JointSlot {
 struct ActuatorSlot {
   int actuator = -1;  // of the model; -1: one that the draft proposes
   std::string name;
-  int joint = -1;  // of the slots; -1: on none of them
-  Quantity wants = Quantity::kUnknown;
+  int joint = -1;                       // of the slots; -1: on none of them
+  Quantity wants = Quantity::kUnknown;  // kOther: a supply or a switch
 };
 
 // The column that a slot gets, and why one may doubt it.

@@ -8,15 +8,17 @@
 
 #include "src/core/statistics.h"
 #include "src/core/units.h"
-#include "src/log/text.h"
+#include "src/model/drive_facts.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kTwoTurns_rad = 13;   // an angle that goes further is hardly in radians
+constexpr double kTwoTurns_rad = 13;   // an angle that goes further, and fast, is hardly in radians
 constexpr double kAgree = 0.08;        // a regression gives a unit when it is this near to it
 constexpr double kServoAgrees = 0.25;  // and between a servo's target and its angle, which droops
 constexpr double kClear = 0.8;         // correlation from which a regression speaks
+constexpr double kIsLinear = 0.97;     // and from which a target that is in no unit of an angle is a linear map of it
+constexpr double kFast_rad_per_s = 30;
 
 std::string CountsUnit(int per_turn) { return "counts/" + std::to_string(per_turn); }
 
@@ -148,14 +150,16 @@ class Scaler {
     }
   }
 
-  // Radians, unless a joint would then leave its range or turn more than twice.
+  // Radians, unless a joint would then leave its range, or turn more than twice and fast.
   std::string UnitByRange(const std::vector<std::size_t>& joints) const {
     const auto fits = [&](const std::string& unit) {
       return std::ranges::all_of(joints, [&](std::size_t j) {
         const int joint = p_.joints[j].joint;
         const double moved = FactorOf(unit) * samples_.spread(GuessOf(p_.positions[j])->column);
         const double width = m_.jnt_range[2 * joint + 1] - m_.jnt_range[2 * joint];
-        return moved < (m_.jnt_limited[joint] ? 1.1 * width + 0.1 : kTwoTurns_rad);
+        const double speed = FactorOf(unit) * FastOf(GuessOf(p_.positions[j])->column);
+        if (m_.jnt_limited[joint]) return moved < 1.1 * width + 0.1;
+        return moved < kTwoTurns_rad || (speed < kFast_rad_per_s && moved < 10 * kTwoTurns_rad);
       });
     };
     const bool whole = std::ranges::all_of(
@@ -164,6 +168,14 @@ class Scaler {
     if (whole) units = {"rad", CountsUnit(4096), CountsUnit(16384), CountsUnit(65536), CountsUnit(1 << 20)};
     const auto found = std::ranges::find_if(units, fits);
     return found == units.end() ? "rad" : *found;
+  }
+
+  double FastOf(int column) const {
+    std::vector<double> speeds;
+    for (const double v : samples_.slopes(column)) {
+      if (std::isfinite(v)) speeds.push_back(std::abs(v));
+    }
+    return speeds.empty() ? 0 : Quantile(std::move(speeds), 0.99);
   }
 
   Scaling Velocity(std::size_t j) const {
@@ -209,6 +221,7 @@ class Scaler {
     Scaling scaling = Stated(p_.commands[a], usual);
     if (!command) return scaling;
     if (servo && joint >= 0 && !slide) return Target(*command, joint, scaling);
+    if (p_.actuators[a].wants == Quantity::kOther && FactsOf(m_, p_.actuators[a].actuator).enables) return scaling;
     if (!scaling.certain && scaling.doubt.empty()) {
       scaling.doubt = "the unit of " + LabelOf(*command) +
                       " is not stated: " + (usual == "1" ? "it is taken as it stands" : usual + " is taken");
@@ -243,7 +256,7 @@ class Scaler {
       if (unit) {
         scaling = Of(*unit, of_angle.certain, "");  // a doubt of the angle's is told there
         scaling.by_data = scaling.is_unit = true;
-      } else if (clear && angle) {
+      } else if (angle && IsMapped(command, line)) {
         return Action(command, factor, of_angle.factor * line.intercept);
       } else if (scaling.doubt.empty()) {
         scaling = Of(of_angle.unit, false,
@@ -257,6 +270,16 @@ class Scaler {
                        command.name + "': the sign of one of them";
     }
     return scaling;
+  }
+
+  // It says that it is a policy's action, or it is a linear map of the angle that no weak servo explains.
+  static bool IsMapped(const Guess& command, const FittedLine& line) {
+    const bool action = std::ranges::any_of(command.said.words, [](const std::string& word) {
+      return word == "action" || word == "actions" || word == "policy";
+    });
+    if (action) return std::abs(line.correlation) > kClear;
+    const double gain = std::abs(line.slope);
+    return std::abs(line.correlation) > kIsLinear && (gain < 0.3 || gain > 1.5);
   }
 
   static Scaling Action(const Guess& command, double factor, double offset) {

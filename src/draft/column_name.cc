@@ -18,9 +18,9 @@ constexpr std::string_view kCommandWords[] = {
     "cmd",   "command",  "commanded", "target",      "des",     "desired", "ref",     "reference", "goal",
     "goals", "setpoint", "ctrl",      "con",         "control", "action",  "actions", "input",     "u",
     "sp",    "demand",   "request",   "feedforward", "ff",      "targets", "commands"};
-constexpr std::string_view kMeasuredWords[] = {"meas",   "measured", "actual",   "fb",  "feedback",
-                                               "state",  "obs",      "observed", "enc", "encoder",
-                                               "sensor", "resp",     "response"};
+constexpr std::string_view kMeasuredWords[] = {"meas",  "measured", "actual",   "fb",          "feedback",
+                                               "state", "obs",      "observed", "observation", "states",
+                                               "enc",   "encoder",  "sensor",   "resp",        "response"};
 constexpr std::string_view kAngleWords[] = {"pos",  "position", "positions", "angle", "angles", "q",
                                             "qpos", "theta",    "alpha",     "phi",   "rad",    "deg",
                                             "dof",  "encoder",  "enc",       "mrad",  "counts", "ticks"};

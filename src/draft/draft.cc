@@ -253,6 +253,11 @@ Result<Draft> DraftExperiment(const std::string& model_path, const Log& log, con
   if (!held.empty()) {
     GS_ASSIGN(rig, Rig::Load(experiment));
   }
+  if (options.servo && rig->compiled().nactuator > 0) {
+    return Error{.what = "--servo says the gains of actuators that the draft adds, but the MJCF has its own",
+                 .where = model_path,
+                 .cure = "leave --servo out; their gains stand under 'parameters:'"};
+  }
   Result<Draft> draft = Drafter(rig->compiled(), log, timeline, options).Write(held);
   if (draft.ok()) return draft;
   Error error = draft.error();

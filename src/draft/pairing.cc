@@ -341,13 +341,15 @@ class Pairer {
 
   void PairByOrder(const std::vector<int>& candidates) {
     for (std::size_t s = 0; s < p_.commands.size(); ++s) {
-      const auto left = std::ranges::find_if(candidates, [&](int c) {
+      const auto is_left = [&](int c) {
         return !guesses_[c].used && Fit(p_.actuators[s].wants, guesses_[c].said.quantity) >= 0 &&
                samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.number;
-      });
+      };
+      const auto left = std::ranges::find_if(candidates, is_left);
       if (p_.commands[s].column >= 0 || left == candidates.end() || p_.actuators[s].wants == Quantity::kOther) continue;
+      const bool only_one = p_.commands.size() == 1 && std::ranges::count_if(candidates, is_left) == 1;
       guesses_[*left].used = true;
-      p_.commands[s] = {.column = *left, .runner_up = -1, .certain = false, .why = "", .by_order = true};
+      p_.commands[s] = {.column = *left, .runner_up = -1, .certain = only_one, .why = "", .by_order = !only_one};
     }
   }
 
@@ -401,8 +403,11 @@ class Pairer {
     const std::vector<int> candidates = Select(
         guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && g.said.quantity == Quantity::kTorque; });
     const Numbers numbers(guesses_, candidates, ActuatorOrders());
-    std::vector<Slot> slots = ActuatorSlots();
-    p_.torques = Match(slots, candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
+    p_.torques = Match(ActuatorSlots(), candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
+    // One torque of one drive needs no name.
+    if (p_.actuators.size() != 1 || candidates.size() != 1 || p_.torques[0].column >= 0) return;
+    guesses_[candidates[0]].used = true;
+    p_.torques[0] = {.column = candidates[0], .runner_up = -1, .certain = true, .why = ""};
   }
 
   const mjModel& m_;

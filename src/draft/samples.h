@@ -30,6 +30,8 @@ class Samples {
   std::size_t columns() const { return values_.size(); }
   // At each sampled row, in the file's unit; NaN where missing.
   const std::vector<double>& values(std::size_t column) const { return values_[column]; }
+  // The same, so many rows earlier.
+  std::vector<double> values_before(std::size_t column, int rows) const { return Shifted(column, -rows); }
   // Of a line through the rows within about 10 ms; per second.
   const std::vector<double>& slopes(std::size_t column) const { return slopes_[column]; }
   double spread(std::size_t column) const { return highest_[column] - lowest_[column]; }  // 0 of a constant

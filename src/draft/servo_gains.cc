@@ -133,11 +133,11 @@ class Fitter {
     const ActuatorSlot& slot = p_.actuators[a];
     const bool fits = slot.wants == Quantity::kAngle && p_.commands[a].column >= 0 && !motions_[slot.joint].empty();
     if (fits && p_.torques[a].column >= 0) {
-      if (const auto fit = FitLaw(Of(a, InSi(p_.torques[a], s_.torques[a])), {kDamping}); Counts(fit))
+      if (const auto fit = Best(a, InSi(p_.torques[a], s_.torques[a]), {kDamping}); Counts(fit))
         return Fitted(a, *fit, Armature(a), "by regression of the measured torque, which it explains to ");
     }
     if (fits) {
-      if (const auto fit = FitLaw(Of(a, torques_[slot.joint]), {kDamping, kArmature, kFriction}); Counts(fit))
+      if (const auto fit = Best(a, torques_[slot.joint], {kDamping, kArmature, kFriction}); Counts(fit))
         return Fitted(a, *fit, fit->armature,
                       "by regression of the torque that the motion takes, which it explains to ");
     }
@@ -145,8 +145,9 @@ class Fitter {
   }
 
  private:
-  std::vector<double> InSi(const Pick& pick, const Scaling& scaling) const {
-    std::vector<double> values = samples_.values(guesses_[pick.column].column);
+  // `late`: as it was so many rows earlier.
+  std::vector<double> InSi(const Pick& pick, const Scaling& scaling, int late = 0) const {
+    std::vector<double> values = samples_.values_before(guesses_[pick.column].column, late);
     for (double& v : values) v = scaling.factor * v + scaling.add;
     return values;
   }
@@ -164,7 +165,7 @@ class Fitter {
 
   // What the measured torque moves beside the model: a rotor. 0: it does not show.
   double Armature(std::size_t a) const {
-    Rows rows = Of(a, InSi(p_.torques[a], s_.torques[a]));
+    Rows rows = Of(a, InSi(p_.torques[a], s_.torques[a]), 0);
     const std::vector<double>& needed = torques_[p_.actuators[a].joint];
     for (std::size_t k = 0; k < needed.size(); ++k) {
       rows.torque[k] = needed[k] - rows.torque[k];
@@ -174,8 +175,19 @@ class Fitter {
     return fit && fit->kp > 0 && fit->error < kKnown * fit->kp ? fit->kp : 0;
   }
 
-  Rows Of(std::size_t a, const std::vector<double>& torque) const {
-    Rows rows{.stretch = InSi(p_.commands[a], s_.commands[a]), .speed = {}, .acceleration = {}, .torque = torque};
+  // A command may act some rows late; the lateness that explains most is taken.
+  std::optional<Fit> Best(std::size_t a, const std::vector<double>& torque, const std::vector<Term>& terms) const {
+    constexpr int kLatest = 4;  // rows
+    std::optional<Fit> best;
+    for (int late = 0; late <= kLatest; ++late) {
+      const auto fit = FitLaw(Of(a, torque, late), terms);
+      if (fit && (!best || fit->explained > best->explained)) best = fit;
+    }
+    return best;
+  }
+
+  Rows Of(std::size_t a, const std::vector<double>& torque, int late) const {
+    Rows rows{.stretch = InSi(p_.commands[a], s_.commands[a], late), .speed = {}, .acceleration = {}, .torque = torque};
     const auto& motion = motions_[p_.actuators[a].joint];
     for (std::size_t k = 0; k < motion.size(); ++k) {
       rows.stretch[k] -= motion[k].value;

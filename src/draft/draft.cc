@@ -148,12 +148,7 @@ class Drafter {
 
   std::string DoubtOfGains(const ActuatorSlot& slot, const ServoGains& g) {
     std::string text;
-    if (slot.wants != Quantity::kTorque) {
-      text = g.certain ? "  # " + g.from
-                       : Unsure(
-                             "the log does not tell the gains of every servo: some are made up; say them by --servo "
-                             "kp=K,kd=D[,limit=T][,armature=A]");
-    }
+    if (slot.wants != Quantity::kTorque) text = g.certain ? "  # " + g.from : Unsure(g.doubt);
     if (g.armature_made_up)
       text += Unsure("the MJCF has no armature: it is made up where a servo needs it to be stable");
     return text;

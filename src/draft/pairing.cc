@@ -16,7 +16,7 @@ constexpr double kFollows = 0.5;       // a correlation that pairs what no name 
 constexpr double kContradicts = 0.3;   // and one that speaks against a name
 constexpr double kIsDerivative = 0.9;  // what no name says is a speed
 constexpr std::size_t kFew = 4;
-constexpr std::size_t kMostNameless = 60;  // columns whose data are compared with all others'
+constexpr std::size_t kMostNameless = 150;  // columns whose data are compared with all others'
 
 bool MayBe(const Guess& guess, Quantity quantity) {
   return !guess.is_time && (guess.said.quantity == quantity || guess.said.quantity == Quantity::kUnknown);

@@ -23,8 +23,9 @@ class Writer {
   std::string Run(const std::vector<ServoGains>& gains) {
     for (std::size_t a = 0; a < gains.size(); ++a) {
       if (gains[a].armature > 0) rotors_.insert(p_.actuators[a].joint);
+      if (gains[a].kp > 0 || gains[a].kd > 0) damped_.insert(p_.actuators[a].joint);
     }
-    for (std::size_t j = 0; j < p_.joints.size(); ++j) OfJoint(p_.joints[j], rotors_.contains(static_cast<int>(j)));
+    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) OfJoint(j);
     for (int a = 0; a < m_.nactuator; ++a) OfActuator(a);
     for (std::size_t a = 0; a < gains.size(); ++a) OfAdded(p_.actuators[a], gains[a]);
     if (parameters_.empty()) return "";
@@ -47,17 +48,19 @@ class Writer {
     if (!field.empty()) set_ += "  " + Quote(field) + ": " + Quote(name) + "\n";
   }
 
-  // `rotor`: an added actuator makes the armature.
-  void OfJoint(const JointSlot& joint, bool rotor) {
+  void OfJoint(int slot) {
+    const JointSlot& joint = p_.joints[slot];
     const int dof = m_.jnt_dofadr[joint.joint];
     const std::string &name = joint.name, field = "joint/" + name + "/";
     const std::string unit = joint.slide ? "N" : "N m", per = joint.slide ? "/m" : "/rad";
     const double inertia = m_.dof_M0[dof], damping = m_.dof_damping[dof], armature = m_.dof_armature[dof];
     // Without a value to start from: a damping that stops the joint within about ten seconds.
     const double scale = damping > 0 ? damping : 0.1 * inertia;
-    Propose({name + ".damping", unit + " s" + per, damping, 0, 20 * scale, field + "damping",
-             damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
-    if (!rotor)
+    // An added servo's kd damps its joint, and no log tells the two apart.
+    if (!damped_.contains(slot))
+      Propose({name + ".damping", unit + " s" + per, damping, 0, 20 * scale, field + "damping",
+               damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
+    if (!rotors_.contains(slot))
       Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, std::max(5 * armature, inertia),
                field + "armature"});
     if (const double k = m_.jnt_stiffness[joint.joint]; k > 0)
@@ -91,7 +94,7 @@ class Writer {
   const Pairing& p_;
   std::string parameters_, set_;
   std::set<std::string> names_;
-  std::set<int> rotors_;  // joints
+  std::set<int> rotors_, damped_;  // joints of which an added actuator makes the armature; the damping
 };
 
 }  // namespace

@@ -60,6 +60,7 @@ std::vector<std::vector<double>> TorquesOf(const mjModel& model, const Pairing& 
 
 struct Fit {
   double kp = 0, kd = 0, armature = 0, explained = 0, error = 0;  // share of variance; standard error of kp
+  bool damped = false;                                            // kd did not come out below zero
 };
 
 // What the torque may hold beside kp stretch + c. Of the torque that a motion takes the servo bears friction and the
@@ -108,7 +109,7 @@ std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms) {
   Fit fit{.kp = solution(0), .explained = 1 - residual / total, .error = std::sqrt(std::max(0.0, covariance(0, 0)))};
   for (std::size_t t = 0; t < terms.size(); ++t) {
     const double size = solution(static_cast<Eigen::Index>(2 + t));
-    if (terms[t] == kDamping) fit.kd = size;
+    if (terms[t] == kDamping) fit.kd = size, fit.damped = true;
     if (terms[t] == kArmature) fit.armature = size;
   }
   return fit;
@@ -155,12 +156,17 @@ class Fitter {
   // A target that is a guess itself leaves the gains one.
   ServoGains Fitted(std::size_t a, const Fit& fit, double armature, const std::string& from) const {
     const bool is_angle = s_.commands[a].certain || s_.commands[a].is_unit;
+    const std::string doubt = !is_angle ? "gains by regression rest on a target whose scale is a guess itself"
+                              : !fit.damped
+                                  ? "kd of a regression came out below zero and is taken as 0: its kp may be off"
+                                  : "";
     return {.kp = fit.kp,
             .kd = fit.kd,
             .limit = 0,
             .armature = armature,
             .from = from + Percent(fit.explained),
-            .certain = is_angle};
+            .doubt = doubt,
+            .certain = doubt.empty()};
   }
 
   // What the measured torque moves beside the model: a rotor. 0: it does not show.
@@ -203,7 +209,14 @@ class Fitter {
     const DataPtr data(mj_makeData(&m_));
     mj_forward(&m_, data.get());
     const double kp = std::max(inertia * w * w, std::abs(data->qfrc_bias[dof]) / kDroop_rad);
-    return {.kp = kp, .kd = 2 * std::sqrt(kp * inertia), .limit = 0, .armature = 0, .from = "made up"};
+    return {.kp = kp,
+            .kd = 2 * std::sqrt(kp * inertia),
+            .limit = 0,
+            .armature = 0,
+            .from = "made up",
+            .doubt =
+                "the log does not tell the gains of every servo: some are made up; say them by --servo "
+                "kp=K,kd=D[,limit=T][,armature=A]"};
   }
 
   const mjModel& m_;

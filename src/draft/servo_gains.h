@@ -17,7 +17,8 @@ struct ServoGains {
   double limit = 0;       // N m; 0: none is known
   double armature = 0;    // kg m^2; 0: the MJCF's
   std::string from;       // where they come from, for a comment
-  bool certain = false;
+  std::string doubt;      // why one may not trust them, a sentence for all servos; empty: none
+  bool certain = false;   // nothing speaks against them
   bool armature_made_up = false;
 };
 

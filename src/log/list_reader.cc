@@ -182,7 +182,7 @@ class Reader {
   Log log_;
 };
 
-const Column* Stamps(const Log& log) {
+const Column* StampColumn(const Log& log) {
   for (const char* name : {"timestamp", "time", "t"}) {
     if (const Column* column = log.Find(name)) return column;
   }
@@ -211,7 +211,7 @@ Status JoinControl(Log* log) {
   const std::string name = other.string();
   GS_ASSIGN(const std::string bytes, ReadFile(name));
   GS_ASSIGN(const Log control, ReadCsvLists(name, bytes));
-  const Column *own = Stamps(*log), *theirs = Stamps(control);
+  const Column *own = StampColumn(*log), *theirs = StampColumn(control);
   if (!own || !theirs) {
     return Error{.what = "no stamps to pair commands and states by",
                  .where = own ? control.WhereHeader() : log->WhereHeader(),

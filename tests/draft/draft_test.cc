@@ -67,6 +67,8 @@ TEST_F(DraftTest, WhereNamesSayNothingTheCommandLeads) {
   ExpectPairs(e, "x", "y", "", {"1", "2", "3"});
   const Experiment swapped = Drafted(Bars(kThree), Columns("y", "x", "", {"1", "2", "3"}));
   ExpectPairs(swapped, "y", "x", "", {"1", "2", "3"});
+  const Experiment three = Drafted(Bars(kThree), Columns("x", "y", "z", {"1", "2", "3"}));
+  ExpectPairs(three, "x", "y", "z", {"1", "2", "3"});
 }
 
 TEST_F(DraftTest, ASpeedIsTheDerivativeOfItsAngle) {

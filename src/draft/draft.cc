@@ -162,8 +162,9 @@ class Drafter {
       text += "  - {actuator: " + Quote(name);
       if (pick.column < 0) {
         const std::string value = DefaultOf(p_.actuators[a]);
-        text += ", default: \"" + value + "\"}" +
-                Unsure("no column looks like the command of actuator '" + name + "': it gets " + value) + "\n";
+        std::string doubt = "no column looks like the command of actuator '";
+        doubt += name + "': it gets " + value;
+        text += ", default: \"" + value + "\"}" + Unsure(doubt) + "\n";
         continue;
       }
       ++draft_.commanded;

@@ -20,7 +20,8 @@ Numbers::Numbers(const std::vector<Guess>& guesses, const std::vector<int>& cand
                  std::vector<std::vector<int>> orders)
     : orders_(std::move(orders)) {
   for (const int c : candidates) {
-    if (guesses[c].said.number) families_[guesses[c].said.stem].push_back(*guesses[c].said.number);
+    const ColumnName& said = guesses[c].said;
+    if (said.number) families_[said.stem].push_back(*said.number);
   }
   for (auto& [stem, members] : families_) {
     std::ranges::sort(members);

@@ -182,6 +182,7 @@ class Pairer {
 
   std::vector<Slot> JointSlots(bool like_positions) const {
     std::vector<Slot> slots;
+    slots.reserve(p_.joints.size());
     for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j)
       slots.push_back({.names = {p_.joints[j].name}, .like = like_positions ? PositionGuess(j) : nullptr});
     return slots;
@@ -421,7 +422,8 @@ class Pairer {
 std::vector<Guess> GuessColumns(const Log& log, const Timeline& timeline, const Samples& samples) {
   const std::vector<ColumnName> said = ReadNames(log.ColumnNames());
   std::vector<Guess> guesses;
-  for (std::size_t c = 0; c < log.columns.size(); ++c) {
+  guesses.reserve(said.size());
+  for (std::size_t c = 0; c < said.size(); ++c) {
     guesses.push_back({.column = static_cast<int>(c),
                        .name = log.columns[c].name,
                        .said = said[c],

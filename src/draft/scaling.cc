@@ -45,6 +45,12 @@ std::optional<std::string> Snap(double factor, const std::vector<std::string>& u
 
 std::string LabelOf(const Guess& guess) { return LabelOf(guess.name, guess.said); }
 
+std::string DoesNotFit(const std::string& unit, const Guess& guess, const std::string& usual) {
+  std::string text = "the unit '";
+  text += unit + "' of '" + guess.name + "' does not fit: " + usual + " is taken";
+  return text;
+}
+
 Scaling Of(const std::string& unit, bool certain, const std::string& doubt) {
   return {.unit = unit, .scale = 1, .add = 0, .factor = FactorOf(unit), .certain = certain, .doubt = doubt};
 }
@@ -84,7 +90,7 @@ class Scaler {
       const auto parsed = ParseUnit(unit);
       if (unit.empty() || !parsed.ok()) continue;
       if (usual == "1" || parsed.value().si == ParseUnit(usual).value().si) return Of(unit, true, "");
-      return Of(usual, false, "the unit '" + unit + "' of '" + guess->name + "' does not fit: " + usual + " is taken");
+      return Of(usual, false, DoesNotFit(unit, *guess, usual));
     }
     return Of(usual, false, "");
   }
@@ -298,6 +304,7 @@ class Scaler {
       if (GuessOf(picks[i]) && accept(i)) families[FamilyOf(GuessOf(picks[i])->said)].push_back(i);
     }
     std::vector<std::vector<std::size_t>> all;
+    all.reserve(families.size());
     for (auto& [family, members] : families) all.push_back(std::move(members));
     return all;
   }

@@ -115,9 +115,7 @@ std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms) {
   return fit;
 }
 
-bool Counts(const std::optional<Fit>& fit) {
-  return fit && fit->kp > 0 && fit->explained > kExplains && fit->error < kKnown * fit->kp;
-}
+bool Counts(const Fit& fit) { return fit.kp > 0 && fit.explained > kExplains && fit.error < kKnown * fit.kp; }
 
 std::string Percent(double share) { return std::to_string(std::lround(100 * share)) + " %"; }
 
@@ -134,11 +132,11 @@ class Fitter {
     const ActuatorSlot& slot = p_.actuators[a];
     const bool fits = slot.wants == Quantity::kAngle && p_.commands[a].column >= 0 && !motions_[slot.joint].empty();
     if (fits && p_.torques[a].column >= 0) {
-      if (const auto fit = Best(a, InSi(p_.torques[a], s_.torques[a]), {kDamping}); Counts(fit))
+      if (const auto fit = Best(a, InSi(p_.torques[a], s_.torques[a]), {kDamping}); fit && Counts(*fit))
         return Fitted(a, *fit, Armature(a), "by regression of the measured torque, which it explains to ");
     }
     if (fits) {
-      if (const auto fit = Best(a, torques_[slot.joint], {kDamping, kArmature, kFriction}); Counts(fit))
+      if (const auto fit = Best(a, torques_[slot.joint], {kDamping, kArmature, kFriction}); fit && Counts(*fit))
         return Fitted(a, *fit, fit->armature,
                       "by regression of the torque that the motion takes, which it explains to ");
     }
@@ -234,6 +232,7 @@ std::vector<ServoGains> FitServos(const mjModel& model, const Samples& samples, 
                                   const Pairing& pairing, const Scalings& scalings) {
   const Fitter fitter(model, samples, guesses, pairing, scalings);
   std::vector<ServoGains> gains;
+  gains.reserve(pairing.actuators.size());
   for (std::size_t a = 0; a < pairing.actuators.size(); ++a) gains.push_back(fitter.Gains(a));
   return gains;
 }

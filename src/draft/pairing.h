@@ -7,19 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "src/draft/column_name.h"
+#include "src/draft/guess_columns.h"
 #include "src/draft/samples.h"
 
 namespace gapscope {
-
-// A column with what its name and its data say.
-struct Guess {
-  int column = 0;  // of the log
-  std::string name;
-  ColumnName said;
-  std::string file_unit;  // as the file states it
-  bool is_time = false, used = false;
-};
 
 // A hinge or slide joint of the model that has a name.
 struct JointSlot {
@@ -51,9 +42,6 @@ struct Pairing {
   std::vector<ActuatorSlot> actuators;
   std::vector<Pick> commands, torques;  // per actuator
 };
-
-// What each column is. Columns that never move say nothing of an angle.
-std::vector<Guess> GuessColumns(const Log& log, const Timeline& timeline, const Samples& samples);
 
 // Without actuators in the model one is proposed for each joint that a command column pairs with.
 Pairing PairColumns(const mjModel& model, const Samples& samples, std::vector<Guess>* guesses);

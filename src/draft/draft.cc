@@ -110,6 +110,10 @@ class Drafter {
       doubt += (doubt.empty() ? "'" + Name(pick) + "' is taken for " + what : std::string()) + ", not '" +
                guesses_[pick.runner_up].name + "'";
     }
+    if (guesses_[pick.column].leads) {
+      doubt += (doubt.empty() ? "" : "; ") + LabelOf(Name(pick), guesses_[pick.column].said) +
+               " leads the angle: it is taken for the command, though no name says so";
+    }
     std::string text = doubt.empty() ? "" : Unsure(doubt);
     if (scaling.doubt.empty()) return text;
     const std::string more = Unsure(scaling.doubt);
@@ -163,7 +167,9 @@ class Drafter {
       if (pick.column < 0) {
         const std::string value = DefaultOf(p_.actuators[a]);
         std::string doubt = "no column looks like the command of actuator '";
-        doubt += name + "': it gets " + value;
+        doubt += name;
+        doubt += "': it gets ";
+        doubt += value;
         text += ", default: \"" + value + "\"}" + Unsure(doubt) + "\n";
         continue;
       }

@@ -26,8 +26,9 @@ void SidesByFamily(std::vector<Guess>* guesses) {
   }
   for (Guess& g : *guesses) {
     const auto vote = votes.find(g.said.stem);
-    if (g.said.number && vote != votes.end() && vote->second != 0)
-      g.said.side = vote->second > 0 ? Side::kCommand : Side::kMeasured;
+    if (!g.said.number || vote == votes.end() || vote->second == 0) continue;
+    g.leads = g.leads || (g.said.side == Side::kUnknown && vote->second > 0);
+    g.said.side = vote->second > 0 ? Side::kCommand : Side::kMeasured;
   }
 }
 
@@ -58,6 +59,7 @@ void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
       const Following f = samples.Follow(leader.column, follower.column);
       if (std::abs(f.correlation) < kIsDerivative || !(f.lag_s > 0)) continue;
       leader.said.side = Side::kCommand;
+      leader.leads = true;
       follower.said.side = Side::kMeasured;
     }
   }

@@ -17,6 +17,7 @@ struct Guess {
   ColumnName said;
   std::string file_unit;  // as the file states it
   bool is_time = false, used = false;
+  bool leads = false;  // no name says that it is a command; another column follows it
 };
 
 // It says that it is of that quantity, or says of none.

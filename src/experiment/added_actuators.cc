@@ -11,7 +11,7 @@ constexpr double kRoom = 5;  // a gain's bounds: this many times smaller and lar
 // A number of an actuator that is a parameter too, and the fields of the model that it makes.
 struct Number {
   const char *key, *unit;
-  std::optional<double> value;
+  double value;
   bool positive;                                                         // zero means nothing there
   double least_high;                                                     // of the upper bound, where zero does
   std::vector<std::pair<std::string, std::vector<std::string>>> fields;  // '%' stands for the parameter
@@ -52,7 +52,7 @@ void AddParameters(const AddedActuator& actuator, Experiment* experiment) {
     }
     const bool listed = std::ranges::any_of(experiment->parameters, [&](const auto& p) { return p.name == name; });
     if (!used || listed) continue;
-    const double value = *number.value;
+    const double value = number.value;
     experiment->parameters.push_back(
         {.name = name,
          .unit = number.unit,

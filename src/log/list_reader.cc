@@ -136,6 +136,12 @@ class Reader {
         log_.columns.push_back({column.name + end, "", {}});
       }
     }
+    if (std::ranges::none_of(columns_, [](const FileColumn& column) { return column.length.has_value(); })) {
+      return Error{.what = "no cell holds a list",
+                   .where = At(path_, line),
+                   .allowed = "cells as \"[0.1, 0.2]\"",
+                   .cure = "read it as format csv"};
+    }
     return Ok();
   }
 

@@ -65,6 +65,7 @@ TEST_F(DraftTest, ForeignNamesGoByOrderAndSaySo) {
 TEST_F(DraftTest, WhereNamesSayNothingTheCommandLeads) {
   const Experiment e = Drafted(Bars(kThree), Columns("x", "y", "", {"1", "2", "3"}));
   ExpectPairs(e, "x", "y", "", {"1", "2", "3"});
+  EXPECT_TRUE(IsUnsure("'x*' leads the angle")) << text_;
   const Experiment swapped = Drafted(Bars(kThree), Columns("y", "x", "", {"1", "2", "3"}));
   ExpectPairs(swapped, "y", "x", "", {"1", "2", "3"});
   const Experiment three = Drafted(Bars(kThree), Columns("x", "y", "z", {"1", "2", "3"}));

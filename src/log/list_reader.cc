@@ -210,6 +210,13 @@ Result<Log> ReadCsvLists(const std::string& path, std::string_view bytes) {
   return Reader(path, bytes).Read();
 }
 
+std::string StateFileOf(const std::string& path) {
+  const std::filesystem::path inside = std::filesystem::path(path) / kState;
+  std::error_code failed;
+  return std::filesystem::is_directory(path, failed) && std::filesystem::exists(inside, failed) ? inside.string()
+                                                                                                : path;
+}
+
 Status JoinControl(Log* log) {
   const std::filesystem::path path(log->path), other = path.parent_path() / kControl;
   std::error_code failed;

@@ -20,6 +20,9 @@ bool LooksLikeLists(const std::string& path, std::string_view bytes);
 // joint_list.txt of another length.
 Result<Log> ReadCsvLists(const std::string& path, std::string_view bytes);
 
+// The state_motor.csv in it if `path` is a folder with one, else `path`.
+std::string StateFileOf(const std::string& path);
+
 // Adds to the log of a state_motor.csv the columns of the control.csv beside it, if there is one, as control/NAME: at
 // each row what was commanded last, NaN before the first command.
 Status JoinControl(Log* log);

@@ -127,7 +127,8 @@ std::string Log::Where(std::size_t row) const {
 
 std::string Log::WhereHeader() const { return At(path, header_line); }
 
-Result<Log> ReadLog(const std::string& path, const ReadOptions& options) {
+Result<Log> ReadLog(const std::string& given, const ReadOptions& options) {
+  const std::string path = StateFileOf(given);
   GS_ASSIGN(Log log, ReadOne(path, options.format));
   if (options.companions.empty() && log.format == std::string_view("csv_lists")) GS_RETURN_IF_ERROR(JoinControl(&log));
   for (const auto& companion : options.companions) {

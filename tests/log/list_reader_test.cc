@@ -56,6 +56,18 @@ TEST(ListReaderTest, NamesOfJointsAndCommandsByTheirOwnStamps) {
   EXPECT_EQ(log.findings[0].column, "type");
 }
 
+TEST(ListReaderTest, TheFolderStandsForItsStateFile) {
+  const TempFolder folder;
+  folder.Write("run/state_motor.csv", kState);
+  folder.Write("run/control.csv", kControl);
+  const auto read = ReadLog(folder.Path("run"), {});
+  ASSERT_TRUE(read.ok()) << read.error().Text();
+  EXPECT_EQ(read.value().path, folder.Path("run/state_motor.csv"));
+  ExpectColumn(read.value(), "control/positions[0]", {NAN, 11, 12});
+  const auto none = ReadLog(folder.Path("."), {});
+  EXPECT_FALSE(none.ok()) << "a folder without that file is no log";
+}
+
 TEST(ListReaderTest, NumbersWithoutNames) {
   const TempFolder folder;
   const auto read = ReadLog(folder.Write("run.csv", "time;q\n0;[1, 2]\n1;[3, 4]\n"), {});

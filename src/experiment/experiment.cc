@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "src/core/units.h"
+#include "src/experiment/added_actuators.h"
 #include "src/experiment/own_effects.h"
 #include "src/experiment/yaml_reader.h"
 
@@ -16,11 +17,11 @@ namespace {
 
 // Reads `unit`, `scale` and `add` of a column: SI = unit * scale * raw + add.
 // Returns the SI unit.
-std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, double* offset) {
+std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, double* offset, const char* add = "add") {
   const auto parsed = ParseUnit(map.Text("unit", "1"));
   if (!parsed.ok()) map.Fail(node, parsed.error());
   *factor = (parsed.ok() ? parsed.value().factor : 1) * map.Number("scale", 1);
-  *offset = map.Number("add", 0);
+  *offset = map.Number(add, 0);
   if (!std::isfinite(*factor) || *factor == 0)
     map.Fail(node, {.what = "'scale' makes every value zero or infinite", .allowed = "a finite number other than 0"});
   return parsed.ok() ? parsed.value().si : "1";
@@ -111,7 +112,10 @@ Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& pat
     command.fallback = map.Text("default", "0");
     command.columns = ReadColumns(map, item, !map.Has("default"));
     if (command.columns.empty()) command.optional = true;
-    command.unit = ReadScaling(map, item, &command.factor, &command.offset);
+    command.where = YamlPlace(path, item);
+    if (map.Has("offset") && map.Has("add"))
+      map.Fail(item, {.what = "'offset' and 'add' of a command are the same", .cure = "delete one"});
+    command.unit = ReadScaling(map, item, &command.factor, &command.offset, map.Has("offset") ? "offset" : "add");
     command.kind = KindOfUnit(command.unit);
     for (const auto& other : experiment->commands) {
       if (other.actuator == command.actuator)
@@ -357,10 +361,10 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   const std::string model = map.Text("model");
   if (model.empty()) map.Fail(root, {.what = "'model' is empty", .allowed = "the path of an MJCF file"});
   const std::vector<YAML::Node> commands = map.List("commands"), candidates = map.List("candidates"),
-                                limits = map.List("limits");
+                                limits = map.List("limits"), actuators = map.List("actuators");
   const YAML::Node log = map.Child("log"), values = map.Child("values"), measured = map.Child("measured"),
                    parameters = map.Child("parameters"), set = map.Child("set"), without = map.Child("without"),
-                   replay = map.Child("replay");
+                   replay = map.Child("replay"), hold = map.Child("hold");
   map.Child("controller");  // LoadController of replay/controller.h reads it
   GS_RETURN_IF_ERROR(map.Finish());
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
@@ -372,6 +376,8 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   GS_RETURN_IF_ERROR(ReadMeasured(measured, path, &experiment));
   GS_RETURN_IF_ERROR(ReadParameters(parameters, path, &experiment));
   if (set.IsDefined()) GS_RETURN_IF_ERROR(ReadFieldSettings(set, path, &experiment.settings));
+  GS_RETURN_IF_ERROR(ReadAddedActuators(actuators, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadHold(hold, path, &experiment));
   GS_RETURN_IF_ERROR(ReadOwnEffects(candidates, path, &experiment));
   GS_RETURN_IF_ERROR(ReadSwitchedOff(without, path, &experiment));
   GS_RETURN_IF_ERROR(ReadLimits(limits, path, &experiment));

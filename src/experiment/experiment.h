@@ -37,6 +37,23 @@ struct CommandSpec {
   double factor = 1, offset = 0;  // command in SI = factor * column + offset
   bool optional = false;          // without the column: `fallback`
   std::string fallback = "0";     // expression of log values
+  std::string where = "";         // file:line:column, for errors
+};
+
+// A drive that the experiment adds to an MJCF without it: kp (command - angle) - kd speed, clipped; kd (command -
+// speed); or the command itself.
+struct AddedActuator {
+  enum class Kind { kPosition, kVelocity, kTorque };
+  std::string name, joint = "";
+  Kind kind = Kind::kPosition;
+  double kp = 0, kd = 0;                                  // N m/rad, N m s/rad (N/m, N s/m of a slide)
+  std::optional<double> force_limit = {}, armature = {};  // N m, kg m^2 (N, kg)
+  std::string where = "";                                 // file:line:column, for errors
+};
+
+// A body whose free joint is taken away: a robot on a stand, at the pose that the MJCF gives it.
+struct HeldBody {
+  std::string name, where = "";  // of the body, or of its free joint; file:line:column
 };
 
 enum class SignalKind { kPosition, kVelocity, kTorque, kSensor };
@@ -170,6 +187,8 @@ struct Experiment {
   ReadOptions read;
   TimelineOptions timeline;
   std::vector<LogValue> values;
+  std::vector<AddedActuator> actuators;
+  std::vector<HeldBody> hold;
   std::vector<CommandSpec> commands;
   std::vector<MeasuredSpec> measured;
   std::vector<Parameter> parameters;

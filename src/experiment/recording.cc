@@ -101,6 +101,11 @@ Result<std::map<std::string, double>> BindValues(const Experiment& experiment, c
 
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path) {
   GS_ASSIGN(const Log log, ReadLog(log_path, experiment.read));
+  return BindLog(experiment, log);
+}
+
+Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
+  const std::string& log_path = log.path;
   TimelineOptions timeline_options = experiment.timeline;
   for (const auto& spec : experiment.commands) {
     if (const Column* column = FindFirst(log, spec.columns)) timeline_options.required.push_back(column->name);

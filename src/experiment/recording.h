@@ -42,6 +42,8 @@ struct Recording {
 // Reads one log and binds it. Errors: those of reading; a column that is neither there nor optional (with the nearest
 // name); no scored signal at all; fewer than two rows.
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path);
+// The same of a log that was read as experiment.read says.
+Result<Recording> BindLog(const Experiment& experiment, const Log& log);
 
 }  // namespace gapscope
 

@@ -10,6 +10,7 @@
 #include "src/core/file.h"
 #include "src/log/bam_reader.h"
 #include "src/log/csv_reader.h"
+#include "src/log/list_reader.h"
 #include "src/log/text.h"
 
 namespace gapscope {
@@ -18,6 +19,7 @@ namespace {
 // A new format is a reader and a row here, before the last.
 constexpr LogReader kReaders[] = {
     {"bam_json", LooksLikeJson, ReadBamJson},
+    {"csv_lists", LooksLikeLists, ReadCsvLists},
     {"csv", [](const std::string&, std::string_view) { return true; }, ReadCsv},
 };
 
@@ -125,8 +127,10 @@ std::string Log::Where(std::size_t row) const {
 
 std::string Log::WhereHeader() const { return At(path, header_line); }
 
-Result<Log> ReadLog(const std::string& path, const ReadOptions& options) {
+Result<Log> ReadLog(const std::string& given, const ReadOptions& options) {
+  const std::string path = StateFileOf(given);
   GS_ASSIGN(Log log, ReadOne(path, options.format));
+  if (options.companions.empty() && log.format == std::string_view("csv_lists")) GS_RETURN_IF_ERROR(JoinControl(&log));
   for (const auto& companion : options.companions) {
     GS_ASSIGN(const std::string other_path, CompanionPath(path, companion));
     Result<Log> other = ReadOne(other_path, options.format);

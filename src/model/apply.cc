@@ -30,10 +30,13 @@ Result<XmlText> InItsNotation(mjSpec& spec, const std::string& where) {
   return XmlText::Parse(std::move(xml), where);
 }
 
+// Without the actuators that the experiment adds: those are changes too.
 Result<XmlText> AsItWas(const Rig& rig) {
-  const SpecPtr spec = rig.CopySpec();
-  const ModelPtr compiled(mj_compile(spec.get(), nullptr));
   const std::string& where = rig.experiment().model_path;
+  char message[1024] = "";
+  const SpecPtr spec(mj_parseXML(where.c_str(), nullptr, message, sizeof message));
+  if (!spec) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = where};
+  const ModelPtr compiled(mj_compile(spec.get(), nullptr));
   if (!compiled)
     return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(spec.get())), .where = where};
   return InItsNotation(*spec, where);
@@ -467,6 +470,11 @@ Status Check(const std::string& text, const std::string& folder, const mjModel& 
 
 Result<AppliedMjcf> ApplyToMjcf(const Model& model, std::span<const double> values, const ApplyOptions& options) {
   const std::string& path = model.experiment().model_path;
+  if (const auto& hold = model.experiment().hold; !hold.empty()) {
+    return Error{.what = "the experiment holds '" + hold.front().name + "', which is free in the MJCF",
+                 .where = hold.front().where,
+                 .cure = "take the model.xml beside the result, which is the held robot"};
+  }
   GS_ASSIGN(const XmlText before, AsItWas(*model.rig()));
   GS_ASSIGN(const ExportedModel exported, model.Export(values, nullptr, {}));
   GS_ASSIGN(const XmlText after, InItsNotation(*exported.spec, path));

@@ -19,13 +19,13 @@ double ParameterOf(const mjModel& m, int instance, const char* key) {
   return plugins::ParseNumber(plugins::ConfigText(&m, instance, key), &value) ? value : 0;
 }
 
-// Whether the actuator is the input `enable` of its instance: as `inputs` lists them, in the order of their ids.
-bool Enables(const mjModel& m, int instance, int actuator) {
+// What the actuator is to its instance: as `inputs` lists them, in the order of their ids; else the law's own command.
+std::string InputOf(const mjModel& m, int instance, int actuator, const plugins::LawTraits& law) {
   const auto before = std::count(m.actuator_plugin, m.actuator_plugin + actuator, instance);
   std::istringstream inputs{std::string(plugins::ConfigText(&m, instance, "inputs"))};
   std::string role;
   for (auto i = before; i >= 0; --i) inputs >> role;
-  return !inputs.fail() && role == plugins::kRoleNames[plugins::kEnable];
+  return inputs.fail() ? plugins::kRoleNames[law.command] : role;
 }
 
 }  // namespace
@@ -45,7 +45,11 @@ DriveFacts FactsOf(const mjModel& m, int actuator) {
   const bool holds = *gain && ParameterOf(m, instance, gain) != 0;
   // The affine law stands in for a native actuator: without a gain it is no servo, and meant to be none.
   const bool servo = *gain && (holds || law->law != plugins::MotorLaw::kAffine);
-  return {.feeds_back_position = servo, .holds_position = holds, .enables = Enables(m, instance, actuator)};
+  const std::string input = InputOf(m, instance, actuator, *law);
+  return {.feeds_back_position = servo,
+          .holds_position = holds,
+          .enables = input == plugins::kRoleNames[plugins::kEnable],
+          .input = input};
 }
 
 }  // namespace gapscope

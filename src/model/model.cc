@@ -112,7 +112,7 @@ Status Model::ResolveNames() {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
     if (id < 0)
       return NoSuch("a command drives an actuator that the MJCF lacks", command.actuator,
-                    ElementNames(m, mjOBJ_ACTUATOR), file);
+                    ElementNames(m, mjOBJ_ACTUATOR), command.where);
     command_ctrl_.push_back(m.actuator_ctrladr[id]);
   }
   for (const auto& measured : experiment().measured) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "src/core/collect.h"
+#include "src/model/add_actuators.h"
 #include "src/model/own_candidates.h"
 
 namespace gapscope {
@@ -29,6 +30,7 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
   char message[1024] = "";
   const SpecPtr read(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
   if (!read) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
+  GS_RETURN_IF_ERROR(AddToSpec(experiment, read.get()));
   rig->spec_.reset(mj_copySpec(read.get()));
   try {
     // What was read is compiled, not a copy: copying leaves out what refers to nothing, which is an error here.

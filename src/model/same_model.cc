@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "src/model/element_names.h"
+
 namespace gapscope {
 namespace {
 

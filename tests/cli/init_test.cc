@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "src/experiment/experiment.h"
 #include "tests/experiment/scratch.h"
@@ -160,6 +161,69 @@ TEST_F(InitTest, NamesThatYamlAndExpressionsDislike) {
       << ReadAll(scratch_.Path("stderr"));
 }
 
+// Bodies alone, with a floating base and a blank in a joint's name; columns by number.
+constexpr const char* kBare = R"(<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.002" integrator="implicitfast" gravity="0 0 0"><flag contact="disable"/></option>
+  <worldbody><body name="pelvis" pos="0 0 1"><freejoint/>
+    <inertial pos="0 0 0" mass="5" diaginertia="0.1 0.1 0.1"/>
+    <body name="upper"><joint name="left hip" axis="0 0 1"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body>
+    <body name="other"><joint name="right hip" axis="0 0 1"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body>
+  </body></worldbody></mujoco>)";
+
+TEST_F(InitTest, ARobotOfBodiesAloneReplaysAndTunesAtOnce) {
+  scratch_.Write("bare.xml", kBare);
+  std::string text = "t_us,q_des[0],q_des[1],q[0],q[1]\n";
+  for (int k = 0; k < 500; ++k) {
+    // 0.02 q'' = 4 (u - q) - 0.4 q' of a slow target: q is u later by 0.1 s.
+    const double t = 0.004 * k;
+    for (const double y : {1e6 * t, 0.4 * std::sin(2 * t), 0.3 * std::sin(3 * t), 0.4 * std::sin(2 * (t - 0.1)),
+                           0.3 * std::sin(3 * (t - 0.1))})
+      text += std::to_string(y) + ",";
+    text.back() = '\n';
+  }
+  scratch_.Write("log.csv", text);
+  const Experiment e = Drafted("init bare.xml log.csv --servo kp=4,kd=0.4,limit=5");
+  ASSERT_EQ(e.actuators.size(), 2u);
+  EXPECT_EQ(e.actuators[0].joint, "left hip");
+  EXPECT_EQ(e.actuators[0].kp, 4);
+  ASSERT_EQ(e.hold.size(), 1u);
+  EXPECT_EQ(e.hold[0].name, "pelvis");
+  EXPECT_EQ(e.timeline.time_unit, "us");
+  const Answer replay = Run("replay drafted/robot.yaml log.csv --quiet --time-step 0.002");
+  EXPECT_EQ(replay.status, 0) << replay.err;
+  EXPECT_NE(replay.out.find("left hip"), std::string::npos) << replay.out;
+  const Answer tune = Run("tune drafted/robot.yaml log.csv --quiet --budget 2 --with \"command_delay@left hip\"");
+  EXPECT_EQ(tune.status, 0) << tune.err;
+  EXPECT_NE(tune.out.find("left_hip.kp"), std::string::npos) << tune.out;
+}
+
+TEST_F(InitTest, WhatDoesNotReplayIsNotWritten) {
+  scratch_.Write("bare.xml", kBare);
+  std::string text = "t,q_des[0],q_des[1],q[0],q[1]\n";
+  for (int k = 0; k < 300; ++k) {
+    const double t = 0.004 * k;
+    for (const double y : {t, std::sin(20 * t), std::sin(30 * t), std::sin(20 * t - 1), std::sin(30 * t - 1)})
+      text += std::to_string(y) + ",";
+    text.back() = '\n';
+  }
+  scratch_.Write("log.csv", text);
+  const Answer answer = Run("init bare.xml log.csv --servo kp=1e12,kd=0,armature=1e-6 --out drafted/robot.yaml");
+  EXPECT_EQ(answer.status, 2) << answer.err;
+  EXPECT_NE(answer.err.find("the draft does not replay"), std::string::npos) << answer.err;
+  EXPECT_NE(answer.err.find("diverges"), std::string::npos) << answer.err;
+  EXPECT_FALSE(std::filesystem::exists(scratch_.Path("drafted/robot.yaml")));
+  for (const char* servo :
+       {"kp=1", "kd=1", "kp=0,kd=1", "kp=1,kd=-1", "kp=1,kd=1,limit=0", "kp=1,kd=1,mass=2", "1,2", "kp=x,kd=1"}) {
+    const Answer wrong = Run(std::string("init bare.xml log.csv --servo ") + servo);
+    EXPECT_EQ(wrong.status, 2) << servo;
+    EXPECT_NE(wrong.err.find("--servo"), std::string::npos) << servo << ": " << wrong.err;
+    EXPECT_EQ(wrong.out, "") << servo;
+  }
+}
+
 TEST_F(InitTest, WhatCannotBeDraftedIsRefused) {
   scratch_.Write("arm.xml", kArm);
   Log({"t", "shoulder", "elbow", "wrist", "cmd_a", "cmd_b", "w_1"});
@@ -173,6 +237,7 @@ TEST_F(InitTest, WhatCannotBeDraftedIsRefused) {
   refused("init arm.xml none.csv", "none.csv");
   refused("init log.csv log.csv", "log.csv");
   refused("init arm.xml", "logs");
+  refused("init arm.xml log.csv --servo kp=1,kd=1", "the MJCF has its own");
   scratch_.Write("still.xml", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>");
   refused("init still.xml log.csv", "joint");
   scratch_.Write("constant.csv", "t,shoulder\n0,1\n1,1\n2,1\n");

@@ -52,6 +52,7 @@ TEST(ExperimentDocTest, NamesEveryKey) {
       {"repair", "model: m.xml\nlog: {repair: {zzz: 1}}\n" + measured},
       {"value", "model: m.xml\nvalues: {v: {header: h, zzz: 1}}\n" + measured},
       {"command", "model: m.xml\ncommands: [{actuator: a, column: c, zzz: 1}]\n" + measured},
+      {"actuator", "model: m.xml\nactuators: [{name: a, joint: j, kp: 1, zzz: 1}]\n" + measured},
       {"measured", "model: m.xml\nmeasured: [{signal: a, joint: a, zzz: 1}]\n"},
       {"parameter", "model: m.xml\nparameters: {p: {unit: s, nominal: 1, frozen: true, zzz: 1}}\n" + measured},
       {"candidate",

@@ -12,6 +12,7 @@
 #include "src/log/bam_reader.h"
 #include "src/log/csv_reader.h"
 #include "src/log/inspect.h"
+#include "src/log/list_reader.h"
 #include "src/log/timeline.h"
 
 namespace gapscope {
@@ -43,6 +44,10 @@ std::vector<Sample> Samples() {
       {"log.csv", "time,x,time,y\nUnit: s,Unit: V,Unit: ms,Unit: rad\n0,1,0,1\n0.1,true,,2\n0.1,3,2,\n0,4,3,1\n",
        ReadCsv},
       {"log.csv", "t x  y\n0 1.5 2\n# note\n0.1 -2e-3 +4\nt x  y\n0.2 .5 nan\n", ReadCsv},
+      {"log.csv",
+       "type,timestamp,positions,torques\nS,1,\"[0.1, -2]\",\"[nan, 1e-3]\"\nS,2,\"[3, 4]\",\n"
+       "S,3,\"[5,6]\",\"[7,8]\"\n",
+       ReadCsvLists},
       {"log.json", json + "]}", ReadBamJson},
       {"log.json",
        "{\n \"a\": {\"b\": [1, {\"c\": null}]},\n \"entries\": [\n  {\"t\": 0, \"x\": NaN},\n  {\"t\": 1e-3, \"y\": "

@@ -31,6 +31,25 @@ std::vector<std::string> RealLogs() {
   return paths;
 }
 
+// As their provenance tells: six joints, 6000 rows at 50 Hz, lists in cells.
+TEST(RealLogsTest, SageFoldersReadAsColumnsOfJoints) {
+  const std::string folder = DataFolder() + "/so101_sage";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no folder " << folder;
+  for (const char* motion : {"multisine", "prbs_excitation"}) {
+    const auto log = ReadLog(folder + "/" + motion, {});
+    ASSERT_TRUE(log.ok()) << log.error().Text();
+    EXPECT_EQ(log.value().rows(), 6000u);
+    for (const char* joint : {"Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw"}) {
+      for (const char* kind : {"positions/", "velocities/", "torques/", "control/positions/"})
+        EXPECT_NE(log.value().Find(std::string(kind) + joint), nullptr) << kind << joint;
+    }
+    const auto timeline = BuildTimeline(log.value(), {});
+    ASSERT_TRUE(timeline.ok());
+    EXPECT_EQ(timeline.value().time_unit, "us");
+    EXPECT_NEAR(timeline.value().median_step_s, 0.02006, 1e-5);
+  }
+}
+
 TEST(RealLogsTest, EveryLogReads) {
   const auto paths = RealLogs();
   if (paths.empty()) GTEST_SKIP() << "no folder " << DataFolder();

@@ -1,0 +1,106 @@
+#include "src/draft/parameter_text.h"
+
+#include <algorithm>
+#include <set>
+
+#include "src/draft/yaml_text.h"
+#include "src/experiment/added_actuators.h"
+#include "src/model/element_names.h"
+
+namespace gapscope {
+namespace {
+
+struct Proposal {
+  std::string element, unit;
+  double nominal, low, high;
+  std::string field = "", comment = "";  // an added actuator's parameters set their fields themselves
+};
+
+class Writer {
+ public:
+  Writer(const mjModel& model, const Pairing& pairing) : m_(model), p_(pairing) {}
+
+  std::string Run(const std::vector<ServoGains>& gains) {
+    for (std::size_t a = 0; a < gains.size(); ++a) {
+      if (gains[a].armature > 0) rotors_.insert(p_.actuators[a].joint);
+      if (gains[a].kp > 0 || gains[a].kd > 0) damped_.insert(p_.actuators[a].joint);
+    }
+    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) OfJoint(j);
+    for (int a = 0; a < m_.nactuator; ++a) OfActuator(a);
+    for (std::size_t a = 0; a < gains.size(); ++a) OfAdded(p_.actuators[a], gains[a]);
+    if (parameters_.empty()) return "";
+    return "parameters:\n" + parameters_ + (set_.empty() ? "" : "set:\n" + set_);
+  }
+
+ private:
+  // A name that expressions can use, and no other parameter has.
+  std::string ParameterName(const std::string& element) {
+    std::string name = NameForExpressions(element);
+    while (!names_.insert(name).second) name += "_";
+    return name;
+  }
+
+  void Propose(const Proposal& proposal) {
+    const auto& [element, unit, nominal, low, high, field, comment] = proposal;
+    const std::string name = ParameterName(element);
+    parameters_ += "  " + Quote(name) + ": {unit: " + Quote(unit) + ", nominal: " + Num(nominal) + ", bounds: [" +
+                   Num(low) + ", " + Num(high) + "]}" + (comment.empty() ? "" : "  # " + comment) + "\n";
+    if (!field.empty()) set_ += "  " + Quote(field) + ": " + Quote(name) + "\n";
+  }
+
+  void OfJoint(int slot) {
+    const JointSlot& joint = p_.joints[slot];
+    const int dof = m_.jnt_dofadr[joint.joint];
+    const std::string &name = joint.name, field = "joint/" + name + "/";
+    const std::string unit = joint.slide ? "N" : "N m", per = joint.slide ? "/m" : "/rad";
+    const double inertia = m_.dof_M0[dof], damping = m_.dof_damping[dof], armature = m_.dof_armature[dof];
+    // Without a value to start from: a damping that stops the joint within about ten seconds.
+    const double scale = damping > 0 ? damping : 0.1 * inertia;
+    // An added servo's kd damps its joint, and no log tells the two apart.
+    if (!damped_.contains(slot))
+      Propose({name + ".damping", unit + " s" + per, damping, 0, 20 * scale, field + "damping",
+               damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
+    if (!rotors_.contains(slot))
+      Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, std::max(5 * armature, inertia),
+               field + "armature"});
+    if (const double k = m_.jnt_stiffness[joint.joint]; k > 0)
+      Propose({name + ".stiffness", unit + per, k, 0.2 * k, 5 * k, field + "stiffness"});
+    if (const double f = m_.dof_frictionloss[dof]; f > 0)
+      Propose({name + ".frictionloss", unit, f, 0, 10 * f, field + "frictionloss"});
+  }
+
+  void OfActuator(int a) {
+    const std::string name = NameOf(m_, mjOBJ_ACTUATOR, a), field = "actuator/" + name + "/";
+    if (name.empty() || m_.actuator_plugin[a] >= 0 || m_.actuator_gaintype[a] != mjGAIN_FIXED) return;
+    const double gain = m_.actuator_gainprm[a * mjNGAIN], b1 = m_.actuator_biasprm[a * mjNBIAS + 1],
+                 b2 = m_.actuator_biasprm[a * mjNBIAS + 2];
+    if (gain > 0 && b1 == -gain)
+      Propose({name + ".kp", "N m/rad", gain, 0.5 * gain, 2 * gain, field + "kp"});
+    else if (gain > 0)
+      Propose({name + ".gain", "N m per unit of command", gain, 0.5 * gain, 2 * gain, field + "gain"});
+    if (b2 < 0) Propose({name + ".kv", "N m s/rad", -b2, -0.3 * b2, -3 * b2, field + "kv"});
+  }
+
+  void OfAdded(const ActuatorSlot& slot, const ServoGains& gains) {
+    const double room = gains.certain ? 2 : 10;
+    if (gains.kp > 0) Propose({slot.name + ".kp", "N m/rad", gains.kp, gains.kp / room, gains.kp * room});
+    if (gains.armature > 0)
+      Propose({slot.name + ".armature_kg_m2", "kg m^2", gains.armature, 0, gains.armature * room});
+    if (gains.kd > 0 || gains.kp > 0)
+      Propose({slot.name + ".kd", "N m s/rad", gains.kd, 0, std::max(gains.kd * room, 0.1 * gains.kp)});
+  }
+
+  const mjModel& m_;
+  const Pairing& p_;
+  std::string parameters_, set_;
+  std::set<std::string> names_;
+  std::set<int> rotors_, damped_;  // joints of which an added actuator makes the armature; the damping
+};
+
+}  // namespace
+
+std::string ParameterText(const mjModel& model, const Pairing& pairing, const std::vector<ServoGains>& gains) {
+  return Writer(model, pairing).Run(gains);
+}
+
+}  // namespace gapscope

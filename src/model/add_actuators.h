@@ -1,0 +1,17 @@
+// What the experiment adds to the MJCF before anything else happens to it: actuators, and a stand for floating bodies.
+#ifndef GAPSCOPE_MODEL_ADD_ACTUATORS_H_
+#define GAPSCOPE_MODEL_ADD_ACTUATORS_H_
+
+#include "src/core/mujoco_handles.h"
+#include "src/experiment/experiment.h"
+
+namespace gapscope {
+
+// Changes a spec that has not been compiled. Errors, with file:line: an actuator whose name the MJCF has already, or on
+// a joint that is not there or no hinge or slide; a body to hold that is not there or has no free joint; a command for
+// an actuator that neither has.
+Status AddToSpec(const Experiment& experiment, mjSpec* spec);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_MODEL_ADD_ACTUATORS_H_

@@ -1,0 +1,143 @@
+// Which column goes where: by names, numbers, order and data, against the columns that made the log.
+#include "tests/draft/bench.h"
+
+namespace gapscope::testing {
+namespace {
+
+const std::vector<std::string> kThree = {"hip", "knee", "left foot"};
+constexpr double kKp = 6, kKd = 0.3;
+
+class DraftTest : public DraftBench {
+ protected:
+  DraftTest() {
+    for (std::size_t i = 0; i < kThree.size(); ++i) motions_.push_back(Move(i, kKp, kKd));
+  }
+  // Targets, angles, speeds of the three joints under names NAME + `ends`; an empty name: none.
+  std::vector<Named> Columns(const std::string& target, const std::string& angle, const std::string& speed,
+                             const std::vector<std::string>& ends) const {
+    std::vector<Named> columns = {{"time", motions_[0].time_s}};
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      if (!target.empty()) columns.push_back({target + ends[i], motions_[i].target});
+      if (!speed.empty()) columns.push_back({speed + ends[i], motions_[i].speed});
+      if (!angle.empty()) columns.push_back({angle + ends[i], motions_[i].angle});
+    }
+    return columns;
+  }
+  void ExpectPairs(const Experiment& e, const std::string& target, const std::string& angle, const std::string& speed,
+                   const std::vector<std::string>& ends) const {
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      EXPECT_EQ(ColumnOf(e, kThree[i]), angle + ends[i]) << text_;
+      if (!target.empty()) EXPECT_EQ(CommandOf(e, kThree[i]), target + ends[i]) << text_;
+      if (!speed.empty()) EXPECT_EQ(ColumnOf(e, kThree[i], SignalKind::kVelocity), speed + ends[i]) << text_;
+    }
+  }
+  std::vector<Motion> motions_;
+};
+
+TEST_F(DraftTest, ByNumber) {
+  for (const auto& [target, angle, speed] :
+       {std::array{"q_des", "q", "dq"}, {"pos_con", "pos_meas", "vel_meas"}, {"goal_", "angle_", "w_"}}) {
+    for (const std::vector<std::string>& ends :
+         {std::vector<std::string>{"1", "2", "3"}, {"[0]", "[1]", "[2]"}, {"11", "12", "13"}}) {
+      const Experiment e = Drafted(Bars(kThree), Columns(target, angle, speed, ends));
+      ExpectPairs(e, target, angle, speed, ends);
+      EXPECT_EQ(e.actuators.size(), 3u);
+      EXPECT_FALSE(IsUnsure("is taken for")) << text_;
+    }
+  }
+}
+
+TEST_F(DraftTest, ByNameWhateverTheOrder) {
+  std::vector<Named> columns = Columns("target/", "q/", "", {"hip", "knee", "left foot"});
+  std::ranges::reverse(columns);
+  const Experiment e = Drafted(Bars(kThree), columns);
+  ExpectPairs(e, "target/", "q/", "", {"hip", "knee", "left foot"});
+  EXPECT_FALSE(IsUnsure("is taken for")) << text_;
+}
+
+TEST_F(DraftTest, ForeignNamesGoByOrderAndSaySo) {
+  const std::vector<std::string> ends = {"Rotation", "Pitch", "Jaw"};
+  const Experiment e = Drafted(Bars(kThree), Columns("control/positions/", "positions/", "velocities/", ends));
+  ExpectPairs(e, "control/positions/", "positions/", "velocities/", ends);
+  EXPECT_TRUE(IsUnsure("no name fits 'positions/*'")) << text_;
+}
+
+TEST_F(DraftTest, WhereNamesSayNothingTheCommandLeads) {
+  const Experiment e = Drafted(Bars(kThree), Columns("x", "y", "", {"1", "2", "3"}));
+  ExpectPairs(e, "x", "y", "", {"1", "2", "3"});
+  EXPECT_TRUE(IsUnsure("'x*' leads the angle")) << text_;
+  const Experiment swapped = Drafted(Bars(kThree), Columns("y", "x", "", {"1", "2", "3"}));
+  ExpectPairs(swapped, "y", "x", "", {"1", "2", "3"});
+  const Experiment three = Drafted(Bars(kThree), Columns("x", "y", "z", {"1", "2", "3"}));
+  ExpectPairs(three, "x", "y", "z", {"1", "2", "3"});
+}
+
+TEST_F(DraftTest, ASpeedIsTheDerivativeOfItsAngle) {
+  // By number they would be another joint's.
+  std::vector<Named> columns = Columns("", "q", "", {"1", "2", "3"});
+  columns.push_back({"speed_a", motions_[2].speed});
+  columns.push_back({"speed_b", motions_[0].speed});
+  const Experiment e = Drafted(Bars(kThree), columns);
+  EXPECT_EQ(ColumnOf(e, "left foot", SignalKind::kVelocity), "speed_a") << text_;
+  EXPECT_EQ(ColumnOf(e, "hip", SignalKind::kVelocity), "speed_b") << text_;
+  EXPECT_EQ(ColumnOf(e, "knee", SignalKind::kVelocity), "") << text_;
+}
+
+TEST_F(DraftTest, ARunnerUpIsNamed) {
+  std::vector<Named> columns = Columns("", "q", "", {"1", "2", "3"});
+  for (std::size_t i = 0; i < 3; ++i)
+    columns.push_back({"q_motor" + std::to_string(i + 1), Times(motions_[i].angle, 1.1)});
+  Drafted(Bars(kThree), columns);
+  EXPECT_TRUE(IsUnsure(", not 'q")) << text_;
+}
+
+TEST_F(DraftTest, TorquesAreCommandsOfTorqueDrives) {
+  std::vector<Named> columns = {{"time", motions_[0].time_s}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::string end = std::to_string(i + 1);
+    columns.push_back({"tau_con" + end, motions_[i].torque});
+    columns.push_back({"tau_meas" + end, Times(motions_[i].torque, 0.9)});
+    columns.push_back({"pos_meas" + end, motions_[i].angle});
+  }
+  Experiment e = Drafted(Bars(kThree), columns);
+  ASSERT_EQ(e.actuators.size(), 3u) << text_;
+  EXPECT_EQ(e.actuators[1].kind, AddedActuator::Kind::kTorque);
+  EXPECT_EQ(CommandOf(e, "knee"), "tau_con2");
+  EXPECT_EQ(ColumnOf(e, "knee", SignalKind::kTorque), "tau_meas2");
+  // The same of motors that the MJCF has, in an order of their own.
+  const std::string motors =
+      "<actuator><motor name=\"a\" joint=\"knee\"/><motor name=\"b\" joint=\"left foot\"/>"
+      "<motor name=\"c\" joint=\"hip\"/></actuator>";
+  e = Drafted(Bars(kThree, motors), columns);
+  EXPECT_TRUE(e.actuators.empty());
+  EXPECT_EQ(CommandOf(e, "a"), "tau_con2") << "as its joint's angle: " << text_;
+  EXPECT_EQ(CommandOf(e, "c"), "tau_con1") << text_;
+  EXPECT_EQ(ColumnOf(e, "hip"), "pos_meas1") << text_;
+}
+
+TEST_F(DraftTest, AFloatingBaseIsHeld) {
+  const std::string robot =
+      "<mujoco><worldbody><body name=\"trunk\"><freejoint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>"
+      "<body><joint name=\"hip\" axis=\"0 0 1\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.02 0.02 0.02\"/>"
+      "</body></body><body name=\"ball\" pos=\"3 0 0\"><freejoint/><geom size=\"0.1\"/></body></worldbody></mujoco>";
+  const Experiment e = Drafted(robot, {{"time", motions_[0].time_s}, {"q", motions_[0].angle}});
+  ASSERT_EQ(e.hold.size(), 1u) << text_;
+  EXPECT_EQ(e.hold[0].name, "trunk") << "the ball carries no joint";
+  EXPECT_TRUE(IsUnsure("held")) << text_;
+}
+
+TEST_F(DraftTest, WhatCannotBeDraftedIsAnError) {
+  const auto says = [&](const Result<Draft>& draft, const std::string& text) {
+    ASSERT_FALSE(draft.ok());
+    EXPECT_NE(draft.error().Text().find(text), std::string::npos) << draft.error().Text();
+  };
+  says(TryDraft("<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>", Columns("", "q", "", {"1", "2", "3"})),
+       "no hinge or slide joint");
+  says(TryDraft(Bars(kThree), {{"time", motions_[0].time_s}, {"temp1", motions_[0].angle}}), "no column of the log");
+  says(TryDraft(Bars(kThree), {{"time", motions_[0].time_s}, {"q1", std::vector<double>(2500, 1.0)}}),
+       "no column of the log");
+  says(TryDraft("<mujoco>", Columns("", "q", "", {"1", "2", "3"})), "cannot read the MJCF");
+}
+
+}  // namespace
+}  // namespace gapscope::testing

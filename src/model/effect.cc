@@ -309,9 +309,9 @@ std::vector<EffectUse> AllUses(const Rig& rig) {
   std::vector<EffectUse> uses = EveryUse(rig);
   std::erase_if(uses, [&](const EffectUse& use) {
     const auto [effect, places] = Placed(use, rig);
-    // What weighs on one joint alone is an unbalanced mass there.
-    if (effect->place == EffectPlace::kBody && rig.JointsAbove(use.on) < 2) return true;
-    if (effect->place == EffectPlace::kModel && rig.Joints().size() < 2) return true;
+    // What weighs on one driven joint alone is an unbalanced mass there.
+    if (effect->place == EffectPlace::kBody && (!several || rig.JointsAbove(use.on) < 2)) return true;
+    if (effect->place == EffectPlace::kModel && !several) return true;
     if (effect->of_range && !std::ranges::all_of(places, [&](const auto& on) { return rig.HasRange(on); })) return true;
     return places.size() > 1 && !(several && HasNoScale(*effect));
   });

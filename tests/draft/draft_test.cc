@@ -27,8 +27,12 @@ class DraftTest : public DraftBench {
                    const std::vector<std::string>& ends) const {
     for (std::size_t i = 0; i < ends.size(); ++i) {
       EXPECT_EQ(ColumnOf(e, kThree[i]), angle + ends[i]) << text_;
-      if (!target.empty()) EXPECT_EQ(CommandOf(e, kThree[i]), target + ends[i]) << text_;
-      if (!speed.empty()) EXPECT_EQ(ColumnOf(e, kThree[i], SignalKind::kVelocity), speed + ends[i]) << text_;
+      if (!target.empty()) {
+        EXPECT_EQ(CommandOf(e, kThree[i]), target + ends[i]) << text_;
+      }
+      if (!speed.empty()) {
+        EXPECT_EQ(ColumnOf(e, kThree[i], SignalKind::kVelocity), speed + ends[i]) << text_;
+      }
     }
   }
   std::vector<Motion> motions_;

@@ -105,7 +105,7 @@ Status TryDraft(const Draft& draft, const Log& log, const InitFlags& flags) {
   const TemporaryFile file(".yaml");
   GS_RETURN_IF_ERROR(WriteFile(file.path(), draft.Yaml(std::filesystem::absolute(flags.model).string())));
   const Status tried = Try(file.path(), log, flags.logs);
-  if (tried.ok()) return tried;
+  if (tried.ok()) return Ok();
   Error error = tried.error();
   error.what = "the draft does not replay: " + error.what;
   for (std::string* text : {&error.what, &error.where, &error.actual, &error.cure}) {

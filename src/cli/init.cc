@@ -1,5 +1,4 @@
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -52,20 +51,16 @@ Result<ServoSaid> ParseServo(const std::string& text) {
   return said;
 }
 
-// A file of its own that is taken away again.
-class TemporaryFile {
+// Takes a file away again.
+class Removed {
  public:
-  explicit TemporaryFile(const std::string& ending)
-      : path_(
-            (std::filesystem::temp_directory_path() / fmt::format("gapscope_init_{}{}", ::getpid(), ending)).string()) {
-  }
-  ~TemporaryFile() {
+  explicit Removed(std::string path) : path_(std::move(path)) {}
+  ~Removed() {
     std::error_code ignored;
     std::filesystem::remove(path_, ignored);
   }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  const std::string& path() const { return path_; }
+  Removed(const Removed&) = delete;
+  Removed& operator=(const Removed&) = delete;
 
  private:
   std::string path_;
@@ -102,15 +97,16 @@ Status Try(const std::string& experiment_path, const Log& log, const std::vector
 }
 
 Status TryDraft(const Draft& draft, const Log& log, const InitFlags& flags) {
-  const TemporaryFile file(".yaml");
-  GS_RETURN_IF_ERROR(WriteFile(file.path(), draft.Yaml(std::filesystem::absolute(flags.model).string())));
-  const Status tried = Try(file.path(), log, flags.logs);
+  GS_ASSIGN(const std::string path,
+            TemporaryBeside((std::filesystem::temp_directory_path() / "gapscope-init").string()));
+  const Removed removed(path);
+  GS_RETURN_IF_ERROR(WriteFile(path, draft.Yaml(std::filesystem::absolute(flags.model).string())));
+  const Status tried = Try(path, log, flags.logs);
   if (tried.ok()) return Ok();
   Error error = tried.error();
   error.what = "the draft does not replay: " + error.what;
   for (std::string* text : {&error.what, &error.where, &error.actual, &error.cure}) {
-    if (const std::size_t at = text->find(file.path()); at != std::string::npos)
-      text->replace(at, file.path().size(), "the draft");
+    if (const std::size_t at = text->find(path); at != std::string::npos) text->replace(at, path.size(), "the draft");
   }
   return error;
 }

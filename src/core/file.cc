@@ -66,14 +66,25 @@ Result<std::string> ReadFile(const std::string& path) {
   return bytes;
 }
 
-Status WriteFile(const std::string& path, std::string_view bytes) {
+Result<std::string> TemporaryBeside(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   std::error_code failure;
   if (!folder.empty()) std::filesystem::create_directories(folder, failure);
-  std::string temporary = path + ".XXXXXX";
-  const Descriptor file(mkstemp(temporary.data()));
+  std::string name = path + ".XXXXXX";
+  const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
   if (file.get() < 0) return SystemError("cannot write the file", path);
   fchmod(file.get(), 0644);
+  return name;
+}
+
+Status WriteFile(const std::string& path, std::string_view bytes) {
+  GS_ASSIGN(const std::string temporary, TemporaryBeside(path));
+  const Descriptor file(open(temporary.c_str(), O_WRONLY | O_CLOEXEC));
+  if (file.get() < 0) {
+    const Error error = SystemError("cannot write the file", path);
+    unlink(temporary.c_str());
+    return error;
+  }
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t put = write(file.get(), bytes.data() + done, bytes.size() - done);

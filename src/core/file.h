@@ -12,6 +12,9 @@ namespace gapscope {
 // The bytes of a regular file. Errors: absent, a folder, unreadable.
 Result<std::string> ReadFile(const std::string& path);
 
+// A new empty file beside `path`, making its folders; its name. Errors: cannot create.
+Result<std::string> TemporaryBeside(const std::string& path);
+
 // Writes `path` atomically (temporary name in the same folder, then rename), making its folders.
 // Errors: cannot create, write (disk full) or rename; the old file stays.
 Status WriteFile(const std::string& path, std::string_view bytes);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <set>
+#include <string_view>
 
 #include "src/draft/parameter_text.h"
 #include "src/draft/samples.h"
@@ -64,7 +65,10 @@ class Drafter {
     if (!held.empty()) y += "]" + Unsure("a floating base is held where the MJCF puts it, as on a stand") + "\n";
     if (proposes_) y += "actuators:\n" + ActuatorText();
     if (const std::string commands = CommandText(); !commands.empty()) y += "commands:\n" + commands;
-    y += "measured:\n" + PositionText() + VelocityText() + TorqueText();
+    y += "measured:\n";
+    y += SignalText({"", "", "joint", "position"}, p_.joints, p_.positions, s_.positions);
+    y += SignalText({"_speed", ", kind: velocity", "joint", "speed"}, p_.joints, p_.velocities, s_.velocities);
+    y += SignalText({"_torque", ", kind: torque", "actuator", "torque"}, p_.actuators, p_.torques, s_.torques);
     y += ParameterText(m_, p_, gains_) + "replay: {mode: free_run, window_s: 1}\n";
     return std::move(draft_);
   }
@@ -186,42 +190,23 @@ class Drafter {
     return FactsOf(m_, slot.actuator).enables ? "1" : "12";
   }
 
-  std::string PositionText() {
+  // Lines of the measured signals of one kind: one for each of `names` that has a column.
+  struct Measured {
+    const char *ending, *kind, *site, *what;
+  };
+  template <class Names>
+  std::string SignalText(const Measured& of, const Names& names, const std::vector<Pick>& picks,
+                         const std::vector<Scaling>& scalings) {
     std::string text;
-    for (std::size_t j = 0; j < p_.joints.size(); ++j) {
-      const std::string& name = p_.joints[j].name;
-      const Pick& pick = p_.positions[j];
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::string& name = names[i].name;
+      const Pick& pick = picks[i];
       if (pick.column < 0) continue;
-      const bool still = !Moves(pick);
-      text += "  - {signal: " + Quote(name) + ", column: " + Quote(Name(pick)) + ", joint: " + Quote(name) +
-              ScalingText(s_.positions[j], "add") + (still ? ", score: false" : "") + "}" +
-              Doubt(pick, s_.positions[j], "the position of joint '" + name + "'") + "\n";
-    }
-    return text;
-  }
-
-  std::string VelocityText() {
-    std::string text;
-    for (std::size_t j = 0; j < p_.joints.size(); ++j) {
-      const std::string& name = p_.joints[j].name;
-      const Pick& pick = p_.velocities[j];
-      if (pick.column < 0) continue;
-      text += "  - {signal: " + Quote(name + "_speed") + ", kind: velocity, column: " + Quote(Name(pick)) +
-              ", joint: " + Quote(name) + ScalingText(s_.velocities[j], "add") + ", optional: true, score: false}" +
-              Doubt(pick, s_.velocities[j], "the speed of joint '" + name + "'") + "\n";
-    }
-    return text;
-  }
-
-  std::string TorqueText() {
-    std::string text;
-    for (std::size_t a = 0; a < p_.actuators.size(); ++a) {
-      const std::string& name = p_.actuators[a].name;
-      const Pick& pick = p_.torques[a];
-      if (pick.column < 0) continue;
-      text += "  - {signal: " + Quote(name + "_torque") + ", kind: torque, column: " + Quote(Name(pick)) +
-              ", actuator: " + Quote(name) + ScalingText(s_.torques[a], "add") + ", optional: true, score: false}" +
-              Doubt(pick, s_.torques[a], "the torque of actuator '" + name + "'") + "\n";
+      const bool angle = std::string_view(of.kind).empty();
+      const char* more = !angle ? ", optional: true, score: false" : Moves(pick) ? "" : ", score: false";
+      text += "  - {signal: " + Quote(name + of.ending) + of.kind + ", column: " + Quote(Name(pick)) + ", " + of.site +
+              ": " + Quote(name) + ScalingText(scalings[i], "add") + more + "}" +
+              Doubt(pick, scalings[i], std::string("the ") + of.what + " of " + of.site + " '" + name + "'") + "\n";
     }
     return text;
   }

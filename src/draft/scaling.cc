@@ -51,6 +51,10 @@ std::string DoesNotFit(const std::string& unit, const Guess& guess, const std::s
   return text;
 }
 
+std::string NotStated(const Guess& guess, const std::string& taken) {
+  return "the unit of " + LabelOf(guess) + " is not stated: " + taken;
+}
+
 Scaling Of(const std::string& unit, bool certain, const std::string& doubt) {
   return {.unit = unit, .scale = 1, .add = 0, .factor = FactorOf(unit), .certain = certain, .doubt = doubt};
 }
@@ -130,21 +134,14 @@ class Scaler {
 
   // What is left: a family has the unit of one member that is certain, else one that suits all of them.
   void AnglesByFamily() {
-    std::map<std::string, std::vector<std::size_t>> families;
-    for (std::size_t j = 0; j < p_.joints.size(); ++j) {
-      if (const Guess* guess = GuessOf(p_.positions[j]); guess && !p_.joints[j].slide)
-        families[FamilyOf(guess->said)].push_back(j);
-    }
-    for (const auto& [family, joints] : families) {
+    for (const auto& joints : Families(p_.positions, [&](std::size_t j) { return !p_.joints[j].slide; })) {
       const auto sure = std::ranges::find_if(joints, [&](std::size_t j) { return scalings_.positions[j].certain; });
       std::string unit = sure != joints.end() ? scalings_.positions[*sure].unit : UnitByRange(joints);
       for (const std::size_t j : joints) {
         Scaling& scaling = scalings_.positions[j];
         if (scaling.certain) continue;
         const Guess& guess = *GuessOf(p_.positions[j]);
-        const std::string doubt = scaling.doubt.empty()
-                                      ? "the unit of " + LabelOf(guess) + " is not stated: " + unit + " is taken"
-                                      : scaling.doubt;
+        const std::string doubt = scaling.doubt.empty() ? NotStated(guess, unit + " is taken") : scaling.doubt;
         scaling = Of(unit, sure != joints.end(), sure != joints.end() ? "" : doubt);
       }
     }
@@ -152,7 +149,7 @@ class Scaler {
       const Guess* guess = GuessOf(p_.positions[j]);
       Scaling& scaling = scalings_.positions[j];
       if (guess && p_.joints[j].slide && !scaling.certain && scaling.doubt.empty())
-        scaling.doubt = "the unit of " + LabelOf(*guess) + " is not stated: m is taken";
+        scaling.doubt = NotStated(*guess, "m is taken");
     }
   }
 
@@ -191,8 +188,7 @@ class Scaler {
     if (!speed || !angle) return scaling;
     const FittedLine line = LineThrough(samples_.slopes(angle->column), samples_.values(speed->column));
     if (std::abs(line.correlation) < kClear) {
-      if (!scaling.certain && scaling.doubt.empty())
-        scaling.doubt = "the unit of " + LabelOf(*speed) + " is not stated: " + usual + " is taken";
+      if (!scaling.certain && scaling.doubt.empty()) scaling.doubt = NotStated(*speed, usual + " is taken");
       return scaling;
     }
     const double factor = scalings_.positions[j].factor / line.slope;
@@ -229,8 +225,7 @@ class Scaler {
     if (servo && joint >= 0 && !slide) return Target(*command, joint, scaling);
     if (p_.actuators[a].wants == Quantity::kOther && FactsOf(m_, p_.actuators[a].actuator).enables) return scaling;
     if (!scaling.certain && scaling.doubt.empty()) {
-      scaling.doubt = "the unit of " + LabelOf(*command) +
-                      " is not stated: " + (usual == "1" ? "it is taken as it stands" : usual + " is taken");
+      scaling.doubt = NotStated(*command, usual == "1" ? "it is taken as it stands" : usual + " is taken");
     }
     return scaling;
   }
@@ -265,8 +260,7 @@ class Scaler {
       } else if (angle && IsMapped(command, line)) {
         return Action(command, factor, of_angle.factor * line.intercept);
       } else if (scaling.doubt.empty()) {
-        scaling = Of(of_angle.unit, false,
-                     "the unit of " + LabelOf(command) + " is not stated: " + of_angle.unit + " is taken");
+        scaling = Of(of_angle.unit, false, NotStated(command, of_angle.unit + " is taken"));
       }
     }
     if (clear && line.slope < 0) {
@@ -347,8 +341,7 @@ class Scaler {
   Scaling Torque(const Pick& pick) const {
     Scaling scaling = Stated(pick, "N m");
     const Guess* guess = GuessOf(pick);
-    if (guess && !scaling.certain && scaling.doubt.empty())
-      scaling.doubt = "the unit of " + LabelOf(*guess) + " is not stated: N m is taken";
+    if (guess && !scaling.certain && scaling.doubt.empty()) scaling.doubt = NotStated(*guess, "N m is taken");
     return scaling;
   }
 

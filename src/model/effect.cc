@@ -211,8 +211,9 @@ Scales ScalesOfBody(const std::string& name, const Rig& rig) {
   return scales;
 }
 
-// The scales at a place; a motor's and its joint's are one.
-Scales ScalesAt(const std::string& on, const Rig& rig, const ScaleTable& table) {
+// The scales at a place of the effect; a motor's and its joint's are one.
+Scales ScalesAt(const Effect& effect, const std::string& on, const Rig& rig, const ScaleTable& table) {
+  if (effect.place == EffectPlace::kBody) return ScalesOfBody(on, rig);
   for (const std::string& name : {on, rig.JointOf(on), rig.JointOfSignal(on)}) {
     if (const auto found = table.find(name); !name.empty() && found != table.end()) return found->second;
   }
@@ -352,10 +353,7 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
       if (!IsElectric(command)) kind = ScaleKind::kTorque;
     }
     double scale = 0, zero = 0;
-    for (const std::string& place : places) {
-      const bool of_body = effect.place == EffectPlace::kBody;
-      scale = std::max(scale, ScaleOf(kind, of_body ? ScalesOfBody(place, rig) : ScalesAt(place, rig, table)));
-    }
+    for (const std::string& place : places) scale = std::max(scale, ScaleOf(kind, ScalesAt(effect, place, rig, table)));
     if (p.from_centre >= 0) zero = rig.CentreOf(places.front())[static_cast<std::size_t>(p.from_centre)];
     PlacedParameter out{.name = use.Text() + "." + key,
                         .key = key,
@@ -385,8 +383,8 @@ std::optional<EffectUse> UseWithParameter(const std::string& name, const Rig& ri
 namespace {
 
 // The rig's own size at a place, once.
-void AddScales(Structure& structure, const std::string& on, const ScaleTable& table) {
-  const Scales scales = ScalesAt(on, structure.rig(), table);
+void AddScales(Structure& structure, const Effect& effect, const std::string& on, const ScaleTable& table) {
+  const Scales scales = ScalesAt(effect, on, structure.rig(), table);
   for (const auto& [size, value, unit] : {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"},
                                           std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {
     const std::string name = ScaleName(on, size);
@@ -426,7 +424,7 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                             .of_torque = entry.of_torque || IsOfTorque(p.scale)});
   }
   for (const std::string& place : PlacesOf(use, structure.rig())) {
-    AddScales(structure, place, table);
+    AddScales(structure, effect, place, table);
     GS_RETURN_IF_ERROR(effect.apply(structure, place, names));
   }
   return Ok();

@@ -110,9 +110,7 @@ Status Model::ResolveNames() {
   const std::string& file = experiment().path;
   for (const auto& command : experiment().commands) {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
-    if (id < 0)
-      return NoSuch("a command drives an actuator that the MJCF lacks", command.actuator,
-                    ElementNames(m, mjOBJ_ACTUATOR), command.where);
+    GS_CHECK(id >= 0 && "an actuator of the rig");  // AddToSpec
     command_ctrl_.push_back(m.actuator_ctrladr[id]);
   }
   for (const auto& measured : experiment().measured) {

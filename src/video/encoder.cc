@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 #include <signal.h>
 #include <spawn.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,19 +20,6 @@ namespace gapscope {
 namespace {
 
 constexpr const char* kInstall = "install ffmpeg (on Debian: apt-get install ffmpeg), or write a .png";
-
-// A new empty file beside `path`; its name.
-Result<std::string> TemporaryBeside(const std::string& path, const std::string& suffix) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::error_code failure;
-  if (!folder.empty()) std::filesystem::create_directories(folder, failure);
-  std::string name = path + suffix + ".XXXXXX";
-  const int file = mkostemp(name.data(), O_CLOEXEC);
-  if (file < 0) return Error{.what = "cannot write the file", .where = path, .actual = std::strerror(errno)};
-  fchmod(file, 0644);
-  close(file);
-  return name;
-}
 
 std::vector<std::string> Arguments(VideoFormat format, int width, int height, double frames_per_s,
                                    const std::string& output) {
@@ -68,10 +54,10 @@ Result<std::unique_ptr<Encoder>> Encoder::Start(const std::string& path, VideoFo
   GS_CHECK(width % 2 == 0 && height % 2 == 0 && frames_per_s > 0);
   std::unique_ptr<Encoder> made(new Encoder);
   made->path_ = path;
-  GS_ASSIGN(made->temporary_, TemporaryBeside(path, ""));
+  GS_ASSIGN(made->temporary_, TemporaryBeside(path));
   // What ffmpeg says goes to a file: a second pipe could fill up while we write into the first.
   GS_ASSIGN(made->messages_path_,
-            TemporaryBeside((std::filesystem::temp_directory_path() / "gapscope-ffmpeg").string(), ""));
+            TemporaryBeside((std::filesystem::temp_directory_path() / "gapscope-ffmpeg").string()));
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) return Error{.what = "cannot make a pipe to ffmpeg", .actual = std::strerror(errno)};
   std::vector<std::string> arguments = Arguments(format, width, height, frames_per_s, "file:" + made->temporary_);

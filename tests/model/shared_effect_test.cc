@@ -6,6 +6,7 @@
 #include <set>
 
 #include "tests/model/synthetic.h"
+#include "tests/model/two_links.h"
 
 namespace gapscope::testing {
 namespace {
@@ -22,18 +23,11 @@ constexpr const char* kArm = R"(<mujoco>
   </worldbody>
   <actuator><motor name="first" joint="shoulder"/><motor name="second" joint="elbow"/></actuator>
 </mujoco>)";
-constexpr const char* kYaml = R"(commands:
-  - {actuator: first, column: u, unit: N m}
-  - {actuator: second, column: v, unit: N m}
-measured:
-  - {signal: q, column: q, joint: shoulder, unit: rad}
-  - {signal: p, column: p, joint: elbow, unit: rad}
-)";
 
 class SharedEffectTest : public ::testing::Test {
  protected:
   explicit SharedEffectTest(const std::string& mjcf = kArm)
-      : experiment_(MakeExperiment(scratch_, mjcf, kYaml)),
+      : experiment_(MakeExperiment(scratch_, mjcf, kTwoLinks)),
         base_(MakeModel(experiment_)),
         recording_(MakeRecording(experiment_, 400, 0.002, [](int c, double t) {
           return c == 0 ? Exciting(t, 2) - Exciting(0, 2) : Exciting(t, 0.5, 1, 6) - Exciting(0, 0.5, 1, 6);
@@ -217,7 +211,7 @@ TEST(SharedEffectPlacesTest, OneDriveIsThatDrive) {
 TEST(SharedEffectPlacesTest, CommandsOfTwoUnitsHaveNoCommonSize) {
   const Scratch scratch;
   const auto model =
-      MakeModel(MakeExperiment(scratch, kArm, Replaced(kYaml, "column: v, unit: N m", "column: v, unit: V")));
+      MakeModel(MakeExperiment(scratch, kArm, Replaced(kTwoLinks, "column: v, unit: N m", "column: v, unit: V")));
   const auto refused = ParseEffects({"dead_zone@all"}, *model->rig());
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.error().Text().find("allowed: first, second"), std::string::npos) << refused.error().Text();

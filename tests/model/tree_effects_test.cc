@@ -7,6 +7,7 @@
 #include <set>
 
 #include "tests/model/synthetic.h"
+#include "tests/model/two_links.h"
 
 namespace gapscope::testing {
 namespace {
@@ -27,13 +28,6 @@ std::string Arm(const std::string& euler = "0 0 0") {
   <actuator><motor name="first" joint="shoulder"/><motor name="second" joint="elbow"/></actuator>
 </mujoco>)";
 }
-constexpr const char* kYaml = R"(commands:
-  - {actuator: first, column: u, unit: N m}
-  - {actuator: second, column: v, unit: N m}
-measured:
-  - {signal: q, column: q, joint: shoulder, unit: rad}
-  - {signal: p, column: p, joint: elbow, unit: rad}
-)";
 
 bool Has(const std::vector<EffectUse>& uses, const EffectUse& use) {
   return std::find(uses.begin(), uses.end(), use) != uses.end();
@@ -46,7 +40,7 @@ struct Dynamics {
 
 class TreeEffectsTest : public ::testing::Test {
  protected:
-  explicit TreeEffectsTest(const std::string& mjcf = Arm(), const std::string& yaml = kYaml)
+  explicit TreeEffectsTest(const std::string& mjcf = Arm(), const std::string& yaml = kTwoLinks)
       : experiment_(MakeExperiment(scratch_, mjcf, yaml)),
         base_(MakeModel(experiment_)),
         recording_(MakeRecording(experiment_, 10, 0.002, [](int, double) { return 0.0; })) {}
@@ -102,7 +96,7 @@ TEST_F(TreeEffectsTest, APayloadStartsAtTheBodysCentreOfMass) {
 TEST_F(TreeEffectsTest, ATiltedMountIsMujocosModelOnATurnedBase) {
   const double x = 0.21, y = -0.33;
   Scratch scratch;
-  const auto turned = MakeModel(MakeExperiment(scratch, Arm("0.21 -0.33 0"), kYaml));
+  const auto turned = MakeModel(MakeExperiment(scratch, Arm("0.21 -0.33 0"), kTwoLinks));
   for (const auto& [q1, q2] : {std::pair{0.6, -1.1}, std::pair{-2.0, 0.4}}) {
     const DataPtr d(mj_makeData(&turned->compiled()));
     d->qpos[0] = q1, d->qpos[1] = q2;
@@ -129,7 +123,7 @@ TEST_F(TreeEffectsTest, AreLookedForWhereTwoJointsFeelThem) {
 
 // Two effects on each place, so that expressions of several parameters are among them.
 TEST(NamesTest, JointsDrivesAndSignalsMayHaveAnyName) {
-  std::string mjcf = Arm(), yaml = kYaml;
+  std::string mjcf = Arm(), yaml = kTwoLinks;
   for (std::string* text : {&mjcf, &yaml}) {
     for (const auto& [plain, odd] : {std::pair{"shoulder", "left hip-1"}, std::pair{"first", "hip (yaw)"},
                                      std::pair{"lower", "fore arm"}, std::pair{"signal: q", "signal: 'hip angle'"}}) {
@@ -160,7 +154,7 @@ TEST(EndStopTest, IsLookedForOnJointsWithARange) {
   const std::string joint = "<joint name=\"elbow\"";
   mjcf.replace(mjcf.find(joint), joint.size(), joint + " range=\"-1 2\" limited=\"false\"");
   Scratch scratch;
-  const auto model = MakeModel(MakeExperiment(scratch, mjcf, kYaml));
+  const auto model = MakeModel(MakeExperiment(scratch, mjcf, kTwoLinks));
   const std::vector<EffectUse> uses = AllUses(*model->rig());
   EXPECT_TRUE(Has(uses, {"end_stop", "elbow"}));
   EXPECT_FALSE(Has(uses, {"end_stop", "shoulder"}));
@@ -174,7 +168,7 @@ TEST(MountTiltTest, WhereTheExperimentSetsGravityItIsAParameter) {
 set:
   option/gravity: ["9.81*sin(tilt)", "0", "-9.81*cos(tilt)"]
 )yaml";
-  const auto model = MakeModel(MakeExperiment(scratch, Arm(), kYaml + set));
+  const auto model = MakeModel(MakeExperiment(scratch, Arm(), kTwoLinks + set));
   EXPECT_FALSE(Has(AllUses(*model->rig()), {"mount_tilt", "model"}));
 }
 

@@ -138,6 +138,12 @@ Simulator::Simulator(const Model& model, double max_step_s)
                                               [](int plugin) { return plugin >= 0; });
 }
 
+void Simulator::set_steps(StepKind steps) {
+  const int own = model_.compiled().opt.integrator;
+  quick_ = steps == StepKind::kQuick && own == mjINT_RK4;
+  mujoco_->opt.integrator = quick_ ? mjINT_EULER : own;
+}
+
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
   std::copy(values.begin(), values.end(), values_.begin());
   for (std::size_t c = 0; c < delays_s_.size(); ++c) {
@@ -274,6 +280,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       break;
     }
   }
+  if (quick_) result.steps = (result.steps + 3) / 4;
   ApplySensors(recording, window, predicted);
   return result;
 }

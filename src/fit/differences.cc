@@ -13,8 +13,7 @@ using Columns = DifferenceOptions::Columns;
 class FitProblem::Differences {
  public:
   Differences(const FitProblem& problem, Worker& worker, std::size_t window, const FitPoint& point,
-              const std::vector<double>& values, const DifferenceOptions& options, Eigen::VectorXd& residual,
-              Eigen::MatrixXd& jacobian)
+              const std::vector<double>& values, const DifferenceOptions& options, Derivatives& result)
       : problem_(problem),
         layout_(problem.layout_),
         worker_(worker),
@@ -24,8 +23,10 @@ class FitProblem::Differences {
         state_(point.states[window]),
         options_(options),
         shift_(problem.Shift(point)),
-        residual_(residual),
-        jacobian_(jacobian) {}
+        residual_(result.residuals[window]),
+        base_(result.quick.empty() ? residual_ : result.quick[window]),
+        steps_(result.quick.empty() ? StepKind::kOwn : StepKind::kQuick),
+        jacobian_(result.jacobians[window]) {}
 
   // False: the window cannot be simulated at the point.
   bool Make() {
@@ -49,14 +50,14 @@ class FitProblem::Differences {
  private:
   // The residuals elsewhere, in worker_.other; false: they cannot be had.
   bool Replay(const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift) {
-    if (!problem_.Simulate(worker_, {window_, point, values, state, shift}, worker_.perturbed)) return false;
+    if (!problem_.Simulate(worker_, {window_, point, values, state, shift, steps_}, worker_.perturbed)) return false;
     problem_.ResidualsOf(window_, point_, worker_.perturbed, worker_.other);
     return true;
   }
   bool Known(Eigen::Index column) const {
     return !options_.known.empty() && options_.known[static_cast<std::size_t>(column)];
   }
-  void Difference(Eigen::Index column, double h) { jacobian_.col(column) = (worker_.other - residual_) / h; }
+  void Difference(Eigen::Index column, double h) { jacobian_.col(column) = (worker_.other - base_) / h; }
 
   void Parameters() {
     worker_.values = values_;
@@ -76,7 +77,7 @@ class FitProblem::Differences {
       }
       const bool inside = point_.y[i] - h >= c.low && point_.y[i] - h <= c.high;
       if (options_.columns == Columns::kCentral && inside && move(i, -h))
-        jacobian_.col(i) = 0.5 * (jacobian_.col(i) - (worker_.other - residual_) / h);
+        jacobian_.col(i) = 0.5 * (jacobian_.col(i) - (worker_.other - base_) / h);
       problem_.space_.SetCoordinate(point_.y, i, point_.y[i], &worker_.values);
     }
   }
@@ -107,7 +108,7 @@ class FitProblem::Differences {
         FitPoint other = point_;
         other.y[signal.offset] += kFitPolicy.offset_step;
         if (!Replay(other, values_, state_, shift_)) continue;
-        column = (worker_.other - residual_) / kFitPolicy.offset_step;
+        column = (worker_.other - base_) / kFitPolicy.offset_step;
       }
       const double* measured =
           problem_.recordings_[window_.log].measured[s].values.data() + window_.rows.begin + window_.first_scored;
@@ -128,6 +129,8 @@ class FitProblem::Differences {
   const DifferenceOptions& options_;
   const double shift_;
   Eigen::VectorXd& residual_;
+  const Eigen::VectorXd& base_;  // what differences are taken from
+  const StepKind steps_;
   Eigen::MatrixXd& jacobian_;
 };
 
@@ -151,17 +154,21 @@ Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const
 Derivatives FitProblem::Differentiate(const FitPoint& point, const DifferenceOptions& options, Residuals base) {
   Derivatives result{.residuals = std::move(base), .work = {}};
   result.work = WorkOf(options, !result.residuals.empty());
+  if (options.steps == StepKind::kQuick) {
+    Evaluation quick = Evaluate(point, Keep::kResiduals, {}, StepKind::kQuick);
+    result.work += quick.work;
+    if (std::isfinite(quick.cost)) result.quick = std::move(quick.residuals);
+  }
   result.residuals.resize(windows_.size());
   result.jacobians.resize(windows_.size());
   std::vector<char> good(windows_.size(), 0);
   const std::vector<double> values = Values(point);
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
-    Differences differences(*this, GetWorker(index), w, point, values, options, result.residuals[w],
-                            result.jacobians[w]);
+    Differences differences(*this, GetWorker(index), w, point, values, options, result);
     good[w] = static_cast<char>(differences.Make());
   });
   result.valid = std::all_of(good.begin(), good.end(), [](char g) { return g != 0; });
-  result.work.steps = TakeSteps();
+  result.work.steps += TakeSteps();
   return result;
 }
 

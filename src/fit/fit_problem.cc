@@ -92,7 +92,7 @@ std::size_t FitProblem::TakeSteps() {
 }
 
 void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
-  const auto& [window, point, values, state, shift_s] = place;
+  const auto& [window, point, values, state, shift_s, steps] = place;
   const Recording& recording = recordings_[window.log];
   const std::vector<double>& first = space_.start();
   // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
@@ -134,6 +134,7 @@ bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double
   predicted.resize(window.rows.rows() * recording.measured.size());
   worker.simulator.set_shift_s(place.shift_s);
   worker.simulator.set_probe(probe_);
+  worker.simulator.set_steps(place.steps);
   if (!worker.simulator.SetParameters(place.values, recording)) return false;
   PlaceStart(worker, place);
   const RunResult run = worker.simulator.Run(recording, window.rows, worker.start, predicted);
@@ -161,7 +162,7 @@ double FitProblem::WindowCost(std::size_t window, const Eigen::VectorXd& residua
   return 0.5 * (huber_.Sum(residual) + windows_[window].prior.cwiseProduct(state).squaredNorm());
 }
 
-Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask) {
+Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask, StepKind steps) {
   const std::vector<double> values = Values(point);
   const double shift = Shift(point);
   std::vector<double> costs(windows_.size());
@@ -171,7 +172,7 @@ Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMa
     if (!mask.empty() && !mask[w]) return;
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
-    if (!Simulate(worker, {window, point, values, point.states[w], shift}, worker.base)) {
+    if (!Simulate(worker, {window, point, values, point.states[w], shift, steps}, worker.base)) {
       costs[w] = kInfinity;
       return;
     }

@@ -41,6 +41,9 @@ struct DifferenceOptions {
   // differences where the bounds allow: a pair of parameters that only acts as a ratio then has columns that are
   // parallel to rounding, which one-sided ones are not.
   enum class Columns { kAll, kStates, kCentral } columns = Columns::kAll;
+  // How the motions are made that differences are taken of. Costs and residuals are always those of the model's own
+  // steps.
+  StepKind steps = StepKind::kOwn;
   // Columns that are left zero: of y (empty: none), and the first ones of a window's state.
   std::vector<char> known = {};
   Eigen::Index known_states = 0;
@@ -50,6 +53,7 @@ struct DifferenceOptions {
 struct Derivatives {
   Residuals residuals;
   std::vector<Eigen::MatrixXd> jacobians;  // per window: y, then the window's state
+  Residuals quick;  // those that differences of quick steps are taken from; none where the model's own were needed
   bool valid = false;                      // false: the point cannot be simulated
   Work work;
 };
@@ -88,7 +92,7 @@ class FitProblem {
   double CostOfAnyVariance(double cost, const Eigen::VectorXd& y) const;
 
   // `mask`: windows that are left out cost nothing and have no residuals.
-  Evaluation Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask = {});
+  Evaluation Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask = {}, StepKind steps = StepKind::kOwn);
   // `base`: the point's residuals where they are known.
   Derivatives Differentiate(const FitPoint& point, const DifferenceOptions& options, Residuals base = {});
   // What that takes, beside the steps.
@@ -115,6 +119,7 @@ class FitProblem {
     const std::vector<double>& values;
     const Eigen::VectorXd& state;
     double shift_s;
+    StepKind steps = StepKind::kOwn;
   };
 
   Worker& GetWorker(int index);

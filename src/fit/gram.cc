@@ -5,7 +5,9 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
 
+#include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/fit/blocks.h"
 
@@ -33,7 +35,7 @@ StateFree TakeStateOut(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& st
   return {.rows = all.topRows(rows), .prior = all.bottomRows(m)};
 }
 
-// Columns [y | extra | residual] of one window, with robust weights.
+// Columns [y | extra | residual] of one window, with robust weights. `extra`: what they add to the residuals.
 StateFree WindowColumns(const FitProblem& problem, std::size_t w, const FitPoint& point, const Derivatives& at,
                         const std::vector<Residuals>& extra) {
   const Eigen::Index n = problem.layout().low.size(), m = point.states[w].size();
@@ -42,11 +44,25 @@ StateFree WindowColumns(const FitProblem& problem, std::size_t w, const FitPoint
   Eigen::MatrixXd columns(residual.size(), n + m + k);
   columns.leftCols(n) = at.jacobians[w].leftCols(n);
   columns.rightCols(m) = at.jacobians[w].rightCols(m);
-  for (Eigen::Index e = 0; e < k; ++e) columns.col(n + e) = extra[static_cast<std::size_t>(e)][w] - residual;
+  for (Eigen::Index e = 0; e < k; ++e) columns.col(n + e) = extra[static_cast<std::size_t>(e)][w];
   problem.huber().Weigh(residual, columns);
   Eigen::MatrixXd wanted(residual.size(), n + k + 1);
   wanted << columns.leftCols(n + k), residual;
   return TakeStateOut(wanted, columns.rightCols(m), problem.windows()[w].prior, point.states[w]);
+}
+
+// What the residuals at a point have beyond `base`; none: it cannot be simulated.
+std::optional<Residuals> Added(FitProblem& problem, const FitPoint& point, const Residuals& base, StepKind steps,
+                               Work* work) {
+  Evaluation there = problem.Evaluate(point, Keep::kResiduals, {}, steps);
+  *work += there.work;
+  if (!std::isfinite(there.cost)) return std::nullopt;
+  for (std::size_t w = 0; w < base.size(); ++w) there.residuals[w] -= base[w];
+  return std::move(there.residuals);
+}
+
+Residuals Zero(const Residuals& like) {
+  return Collect(like, [](const Eigen::VectorXd& of) { return Eigen::VectorXd(Eigen::VectorXd::Zero(of.size())); });
 }
 
 // Rows of all signals that lie in a block of rows.
@@ -87,14 +103,14 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
   if (!at.valid) return gram;
   std::vector<Residuals> others;
   for (const ExtraColumn& column : extra) {
+    const FitPoint there = CarryOver(parent, point, *column.child, column.values);
     column.child->SetProbe(column.probe);
-    Evaluation there = column.child->Evaluate(CarryOver(parent, point, *column.child, column.values), Keep::kResiduals);
+    std::optional<Residuals> added;
+    if (!at.quick.empty()) added = Added(*column.child, there, at.quick, StepKind::kQuick, &gram.work);
+    if (!added) added = Added(*column.child, there, at.residuals, StepKind::kOwn, &gram.work);
     column.child->SetProbe({});
-    gram.work += there.work;
-    const bool failed = !std::isfinite(there.cost);
-    if (failed) there.residuals = at.residuals;
-    gram.failed.push_back(static_cast<char>(failed));
-    others.push_back(std::move(there.residuals));
+    gram.failed.push_back(static_cast<char>(!added));
+    others.push_back(added ? std::move(*added) : Zero(at.residuals));
   }
   const std::size_t count = parent.windows().size();
   std::vector<std::vector<std::pair<RowBlock, Eigen::MatrixXd>>> parts(count);

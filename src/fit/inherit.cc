@@ -35,7 +35,7 @@ Derivatives Inherit(const FitProblem& from, const Derivatives& known, FitProblem
                     double step) {
   const std::vector<Eigen::Index> shared = SharedColumns(from, to);
   const Eigen::Index n = to.layout().low.size(), theirs = from.layout().low.size();
-  DifferenceOptions options{.step = step, .known = std::vector<char>(shared.size(), 0)};
+  DifferenceOptions options{.step = step, .steps = StepKind::kQuick, .known = std::vector<char>(shared.size(), 0)};
   for (std::size_t i = 0; i < shared.size(); ++i) options.known[i] = static_cast<char>(shared[i] >= 0);
   // States that only one of the two has come last: motor sides.
   const Eigen::Index states = known.jacobians.empty() ? 0 : known.jacobians.front().cols() - theirs;

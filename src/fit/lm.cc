@@ -33,8 +33,8 @@ class LmRun {
   }
 
  private:
-  double Cost(const FitPoint& point, Residuals* residuals) {
-    Evaluation evaluation = problem_.Evaluate(point, Keep::kResiduals);
+  double Cost(const FitPoint& point, Residuals* residuals, StepKind steps = StepKind::kOwn) {
+    Evaluation evaluation = problem_.Evaluate(point, Keep::kResiduals, {}, steps);
     s_.work += evaluation.work;
     *residuals = std::move(evaluation.residuals);
     return evaluation.cost;
@@ -102,7 +102,8 @@ FitPoint LmRun::BentStep(const Derivatives& derivatives, const Linearization& at
   for (std::size_t w = 0; w < probe.states.size(); ++w)
     probe.states[w] += share * (straight.states[w] - s_.point.states[w]);
   Residuals residuals;
-  if (!std::isfinite(Cost(probe, &residuals))) return straight;
+  // From what the Jacobian is of: a bend is a small difference beside it.
+  if (!std::isfinite(Cost(probe, &residuals, derivatives.quick.empty() ? StepKind::kOwn : StepKind::kQuick))) return straight;
   const Linearization bend = Bend(problem_, at, derivatives, s_.point, straight, {share, residuals});
   const Eigen::VectorXd correction = DampedStep(bend, straight);
   const auto length = [&](const Eigen::VectorXd& v) {
@@ -125,8 +126,10 @@ double LmRun::TryStep(const Derivatives& derivatives, const Linearization& at, c
 }
 
 void LmRun::Iterate() {
+  // What looks far ahead needs no exact motion; the bottom does.
   const DifferenceOptions differences{.step = s_.difference,
-                                      .columns = options_.central ? Columns::kCentral : Columns::kAll};
+                                      .columns = options_.central ? Columns::kCentral : Columns::kAll,
+                                      .steps = s_.difference > options_.fine_step ? StepKind::kQuick : StepKind::kOwn};
   s_.derivatives =
       std::make_shared<Derivatives>(problem_.Differentiate(s_.point, differences, std::move(s_.residuals)));
   Derivatives& derivatives = *s_.derivatives;

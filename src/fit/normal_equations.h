@@ -55,7 +55,7 @@ FitPoint Move(const FitProblem& problem, const FitPoint& point, const Linearizat
 void UpdateSecant(const FitProblem& problem, Derivatives& derivatives, const FitPoint& from, const FitPoint& to,
                   Residuals residuals);
 
-// The residuals a share of the way from one point to another.
+// The residuals a share of the way from one point to another, by the steps that the derivatives are of.
 struct Probe {
   double share;
   const Residuals& residuals;

@@ -257,6 +257,34 @@ TEST(FitProblemTest, SecantUpdateExplainsItsStep) {
   EXPECT_NEAR(Reduce(problem, to, snapshot, Blocks::kNone).cost, cost, 1e-12 * cost);
 }
 
+// Quick steps differ from the model's own by the order of an Euler step: their differences do, and costs not at all.
+TEST(QuickDifferencesTest, AreOffByAnEulerStep) {
+  const Rig rig = LoadRig("qube");
+  const auto command = [](double t) { return 1.5 * std::sin(6 * t + 2 * t * t); };
+  const std::vector<Recording> logs = {MakeLog(rig, rig.Values({{"arm.damping", 3e-4}}), command, 2, 0.004, 2e-3, 1)};
+  ThreadPool pool(1);
+  const auto off = [&](double step_s) {
+    FitProblem problem(*rig.model, logs,
+                       {.free = {rig.Index("motor.kt"), rig.Index("arm.damping")}, .time_step_s = step_s},
+                       rig.model->Nominal(), pool);
+    const FitPoint at = problem.Start();
+    const Derivatives own = problem.Differentiate(at, {.step = 0.03}),
+                      quick = problem.Differentiate(at, {.step = 0.03, .steps = StepKind::kQuick});
+    EXPECT_LT(quick.work.steps, own.work.steps / 2);
+    double difference = 0, size = 0;
+    for (std::size_t w = 0; w < problem.windows().size(); ++w) {
+      EXPECT_EQ(own.residuals[w], quick.residuals[w]) << w;
+      difference += (own.jacobians[w] - quick.jacobians[w]).squaredNorm();
+      size += own.jacobians[w].squaredNorm();
+    }
+    return std::sqrt(difference / size);
+  };
+  const double whole = off(0.004), half = off(0.002);
+  EXPECT_LT(whole, 0.05);
+  EXPECT_GT(whole, 1e-4);
+  EXPECT_NEAR(half / whole, 0.5, 0.1);
+}
+
 // A step of a linear problem does not bend; a product of two parameters does, as its second derivative says.
 TEST(BendTest, IsTheSecondDerivativeAlongTheStep) {
   const Rig rig = LoadCart();

@@ -98,8 +98,8 @@ TEST(InheritTest, SharedColumnsAreTakenAndNewOnesMade) {
   options.free.push_back(bench.truth.Index("coulomb_friction@arm.friction_n_m"));
   FitProblem child(*bench.truth.model, bench.logs, options, bench.truth.model->Nominal(), bench.pool);
   constexpr double kStep = 0.01;
-  const Derivatives known = parent.Differentiate(point, {.step = kStep}),
-                    full = child.Differentiate(child.Start(), {.step = kStep});
+  const DifferenceOptions quick{.step = kStep, .steps = StepKind::kQuick};
+  const Derivatives known = parent.Differentiate(point, quick), full = child.Differentiate(child.Start(), quick);
   const Derivatives inherited = Inherit(parent, known, child, child.Start(), kStep);
   ASSERT_TRUE(known.valid && full.valid && inherited.valid);
   // Without its friction the child is the parent: all columns are what differencing all of them gives.

@@ -139,9 +139,8 @@ Simulator::Simulator(const Model& model, double max_step_s)
 }
 
 void Simulator::set_steps(StepKind steps) {
-  const int own = model_.compiled().opt.integrator;
-  quick_ = steps == StepKind::kQuick && own == mjINT_RK4;
-  mujoco_->opt.integrator = quick_ ? mjINT_EULER : own;
+  quick_ = steps == StepKind::kQuick && model_.HasQuickSteps();
+  mujoco_->opt.integrator = quick_ ? mjINT_EULER : model_.compiled().opt.integrator;
 }
 
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {

@@ -33,7 +33,7 @@ struct InitialState {
 };
 
 // Each step as the model's integrator makes it, or by one evaluation (semi-implicit Euler) where that one makes four: a
-// third of the time, for differences of motions that are both made so.
+// third of the time, for differences of motions that are both made so (Model::HasQuickSteps).
 enum class StepKind { kOwn, kQuick };
 
 // The model's initial pose, at rest.

@@ -29,7 +29,7 @@ struct DiagnoseFlags {
   std::string from;
   SearchEffort effort = SearchEffort::kNormal;
   double budget_s = 0, window_s = 0;
-  bool resume = false;
+  bool resume = false, no_next_experiment = false;
 };
 
 // What each effect of the final model does along a log, beside what is missing without it.
@@ -171,7 +171,8 @@ Result<DiagnoseOptions> OptionsOf(const DiagnoseFlags& flags, const Experiment& 
                           .effort = flags.effort,
                           .window_s = flags.window_s > 0 ? flags.window_s : experiment.replay.window_s,
                           .seed = flags.common.seed,
-                          .resume = flags.resume};
+                          .resume = flags.resume,
+                          .next_experiment = !flags.no_next_experiment};
   for (const auto& text : flags.prior) {
     GS_ASSIGN(const auto assignment, ParseAssignment(text, "--prior"));
     options.priors.insert_or_assign(assignment.first, assignment.second);
@@ -256,6 +257,10 @@ Command DiagnoseCommand() {
        .more = fmt::format("Work is counted in simulated steps: 0.3, 1 and 4 times {} replays of the training windows",
                            kDiagnosePolicy.search.replays)},
       WindowOption(flags->window_s),
+      {.flag = "--no-next-experiment",
+       .value = &flags->no_next_experiment,
+       .help = "Design no next experiment",
+       .more = "Its inputs are simulated at every rival's model, which takes a good part of a short run"},
       {.flag = "--resume",
        .value = &flags->resume,
        .help = "Go on with the interrupted run in --out, to the same result",

@@ -12,6 +12,10 @@ namespace gapscope {
 namespace {
 
 constexpr int kRoughJacobians = 2, kJacobians = 8;  // of an imitation: each is a replay per parameter
+// Rivals are simulations that are compared with each other.
+constexpr StepKind kRivalSteps = StepKind::kQuick;
+
+Error TimeIsOver() { return {.what = "the time that was asked for is over", .where = "--budget"}; }
 
 // Library inputs made as large as all models' limits allow. An entry without a value keeps no limit at any amplitude.
 Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<const Hypothesis*>& models,
@@ -35,12 +39,13 @@ Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<cons
   }());
   std::vector<std::optional<InputScore>> sized(library.size());
   pool.ForEach(library.size(), [&](std::size_t i, int) {
+    if (IsLate(options.deadline)) return;
     const auto wave = SampleWaveform(library[i].wave, options.rehearsal.rate_hz);
     if (!wave.ok()) return;
     std::vector<std::unique_ptr<Simulator>> simulators;
     std::vector<ModelAndValues> trials;
     for (const Hypothesis* h : models) {
-      simulators.push_back(std::make_unique<Simulator>(*h->model, 0));
+      simulators.push_back(std::make_unique<Simulator>(*h->model, options.time_step_s));
       trials.push_back({h->model.get(), simulators.back().get(), h->values});
     }
     // One model after the other: most of them are content with what the one before allowed.
@@ -59,6 +64,7 @@ Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<cons
     sized[i] = std::move(score);
   });
   if (std::none_of(sized.begin(), sized.end(), [](const auto& s) { return s.has_value(); })) {
+    if (IsLate(options.deadline)) return TimeIsOver();
     return Error{.what = "no input of the library keeps the limits",
                  .where = experiment.path,
                  .cure = "see 'limits:', or give --duration"};
@@ -116,7 +122,8 @@ void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& optio
   score->per_target.clear();
   score->score = kInfinity;
   for (const Hypothesis& truth : rivals) {
-    Simulator simulator(*truth.model, 0);
+    Simulator simulator(*truth.model, options.time_step_s);
+    simulator.set_steps(kRivalSteps);
     const Rehearsal foretold = Rehearse(*truth.model, simulator, input, truth.values);
     for (const Hypothesis& imitation : rivals) {
       if (&truth == &imitation) continue;
@@ -126,7 +133,8 @@ void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& optio
       }
       const double distance =
           foretold.worst < kInfinity
-              ? ForetoldFit(imitation, foretold.recording, floors, options.window_s).Misfit(jacobians)
+              ? ForetoldFit(imitation, {foretold.recording, floors, options.window_s, options.time_step_s, kRivalSteps})
+                    .Misfit(jacobians)
               : kInfinity;
       // What cannot be simulated separates nothing.
       score->per_target.push_back(std::isfinite(distance) ? distance : 0);
@@ -174,7 +182,7 @@ Result<OptimalDesign> DesignForParameters(const Hypothesis& base, const std::vec
   pool.ForEach(sized.size(), [&](std::size_t i, int) {
     if (!sized[i]) return;
     const Recording& log = sized[i]->rehearsal.recording;
-    ForetoldFit fit(base, log, FloorsOf(log));
+    ForetoldFit fit(base, {log, FloorsOf(log), 0, options.time_step_s});
     const std::vector<double> deviations = fit.Deviations(wanted);
     if (deviations.empty()) {
       sized[i].reset();
@@ -207,15 +215,18 @@ Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<
   }
   GS_ASSIGN(auto sized, SizeInputs(models, options, pool));
   pool.ForEach(sized.size(), [&](std::size_t i, int) {
-    if (sized[i]) Separate(rivals, options, kRoughJacobians, &*sized[i]);
+    if (!sized[i]) return;
+    IsLate(options.deadline) ? sized[i].reset() : Separate(rivals, options, kRoughJacobians, &*sized[i]);
   });
   for (auto next = WorthRefining(sized, options.batch); !next.empty(); next = WorthRefining(sized, options.batch)) {
+    if (IsLate(options.deadline)) break;
     pool.ForEach(next.size(), [&](std::size_t i, int) {
       Separate(rivals, options, kJacobians, next[i]);
       next[i]->refined = true;
     });
   }
   SortByScore(sized, &design);
+  if (design.inputs.empty()) return TimeIsOver();
   return design;
 }
 

@@ -29,6 +29,8 @@ struct OptimalOptions {
   std::size_t batch = 2;
   std::vector<double> floors;  // per measured signal, SI; empty: FloorsOf
   double window_s = 0;         // rivals are compared in windows of this length; 0: in one run from rest
+  double time_step_s = 0;      // of every simulation; 0: each model's own
+  Deadline deadline;           // inputs that are not scored by then are left out
 };
 
 struct InputScore {

@@ -34,12 +34,14 @@ std::vector<double> WeightsOf(const Recording& log, std::size_t signals, const s
 
 double RowsPerReading(const Recording& log) { return std::max(1.0, kNoiseCorrelation_s / log.timeline.median_step_s); }
 
-FitOptions OptionsOf(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
-                     double window_s) {
+FitOptions OptionsOf(const Hypothesis& hypothesis, const ForetoldLog& foretold) {
+  const auto& [log, floors, window_s, time_step_s, steps] = foretold;
   const double half_sample_s = 0.5 * log.timeline.median_step_s;
   FitOptions options{.free = hypothesis.model->FreeParameters(),
                      .objective = ObjectiveKind::kFreeRun,
                      .start = WindowStart::kRest,
+                     .time_step_s = time_step_s,
+                     .steps = steps,
                      .fit_states = false,
                      .shift_range_s = half_sample_s,
                      .weights = WeightsOf(log, hypothesis.model->sources().size(), floors, RowsPerReading(log)),
@@ -77,12 +79,11 @@ std::vector<double> FloorsOf(const Recording& predicted) {
   return Collect(predicted.measured, [](const auto& measured) { return FloorOf(measured.spec, measured.values); });
 }
 
-ForetoldFit::ForetoldFit(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
-                         double window_s)
-    : rows_per_reading_(RowsPerReading(log)),
+ForetoldFit::ForetoldFit(const Hypothesis& hypothesis, const ForetoldLog& foretold)
+    : rows_per_reading_(RowsPerReading(foretold.log)),
       model_(hypothesis.model),
-      logs_(ScoredLog(log, floors)),
-      problem_(*model_, logs_, OptionsOf(hypothesis, log, floors, window_s), hypothesis.values, pool_) {}
+      logs_(ScoredLog(foretold.log, foretold.floors)),
+      problem_(*model_, logs_, OptionsOf(hypothesis, foretold), hypothesis.values, pool_) {}
 
 std::vector<double> ForetoldFit::Deviations(const std::vector<std::size_t>& wanted) {
   const Linearization at = Linearize(

@@ -25,15 +25,23 @@ std::vector<double> FloorsOf(const Recording& predicted);
 // Readings closer than this carry the same noise: sensors' noise is coloured.
 inline constexpr double kNoiseCorrelation_s = 0.01;
 
+// What an input is foretold to bring.
+struct ForetoldLog {
+  const Recording& log;
+  std::vector<double> floors;  // per signal of the log
+  double window_s = 0;
+  double time_step_s = 0;  // 0: the model's
+  StepKind steps = StepKind::kOwn;
+};
+
 // The fit of a model's free parameters to the scored signals of a log that begins at rest. Residuals are in floors, and
 // rows within the noise's correlation time count once. Nuisances: each position's zero, and the commands' shift within
 // half a sample; known beforehand: FitPolicy::known_share of base parameters, likewise zeros, and the shift. With
-// `window_s` above zero each window of that length begins where the log is, and its initial state is a nuisance too.
+// ForetoldLog::window_s above zero each window of that length begins where the log is, and its initial state is a
+// nuisance too.
 class ForetoldFit {
  public:
-  // `floors`: per signal of `log`.
-  ForetoldFit(const Hypothesis& hypothesis, const Recording& log, const std::vector<double>& floors,
-              double window_s = 0);
+  ForetoldFit(const Hypothesis& hypothesis, const ForetoldLog& foretold);
 
   FitProblem& problem() { return problem_; }
   // Cramer-Rao bound: standard deviation of each coordinate of the problem's space, in its own units, at the start. Of

@@ -180,8 +180,9 @@ Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement
 
 }  // namespace
 
-Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const std::vector<double>& noise,
-                           std::uint64_t seed, const Say& say) {
+Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const DescribeOptions& options,
+                           const Say& say) {
+  const auto& [noise, seed, next_experiment] = options;
   Diagnosis result;
   Judgement judgement = Judge(bench, found, say);
   const Candidate& base = *found.base;
@@ -217,8 +218,10 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const st
   const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(bench, chosen, *base.model);
-  say("designing the next experiment");
-  result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
+  if (next_experiment) {
+    say("designing the next experiment");
+    result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
+  }
   result.where = Locate(PredictHeldOut(bench, base), bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(predicted, bench.data.held_out, seed);
   result.cut = found.cut;

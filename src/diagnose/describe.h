@@ -7,9 +7,14 @@
 
 namespace gapscope {
 
-// `noise`: of each measured signal, SI. Which logs were fitted, and the time, are left to the caller.
-Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const std::vector<double>& noise,
-                           std::uint64_t seed, const Say& say);
+struct DescribeOptions {
+  const std::vector<double>& noise;  // of each measured signal, SI
+  std::uint64_t seed = 0;
+  bool next_experiment = true;  // design one
+};
+
+// Which logs were fitted, and the time, are left to the caller.
+Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const DescribeOptions& options, const Say& say);
 
 }  // namespace gapscope
 

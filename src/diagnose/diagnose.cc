@@ -249,18 +249,19 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   };
   const Workbench bench = make_bench(data, false);
   GS_ASSIGN(const auto found, Search(bench, !data.asked, say));
+  const DescribeOptions describe{noise, options.seed, options.next_experiment};
   Diagnosis result;
   if (!data.asked && found->uneven) {
     // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
     const DataSplit blocks = InWindows(data);
     const Workbench again = make_bench(blocks, true);
     GS_ASSIGN(const auto second, Search(again, false, say));
-    GS_ASSIGN(result, Describe(*second, again, noise, options.seed, say));
+    GS_ASSIGN(result, Describe(*second, again, describe, say));
     for (const auto& recording : blocks.train) result.train_logs.push_back(recording.log_path);
     result.held_out_logs = result.train_logs;
     result.split = blocks.how;
   } else {
-    GS_ASSIGN(result, Describe(*found, bench, noise, options.seed, say));
+    GS_ASSIGN(result, Describe(*found, bench, describe, say));
     for (const auto& recording : data.train) result.train_logs.push_back(recording.log_path);
     for (const auto& recording : data.held_out) result.held_out_logs.push_back(recording.log_path);
     result.split = data.how;

@@ -207,6 +207,7 @@ struct DiagnoseOptions {
   // what it led to is to be written first (DiagnosisJournal::Remove).
   std::string journal;
   bool resume = false;
+  bool next_experiment = true;  // design one
   std::function<void(const std::string&)> warn;
 };
 

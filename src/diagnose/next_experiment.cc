@@ -85,7 +85,11 @@ ForetoldMisfit MisfitOf(const InputScore& best, std::size_t explanations, double
 
 Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& bench, const std::vector<double>& noise) {
   NextExperiment next = question.next;
-  OptimalOptions options{.duration_s = kDiagnosePolicy.next.duration_s, .floors = noise, .window_s = bench.window_s};
+  OptimalOptions options{.duration_s = kDiagnosePolicy.next.duration_s,
+                         .floors = noise,
+                         .window_s = bench.window_s,
+                         .time_step_s = bench.time_step_s,
+                         .deadline = bench.deadline};
   Experiment experiment = bench.rig->experiment();
   GS_ASSIGN([[maybe_unused]] const std::size_t driven, DrivenCommand(experiment, {}));  // there is a command
   FillLimits(bench.data, options.margin, &experiment);

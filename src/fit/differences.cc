@@ -154,7 +154,7 @@ Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const
 Derivatives FitProblem::Differentiate(const FitPoint& point, const DifferenceOptions& options, Residuals base) {
   Derivatives result{.residuals = std::move(base), .work = {}};
   result.work = WorkOf(options, !result.residuals.empty());
-  if (options.steps == StepKind::kQuick) {
+  if (options.steps == StepKind::kQuick && options_.steps == StepKind::kOwn && model_.HasQuickSteps()) {
     Evaluation quick = Evaluate(point, Keep::kResiduals, {}, StepKind::kQuick);
     result.work += quick.work;
     if (std::isfinite(quick.cost)) result.quick = std::move(quick.residuals);

@@ -134,7 +134,7 @@ bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double
   predicted.resize(window.rows.rows() * recording.measured.size());
   worker.simulator.set_shift_s(place.shift_s);
   worker.simulator.set_probe(probe_);
-  worker.simulator.set_steps(place.steps);
+  worker.simulator.set_steps(options_.steps == StepKind::kQuick ? StepKind::kQuick : place.steps);
   if (!worker.simulator.SetParameters(place.values, recording)) return false;
   PlaceStart(worker, place);
   const RunResult run = worker.simulator.Run(recording, window.rows, worker.start, predicted);

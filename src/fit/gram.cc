@@ -106,7 +106,8 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
     const FitPoint there = CarryOver(parent, point, *column.child, column.values);
     column.child->SetProbe(column.probe);
     std::optional<Residuals> added;
-    if (!at.quick.empty()) added = Added(*column.child, there, at.quick, StepKind::kQuick, &gram.work);
+    if (!at.quick.empty() && column.child->model().HasQuickSteps())
+      added = Added(*column.child, there, at.quick, StepKind::kQuick, &gram.work);
     if (!added) added = Added(*column.child, there, at.residuals, StepKind::kOwn, &gram.work);
     column.child->SetProbe({});
     gram.failed.push_back(static_cast<char>(!added));

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "replay/simulator.h"
+
 namespace gapscope {
 
 struct LogWindow;
@@ -43,6 +45,7 @@ struct FitOptions {
   // TakenWindows of these options, where many problems on the same logs share them; null: chosen anew.
   std::shared_ptr<const std::vector<LogWindow>> windows;
   double time_step_s = 0;    // 0: the model's
+  StepKind steps = StepKind::kOwn;  // of all replays
   bool fit_offsets = true;   // zero offsets of measured positions, per log
   bool fit_shift = true;     // command shift within +-1 sample, common to all logs
   bool fit_states = true;    // initial state of each window

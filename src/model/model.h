@@ -78,6 +78,8 @@ class Model {
   const std::vector<int>& memories() const { return memories_; }
   // {joint, joint that it starts with}: unmeasured joints that an effect added.
   const std::vector<std::pair<int, int>>& mirrored_joints() const { return mirrored_; }
+  // Whether quick steps (StepKind) are another thing than its own: two bodies on a stiff link always take their own.
+  bool HasQuickSteps() const { return compiled().opt.integrator == mjINT_RK4 && mirrored_.empty(); }
 
   // The tuned MJCF with its plugin elements: loads in any MuJoCo with the plugin library. `values` as Nominal(),
   // `log_values` of one log.

@@ -198,7 +198,7 @@ TEST(OptimalTest, SeparatingInputMovesWhereTheRivalsDiffer) {
   // In windows that begin where the log is, a bias has less time to bend the motion than over the whole log.
   Simulator simulator(*rivals[1].model, 0);
   const Recording log = Rehearse(*rivals[1].model, simulator, best.rehearsal.recording, rivals[1].values).recording;
-  const double in_windows = ForetoldFit(base, log, FloorsOf(log), 0.5).Misfit(4);
+  const double in_windows = ForetoldFit(base, {log, FloorsOf(log), 0.5}).Misfit(4);
   EXPECT_GT(in_windows, 0);
   EXPECT_LT(in_windows, 0.5 * best.score);
   // The command makes the same input.

@@ -46,7 +46,7 @@ struct Cart {
 TEST(ForetoldFitTest, DeviationIsTheCartsClosedForm) {
   for (const double amplitude : {0.01, 1.0}) {
     const Cart cart(amplitude);
-    ForetoldFit fit(cart.With(1.5), cart.Log(), {kFloor_m});
+    ForetoldFit fit(cart.With(1.5), {cart.Log(), {kFloor_m}});
     const Coordinate& gain = fit.problem().space().coordinates().front();
     ASSERT_EQ(fit.Deviations({0}).size(), 1u);
     EXPECT_NEAR(fit.Deviations({0})[0] * gain.scale / cart.Deviation(), 1, kTolerance) << amplitude;
@@ -56,7 +56,7 @@ TEST(ForetoldFitTest, DeviationIsTheCartsClosedForm) {
 // What an input does not show is known to lie within its bounds, and nothing else.
 TEST(ForetoldFitTest, WhatStandsStillIsKnownByItsBounds) {
   const Cart cart(0);
-  ForetoldFit fit(cart.With(1.5), cart.Log(), {kFloor_m});
+  ForetoldFit fit(cart.With(1.5), {cart.Log(), {kFloor_m}});
   const Coordinate& gain = fit.problem().space().coordinates().front();
   EXPECT_NEAR(fit.Deviations({0})[0], gain.high - gain.low, kTolerance * (gain.high - gain.low));
 }
@@ -66,14 +66,14 @@ TEST(ForetoldFitTest, WhatStandsStillIsKnownByItsBounds) {
 TEST(ForetoldFitTest, AnotherGainIsImitated) {
   const Cart cart(1);
   const std::vector<double> floors = {kFloor_m};
-  EXPECT_LT(ForetoldFit(cart.With(1.5), cart.Log(), floors).Misfit(1), 1e-9);
+  EXPECT_LT(ForetoldFit(cart.With(1.5), {cart.Log(), floors}).Misfit(1), 1e-9);
   const Hypothesis other = cart.With(12);
   const std::vector<double> far = CartMotion(12 - 1.5, 0, 0, cart.command);
   double square = 0;
   for (std::size_t k = 1; k < far.size(); ++k) square += far[k] * far[k] / (kFloor_m * kFloor_m);
   const double before = std::sqrt(square / static_cast<double>(far.size() - 1));
-  EXPECT_NEAR(ForetoldFit(other, cart.Log(), floors).Misfit(0) / before, 1, 1e-6);
-  EXPECT_LT(ForetoldFit(other, cart.Log(), floors).Misfit(2), 1e-3 * before);
+  EXPECT_NEAR(ForetoldFit(other, {cart.Log(), floors}).Misfit(0) / before, 1, 1e-6);
+  EXPECT_LT(ForetoldFit(other, {cart.Log(), floors}).Misfit(2), 1e-3 * before);
 }
 
 TEST(FloorTest, OfEachKindOfSignal) {

@@ -41,6 +41,7 @@ class ResumeTest : public ::testing::Test {
     options.window_s = 0.3;
     options.replay_steps = 60;  // two windows
     options.sample_s = 0.01;
+    options.next_experiment = false;  // no part of the journal
     options.warn = [this](const std::string& text) { warnings_ += text + "\n"; };
     return Diagnose(experiment_, SplitData({log_}, {}), options, pool);
   }

@@ -92,7 +92,8 @@ class Attempt {
       };
       double severity = request_.severity;
       if (severity <= 0) {
-        const double target = random_->LogUniform(kLowestRatio, kHighestRatio);
+        // An effect of one joint shows in one of the angles, all of which share a figure.
+        const double target = random_->LogUniform(kLowestRatio, kHighestRatio / std::sqrt(c_->base.count()));
         const Search found = Find(about_base, plant_at, target, range);
         if (found.severity <= 0 || found.gap.refit < kWeakest * kLowestRatio) return false;
         severity = found.severity;
@@ -112,6 +113,8 @@ class Attempt {
 
   bool DrawRoughness(const ArmRetuning& about_base) {
     const auto motions = ArmJointMotions(c_->base, c_->logs);
+    // All joints together as rough as the two of the other rigs.
+    const double share = std::sqrt(2.0 / c_->base.count());
     c_->roughness.clear();
     for (int j = 0; j < c_->base.count(); ++j) {
       const Rough unit = DrawRough(motions[j], kUnitRough * motions_[j].torque_rms_n_m, random_);
@@ -122,10 +125,10 @@ class Attempt {
         plant.joints[j].rough.scale_n_m *= severity;
         return plant;
       };
-      const double target = random_->LogUniform(kLowestRough, kHighestRough);
+      const double target = share * random_->LogUniform(kLowestRough, kHighestRough);
       const Search found = Find(about_base, plant_at, target, ArmRange{});
-      if (found.severity <= 0 || found.gap.refit < kWeakest * kLowestRough) return false;
-      if (found.gap.refit > 1.5 * kHighestRough) return false;
+      if (found.severity <= 0 || found.gap.refit < kWeakest * share * kLowestRough) return false;
+      if (found.gap.refit > 1.5 * share * kHighestRough) return false;
       Label::Roughness rough;
       rough.on = ArmLinks(c_->base.rig)[static_cast<std::size_t>(j)].joint;
       rough.rough = plant_at(found.severity).joints[j].rough;

@@ -111,7 +111,7 @@ std::vector<ArmRange> ArmEffectsOf(ArmRig rig) {
   add("payload", ArmPlace::kBody, joints - 1);
   list.back().highest = 18;  // 3.6 times the last body's mass
   add("mount_tilt", ArmPlace::kModel, 0);
-  list.back().highest = 15;  // 0.23 rad
+  list.back().highest = 27;  // 0.4 rad
   return list;
 }
 

@@ -121,9 +121,9 @@ bool DrawArmEffect(ArmRig rig, const std::string& wanted, Random* random, ArmRan
   std::vector<ArmRange> fitting;
   std::vector<std::string> names;
   for (const ArmRange& range : ArmEffectsOf(rig)) {
-    if ((!name.empty() && range.choice.name != name) || (!on.empty() && ArmPlaceName(rig, range.choice) != on)) {
-      continue;
-    }
+    const bool wrong = (!name.empty() && range.choice.name != name) ||
+                       (!on.empty() && ArmPlaceName(rig, range.choice) != on) || (on.empty() && range.only_asked());
+    if (wrong) continue;
     fitting.push_back(range);
     if (std::find(names.begin(), names.end(), range.choice.name) == names.end()) names.push_back(range.choice.name);
   }

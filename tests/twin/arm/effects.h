@@ -29,6 +29,8 @@ std::string ArmPlaceName(ArmRig rig, const ArmChoice& choice);
 struct ArmRange {
   ArmChoice choice;
   double lowest = 0.01, highest = 10;  // severities that make sense
+  // A log that is late as a whole is one whose targets are: made where it is asked for, by name and place, never drawn.
+  bool only_asked() const { return choice.place == ArmPlace::kSignal && choice.joint == kAllJoints; }
 };
 std::vector<ArmRange> ArmEffectsOf(ArmRig rig);
 // One of them, with a seed of its shape: of that NAME or NAME@ON where it is not empty. False: there is none such.

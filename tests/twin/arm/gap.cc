@@ -99,7 +99,7 @@ Eigen::VectorXd ArmRetuning::Predicted(const Window& window, const ArmPlant& pla
     simulator.Nudge(nudge / 2, nudge % 2 == 0 ? kNudge_rad : 0, nudge % 2 == 0 ? 0 : kNudge_rad_per_s);
   }
   const double h = simulator.step_s(), begin = simulator.time_s();
-  AngleHistory history;
+  JointHistory history;
   history.Push(simulator.q());
   Eigen::VectorXd y(Count(window.rows.size()) * joints_);
   for (std::size_t i = 0; i < window.rows.size(); ++i) {

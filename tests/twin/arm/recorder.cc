@@ -98,7 +98,7 @@ ArmLog DrawArmLog(const ArmPlant& plant, int kind, Random* random) {
 
 }  // namespace
 
-double AngleHistory::At(int joint, double step) const {
+double JointHistory::At(int joint, double step) const {
   const double at = std::clamp(step, 0.0, static_cast<double>(past_.size() - 1));
   const auto low = static_cast<std::size_t>(at);
   const auto high = std::min(low + 1, past_.size() - 1);
@@ -137,6 +137,10 @@ class ArmRecorder {
     }
     late_ = std::any_of(plant.joints.begin(), plant.joints.end(),
                         [](const ArmJoint& joint) { return joint.sensor_delay_s > 0; });
+    const auto least =
+        std::min_element(plant.joints.begin(), plant.joints.end(),
+                         [](const ArmJoint& a, const ArmJoint& b) { return a.sensor_delay_s < b.sensor_delay_s; });
+    log_late_s_ = least->sensor_delay_s;
     record_.names = ColumnNames(plant.rig, log.torque_columns);
   }
 
@@ -147,7 +151,7 @@ class ArmRecorder {
       Row(k, k > 0 && k + 1 < rows && draws_.Chance(log_.dropped_share), k + 1 == rows);
       for (int i = 0; i < substeps_; ++i) {
         simulator_.Step(commands_);
-        if (late_) history_.Push(simulator_.q());
+        if (late_) Remember();
       }
     }
     return std::move(record_);
@@ -170,7 +174,12 @@ class ArmRecorder {
     const auto steps = static_cast<int>(std::llround(kSettle_s / simulator_.step_s()));
     for (int i = 0; i < steps; ++i) simulator_.Step(still);
     simulator_.SetTime(0);
+    Remember();
+  }
+
+  void Remember() {
     history_.Push(simulator_.q());
+    torque_history_.Push(simulator_.estimate_n_m());
   }
 
   // What the sensors show at row k, and what is sent there. A missed tick is no row, and the arm keeps the old targets.
@@ -190,7 +199,8 @@ class ArmRecorder {
     for (int j = 0; j < plant_.count(); ++j) row.push_back(encoders_[j].Read(shown[j]));
     for (int j = 0; j < plant_.count(); ++j) {
       const double noise = sensors_.torque_noise * ArmLinks(plant_.rig)[j].rated_n_m * noise_.Normal();
-      const double estimate = simulator_.estimate_n_m()[j];
+      const double late = log_late_s_ / simulator_.step_s(), now = t / simulator_.step_s();
+      const double estimate = late > 0 ? torque_history_.At(j, now - late) : simulator_.estimate_n_m()[j];
       if (log_.torque_columns) row.push_back(options_.noise ? Rounded(estimate + noise, kTorqueQuantum) : estimate);
     }
     if (missed) return;
@@ -222,8 +232,9 @@ class ArmRecorder {
   ArmSimulator simulator_;
   ArmCommands commands_;
   std::vector<Encoder> encoders_;
-  AngleHistory history_;
+  JointHistory history_, torque_history_;
   bool late_ = false;
+  double log_late_s_ = 0;  // all sensors are late alike: the log is, torques too
   double next_snapshot_s_ = 0;
   ArmRecord record_;
 };

@@ -47,10 +47,10 @@ struct ArmRecord {
   std::vector<std::size_t> snapshot_rows;
 };
 
-// The angles of the past at every substep, for late sensors.
-class AngleHistory {
+// Angles or torques of the past at every substep, for late sensors.
+class JointHistory {
  public:
-  void Push(const JointVector& q_rad) { past_.push_back(q_rad); }
+  void Push(const JointVector& values) { past_.push_back(values); }
   // `step`: substeps since the first push, fractions included; held at both ends.
   double At(int joint, double step) const;
 

@@ -56,11 +56,15 @@ TEST(ArmRecorderTest, LateTargetsAndLateSensorsShiftTheLog) {
   ArmPlant plant = NominalArm(ArmRig::kArm2), late = plant, seen_late = plant;
   for (ArmJoint& joint : late.joints) joint.drive.command_delay_s = 0.02;
   for (ArmJoint& joint : seen_late.joints) joint.sensor_delay_s = 0.02;
-  const ArmLog log = ShortLogs(plant, 2)[0];
-  const ArmRecord on_time = Exact(plant, log);
+  ArmLog log = ShortLogs(plant, 2)[0];
+  log.torque_columns = true;
+  const ArmRecord on_time = Exact(plant, log), later = Exact(seen_late, log);
   EXPECT_GT(LargestChange(on_time, Exact(late, log)), 1e-3);
   EXPECT_LT(LargestChange(on_time, Exact(late, log), 4), 1e-4);  // of rest, which is never quite reached
-  EXPECT_LT(LargestChange(on_time, Exact(seen_late, log), 4), 1e-12);
+  EXPECT_LT(LargestChange(on_time, later, 4), 1e-12);
+  const std::size_t torque = on_time.names.size() - 1;  // a log that is late as a whole
+  EXPECT_NEAR(later.rows[104][torque], on_time.rows[100][torque], 1e-9);
+  EXPECT_GT(std::abs(later.rows[104][torque] - on_time.rows[104][torque]), 1e-3);
 }
 
 TEST(ArmRecorderTest, CoarseStepsFollowFineOnesBesideDryFriction) {

@@ -125,14 +125,20 @@ Peaks PeaksOf(const Plant& plant, const LogSpec& log) {
   return peaks;
 }
 
+Sensor DrawSensor(Random* random) {
+  Sensor sensor;
+  sensor.offset_rad = random->Uniform(-0.01, 0.01);
+  sensor.white_rad = random->LogUniform(3e-5, 5e-4);
+  sensor.coloured_rad = random->LogUniform(3e-5, 7e-4);
+  sensor.colour_time_s = random->LogUniform(0.004, 0.06);
+  return sensor;
+}
+
 Sensors DrawSensors(Rig rig, Random* random) {
   Sensors sensors;
   for (int s = 0; s < SignalCount(rig); ++s) {
     Sensor& sensor = sensors.angle[static_cast<std::size_t>(s)];
-    sensor.offset_rad = random->Uniform(-0.01, 0.01);
-    sensor.white_rad = random->LogUniform(3e-5, 5e-4);
-    sensor.coloured_rad = random->LogUniform(3e-5, 7e-4);
-    sensor.colour_time_s = random->LogUniform(0.004, 0.06);
+    sensor = DrawSensor(random);
     double counts = 4096;
     if (rig == Rig::kJoint) counts = std::exp2(random->Integer(14, 16));
     if (rig == Rig::kQube) counts = 2048;

@@ -34,6 +34,7 @@ struct LogStyle {
   Envelope envelope{};
 };
 
+Sensor DrawSensor(Random* random);  // all but its resolution
 Sensors DrawSensors(Rig rig, Random* random);
 // Base parameters within their spread.
 Base DrawBase(Rig rig, Random* random);

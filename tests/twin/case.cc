@@ -198,6 +198,18 @@ Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& r
   const std::array<double, 2> floor = {sensors.angle[0].Floor(), sensors.angle[1].Floor()};
   const auto directions = BaseDirections(reference.rig);
   const Envelope tolerable = Tolerable(reference.rig);
+  const auto gap_at = [&](double severity) -> std::optional<Gap> {
+    const Plant plant = plant_at(severity);
+    const bool calm =
+        std::all_of(logs.begin(), logs.end(), [&](const LogSpec& l) { return PeaksOf(plant, l).Within(tolerable); });
+    if (!calm) return std::nullopt;
+    return MeasureGap(CoarseRecords(plant, logs, sensors, options), reference, floor, directions, true, options);
+  };
+  return SearchSeverity(gap_at, target, lowest, highest);
+}
+
+Search SearchSeverity(const std::function<std::optional<Gap>(double)>& gap_at, double target, double lowest,
+                      double highest) {
   Search best;
   double closest = kNever;
   double low = std::log(lowest), high = std::log(highest);
@@ -205,13 +217,9 @@ Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& r
   double low_ratio = 0, high_ratio = 0;  // logarithms, once known
   bool low_known = false, high_known = false;
   for (int i = 0; i < 8; ++i) {
-    const Plant plant = plant_at(std::exp(at));
-    const bool calm =
-        std::all_of(logs.begin(), logs.end(), [&](const LogSpec& l) { return PeaksOf(plant, l).Within(tolerable); });
-    Gap gap;
-    if (calm)
-      gap = MeasureGap(CoarseRecords(plant, logs, sensors, options), reference, floor, directions, true, options);
-    const double distance = calm && gap.Finite() ? std::abs(std::log(std::max(gap.refit, 1e-9) / target)) : kNever;
+    const std::optional<Gap> measured = gap_at(std::exp(at));
+    const Gap gap = measured.value_or(Gap());
+    const double distance = measured && gap.Finite() ? std::abs(std::log(std::max(gap.refit, 1e-9) / target)) : kNever;
     if (distance < closest) {
       closest = distance;
       best = {std::exp(at), gap, distance < std::log(1.25)};

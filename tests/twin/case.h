@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -85,6 +86,9 @@ struct Search {
   Gap gap;
   bool reached = false;  // the ratio is within a quarter of the target
 };
+// Severity between those whose gap is `target` floors after refit; no gap: what nobody would tolerate, so too severe.
+Search SearchSeverity(const std::function<std::optional<Gap>(double)>& gap_at, double target, double lowest,
+                      double highest);
 // Severity at which plant_at(severity) differs from `reference` by `target` floors after refit; plants beyond what the
 // rig tolerates count as too severe.
 Search FindSeverity(const std::function<Plant(double)>& plant_at, const Plant& reference,
@@ -106,6 +110,21 @@ struct Listed {
 // Draws `count` effects, logs for them and severities. False with a text in `problem` when there are none such.
 bool DrawListed(const CaseRequest& request, int count, Random* random, Case* c, Listed* drawn, std::string* problem);
 constexpr double kLowestRatio = 3, kHighestRatio = 100;  // floors after refit
+
+// What a rough case of the mix holds: effects of the list, or a cause outside it.
+struct Mix {
+  int effects = 0;
+  bool outside = false;
+};
+Mix DrawMix(const CaseRequest& request, Random* random);
+constexpr double kLowestRough = 1.5, kHighestRough = 60;  // floors after refit, of each joint's roughness alone
+constexpr double kUnitRough = 0.1;                        // of the joint's torque, root mean square: severity one
+constexpr double kPause_s = 4;                            // between two logs
+constexpr int kTorques = 12;                              // of the oracle, on every joint
+// Of an effect that leaves `refit` floors: what is left beside random torques, and whether it stands clear of roughness
+// that leaves `rough_refit`.
+double BesideTorques(double refit, const Trace& trace);
+bool StandsClear(double refit, double beside_torques, double rough_refit);
 
 // case_outside.cc, case_ambiguous.cc, case_rough.cc.
 std::vector<std::string> OutsideNames();

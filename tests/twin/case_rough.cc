@@ -9,22 +9,7 @@ namespace gapscope::twin {
 namespace {
 
 constexpr int kTries = 12;
-constexpr double kLowestRough = 1.5, kHighestRough = 60;  // floors after refit, of each joint's roughness alone
-constexpr double kUnit = 0.1;                             // of the joint's torque, root mean square: severity one
-constexpr double kPause_s = 4;                            // between two logs
-constexpr int kTorques = 12;                              // of the oracle, on every joint
 constexpr double kBeside = 1.5, kLeastShare = 0.5;
-
-// What a case of the mix holds: effects of the list, or a cause outside it.
-struct Mix {
-  int effects = 0;
-  bool outside = false;
-};
-Mix DrawMix(const CaseRequest& request, Random* random) {
-  const double u = random->Unit();
-  if (!request.effect.empty()) return {1, false};
-  return u < 0.20 ? Mix{0, false} : u < 0.30 ? Mix{0, true} : u < 0.65 ? Mix{1} : u < 0.90 ? Mix{2} : Mix{3};
-}
 
 // The laws are taken out over the plant's own motion, which the torque itself changes a little.
 void Settle(const std::vector<LogSpec>& logs, Plant* plant) {
@@ -38,7 +23,7 @@ void Settle(const std::vector<LogSpec>& logs, Plant* plant) {
 bool DrawOnJoint(std::size_t joint, const Motion& motion, const std::array<JointMotion, 2>& motions, Random* random,
                  Case* c, std::array<Rough, 2>* drawn) {
   const double torque = joint == 0 ? motion.torque_rms_n_m : motion.torque2_rms_n_m;
-  const Rough unit = DrawRough(motions[joint], kUnit * torque, random);
+  const Rough unit = DrawRough(motions[joint], kUnitRough * torque, random);
   if (!unit.Any()) return false;
   const double target = random->LogUniform(kLowestRough, kHighestRough);
   const auto plant_at = [&](double severity) {
@@ -127,10 +112,8 @@ void JudgeClear(const Listed& drawn, const std::vector<Record>& given, const Gap
   for (std::size_t j = 0; j < c->roughness.size(); ++j) c->roughness[j].refit = traces[c->effects.size() + j].refit;
   for (std::size_t i = 0; i < c->effects.size(); ++i) {
     EffectLabel& e = c->effects[i];
-    const double refit = e.gap.refit;
-    e.beside_torques = traces[i].refit > 0 ? refit * std::min(1.0, traces[i].beside / traces[i].refit) : 0;
-    e.clear = refit >= std::max(kLowestRatio, c->rough_refit) &&
-              e.beside_torques >= std::max(kBeside, std::min(kLeastShare * refit, c->rough_refit));
+    e.beside_torques = BesideTorques(e.gap.refit, traces[i]);
+    e.clear = StandsClear(e.gap.refit, e.beside_torques, c->rough_refit);
   }
 }
 
@@ -179,6 +162,21 @@ bool DrawCase(const CaseRequest& request, const Mix& mix, Random* random, Case* 
 }
 
 }  // namespace
+
+Mix DrawMix(const CaseRequest& request, Random* random) {
+  const double u = random->Unit();
+  if (!request.effect.empty()) return {1, false};
+  return u < 0.20 ? Mix{0, false} : u < 0.30 ? Mix{0, true} : u < 0.65 ? Mix{1} : u < 0.90 ? Mix{2} : Mix{3};
+}
+
+double BesideTorques(double refit, const Trace& trace) {
+  return trace.refit > 0 ? refit * std::min(1.0, trace.beside / trace.refit) : 0;
+}
+
+bool StandsClear(double refit, double beside_torques, double rough_refit) {
+  return refit >= std::max(kLowestRatio, rough_refit) &&
+         beside_torques >= std::max(kBeside, std::min(kLeastShare * refit, rough_refit));
+}
 
 bool MakeRough(const CaseRequest& request, Random* random, Case* c, std::string* problem) {
   const Mix mix = DrawMix(request, random);

@@ -7,9 +7,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kParameterSpread = 0.2;  // relative
-constexpr double kOffsetSpread_rad = 0.02, kDelaySpread_s = 5e-4;
-
 // Angles of one window at its sampled rows, signals interleaved.
 class Window {
  public:
@@ -139,8 +136,7 @@ class Retuning {
       const auto i = static_cast<std::size_t>(k);
       local.col(k) = (window.Predicted(center_, commands_, kNudges[i]) - y).cwiseProduct(weight);
     }
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(local);
-    Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(local.rows(), local.cols());
+    Eigen::MatrixXd basis = BasisOf(local);
     global -= basis * (basis.transpose() * global);
     return {std::move(global), std::move(basis)};
   }
@@ -174,6 +170,42 @@ std::vector<Direction> BaseDirections(Rig rig) {
     const auto field = p.field;
     list.push_back({[field](Plant* plant, double x) { plant->base.*field *= std::exp(x); }, 0.02,
                     p.relative_spread < 0.1 ? p.relative_spread : kParameterSpread});
+  }
+  return list;
+}
+
+Eigen::MatrixXd BasisOf(const Eigen::MatrixXd& columns) {
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), columns.cols());
+}
+
+Leftover::Leftover(Eigen::Index columns, Eigen::Index changes) : normal_(Eigen::MatrixXd::Zero(columns, columns)) {
+  NewChanges(changes);
+}
+
+void Leftover::NewChanges(Eigen::Index changes) {
+  samples_ = 0;
+  left_ = Eigen::VectorXd::Zero(changes);
+  right_ = Eigen::MatrixXd::Zero(normal_.rows(), changes);
+}
+
+void Leftover::AddChanges(const Eigen::MatrixXd& global, const Eigen::MatrixXd& basis, double samples,
+                          Eigen::MatrixXd change) {
+  change -= basis * (basis.transpose() * change);
+  samples_ += samples;
+  left_ += change.colwise().squaredNorm().transpose();
+  right_ += global.transpose() * change;
+}
+
+std::vector<Trace> Leftover::Solve(Eigen::Index beside) const {
+  const Eigen::Index alone = normal_.rows() - beside;
+  const Eigen::MatrixXd right_alone = right_.bottomRows(alone);
+  const Eigen::MatrixXd best = normal_.ldlt().solve(right_);
+  const Eigen::MatrixXd best_alone = normal_.bottomRightCorner(alone, alone).ldlt().solve(right_alone);
+  std::vector<Trace> list;
+  for (Eigen::Index i = 0; i < left_.size(); ++i) {
+    list.push_back({Root(left_[i] - right_alone.col(i).dot(best_alone.col(i)), samples_),
+                    Root(left_[i] - right_.col(i).dot(best.col(i)), samples_)});
   }
   return list;
 }
@@ -226,11 +258,8 @@ std::vector<Trace> MeasureTraces(const std::vector<Record>& records, const Plant
   std::vector<Direction> all = beside;  // first, so that the rest can stand alone
   all.insert(all.end(), directions.begin(), directions.end());
   Retuning retuning(plant, all);
-  const Eigen::Index columns = retuning.count(), alone = columns - static_cast<Eigen::Index>(beside.size());
   const auto traces = static_cast<Eigen::Index>(others.size()) + 1;
-  double count = 0;
-  Eigen::VectorXd left = Eigen::VectorXd::Zero(traces);
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns), right = Eigen::MatrixXd::Zero(columns, traces);
+  Leftover leftover(retuning.count(), traces);
   for (const Record& record : records) {
     retuning.Receive(record);
     for (std::size_t w = 0; w < record.snapshots.size(); ++w) {
@@ -244,24 +273,13 @@ std::vector<Trace> MeasureTraces(const std::vector<Record>& records, const Plant
         const Plant& other = others[static_cast<std::size_t>(i)];
         change.col(i) = (y - window.Predicted(other, Received(record, other), {})).cwiseProduct(weight);
       }
-      count += static_cast<double>((weight.array() > 0).count());
       const auto [global, basis] = retuning.In(window, y, weight);
-      change -= basis * (basis.transpose() * change);
-      left += change.colwise().squaredNorm().transpose();
-      normal += global.transpose() * global;
-      right += global.transpose() * change;
+      leftover.AddColumns(global);
+      leftover.AddChanges(global, basis, static_cast<double>((weight.array() > 0).count()), std::move(change));
     }
   }
-  retuning.AddPriors(&normal);
-  const Eigen::MatrixXd right_alone = right.bottomRows(alone);
-  const Eigen::MatrixXd best = normal.ldlt().solve(right);
-  const Eigen::MatrixXd best_alone = normal.bottomRightCorner(alone, alone).ldlt().solve(right_alone);
-  std::vector<Trace> list;
-  for (Eigen::Index i = 0; i < traces; ++i) {
-    list.push_back({Root(left[i] - right_alone.col(i).dot(best_alone.col(i)), count),
-                    Root(left[i] - right.col(i).dot(best.col(i)), count)});
-  }
-  return list;
+  retuning.AddPriors(leftover.normal());
+  return leftover.Solve(static_cast<Eigen::Index>(beside.size()));
 }
 
 Gap FitRival(const std::vector<Record>& records, const std::array<double, 2>& floor_rad,

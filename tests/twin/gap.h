@@ -6,6 +6,7 @@
 #ifndef GAPSCOPE_TESTS_TWIN_GAP_H_
 #define GAPSCOPE_TESTS_TWIN_GAP_H_
 
+#include <Eigen/Dense>
 #include <array>
 #include <functional>
 #include <vector>
@@ -16,10 +17,14 @@
 namespace gapscope::twin {
 
 // One thing a retuning may change: move(plant, step * x), x about N(0, (spread / step)^2).
-struct Direction {
-  std::function<void(Plant*, double)> move;
+template <class P>
+struct DirectionOf {
+  std::function<void(P*, double)> move;
   double step, spread;
 };
+using Direction = DirectionOf<Plant>;
+// Deviations that a retuning allows itself: of an offset of each signal, of a delay; of a base parameter, relative.
+inline constexpr double kOffsetSpread_rad = 0.02, kDelaySpread_s = 5e-4, kParameterSpread = 0.2;
 // The free base parameters, relative moves with the contract's spread.
 std::vector<Direction> BaseDirections(Rig rig);
 
@@ -50,6 +55,29 @@ std::vector<Trace> MeasureTraces(const std::vector<Record>& records, const Plant
                                  const std::vector<Plant>& others, const std::array<double, 2>& floor_rad,
                                  const std::vector<Direction>& directions, const std::vector<Direction>& beside,
                                  const GapOptions& options);
+
+// An orthonormal basis of the columns' span: what a window's own initial state explains.
+Eigen::MatrixXd BasisOf(const Eigen::MatrixXd& columns);
+
+// What columns that all windows share leave of changes, summed window by window. The first `beside` columns may be left
+// out of a solution.
+class Leftover {
+ public:
+  Leftover(Eigen::Index columns, Eigen::Index changes);
+  // Sums over the windows stay as they are for the columns; the changes are of others from here on.
+  void NewChanges(Eigen::Index changes);
+  void AddColumns(const Eigen::MatrixXd& global) { normal_ += global.transpose() * global; }
+  // `change`, one a column and in floors, loses its part in `basis`.
+  void AddChanges(const Eigen::MatrixXd& global, const Eigen::MatrixXd& basis, double samples, Eigen::MatrixXd change);
+  Eigen::MatrixXd* normal() { return &normal_; }
+  // Root mean squares that are left of each change, by all but the first `beside` columns and by all.
+  std::vector<Trace> Solve(Eigen::Index beside) const;
+
+ private:
+  double samples_ = 0;
+  Eigen::VectorXd left_;
+  Eigen::MatrixXd normal_, right_;
+};
 
 // Moves `rival` along the directions until its gap is least (damped Gauss-Newton); returns that gap.
 Gap FitRival(const std::vector<Record>& records, const std::array<double, 2>& floor_rad,

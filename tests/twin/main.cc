@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/twin/arm/case.h"
 #include "tests/twin/case.h"
 #include "tests/twin/output.h"
 
@@ -120,6 +121,27 @@ bool DriveBy(const std::string& path, Case* c, std::string* problem) {
   return true;
 }
 
+// Records of any rig as files, and the label where one is asked for.
+template <class R>
+int Write(const Options& o, const std::vector<R>& records, const Label& label) {
+  std::string problem;
+  std::vector<std::string> files;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    files.push_back("log_" + std::to_string(i) + ".csv");
+    const std::string text = CsvText(records[i].names, records[i].rows);
+    if (!WriteText(o.out + "/" + files.back(), text, &problem)) return Fail(problem);
+  }
+  if (!o.label.empty() && !WriteText(o.label, LabelText(label, files), &problem)) return Fail(problem);
+  return 0;
+}
+
+int RunArm(const Options& o, const CaseRequest& request, ArmRig rig) {
+  ArmCase c;
+  std::string problem;
+  if (!MakeArmCase(request, rig, &c, &problem)) return Fail(problem);
+  return Write(o, MakeArmRecords(c, o.noise), LabelOf(c));
+}
+
 int Run(const Options& o) {
   Case c;
   std::string problem;
@@ -127,16 +149,14 @@ int Run(const Options& o) {
   if (!ParseKind(o.kind, &request.kind))
     return Fail("--kind " + o.kind + ": none, single, pair, triple, unknown, ambiguous, rough or auto");
   const bool manual = o.nominal || !o.set.empty() || !o.shapes.empty();
+  if (ArmRig arm; ParseArmRig(request.rig, &arm)) {
+    if (manual || !o.drive.empty())
+      return Fail("--rig " + request.rig + ": takes no --nominal, --set, --excitation, --drive");
+    return RunArm(o, request, arm);
+  }
   if (!(manual ? MakeManual(o, &c, &problem) : MakeCase(request, &c, &problem))) return Fail(problem);
   if (!o.drive.empty() && !DriveBy(o.drive, &c, &problem)) return Fail(problem);
-  const std::vector<Record> records = MakeRecords(c, o.noise);
-  std::vector<std::string> files;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    files.push_back("log_" + std::to_string(i) + ".csv");
-    if (!WriteText(o.out + "/" + files.back(), CsvText(records[i]), &problem)) return Fail(problem);
-  }
-  if (!o.label.empty() && !WriteText(o.label, LabelText(c, files), &problem)) return Fail(problem);
-  return 0;
+  return Write(o, MakeRecords(c, o.noise), LabelOf(c));
 }
 
 }  // namespace
@@ -153,7 +173,8 @@ int main(int argc, char** argv) {
   app.add_option("--label", o.label, "File for the label (JSON); none without it");
   app.add_option("--kind", o.kind, "none, single, pair, triple, unknown, ambiguous, rough, auto")
       ->capture_default_str();
-  app.add_option("--rig", o.request.rig, "joint, qube, flexjoint, flexlink; drawn without it");
+  app.add_option("--rig", o.request.rig,
+                 "joint, qube, flexjoint, flexlink, one of which is drawn without it; or arm2, arm6");
   app.add_option("--effect", o.request.effect, "NAME or NAME@ON");
   app.add_option("--severity", o.request.severity, "Instead of searching one by effect-to-floor ratio");
   app.add_option("--set", o.set, "NAME=VALUE of a base parameter or EFFECT[@ON].PARAMETER")->take_all();

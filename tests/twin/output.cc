@@ -26,7 +26,13 @@ Json ToJson(const Values& values) {
   return json;
 }
 
-std::vector<std::string> ExpectedVerdicts(const Case& c) {
+Json SensorJson(const Sensor& sensor) {
+  return {
+      {"floor_rad", sensor.Floor()},   {"offset_rad", sensor.offset_rad},     {"resolution_rad", sensor.resolution_rad},
+      {"white_rad", sensor.white_rad}, {"coloured_rad", sensor.coloured_rad}, {"colour_time_s", sensor.colour_time_s}};
+}
+
+std::vector<std::string> ExpectedVerdicts(const Label& c) {
   switch (c.kind) {
     case Kind::kNone:
       return c.nominal_base ? std::vector<std::string>{"none"} : std::vector<std::string>{"none", "parameters"};
@@ -55,13 +61,13 @@ Json RoughTermJson(const RoughTerm& t) {
   return json;
 }
 
-Json RoughJson(const Case& c) {
+Json RoughJson(const std::vector<Label::Roughness>& roughness) {
   Json list = Json::array();
-  for (const RoughLabel& label : c.roughness) {
-    const Rough& rough = c.truth.rough[label.place == Place::kSecond ? 1 : 0];
+  for (const Label::Roughness& label : roughness) {
+    const Rough& rough = label.rough;
     Json terms = Json::array();
     for (const RoughTerm& t : rough.terms) terms.push_back(RoughTermJson(t));
-    list.push_back({{"on", PlaceName(c.rig, label.place)},
+    list.push_back({{"on", label.on},
                     {"of", RoughKindName(KindOf(rough))},
                     {"hysteretic", rough.memory_rad > 0},
                     {"drifting", rough.terms.at(0).drift_hz > 0},
@@ -83,11 +89,11 @@ Json RoughJson(const Case& c) {
 
 }  // namespace
 
-std::string CsvText(const Record& record) {
+std::string CsvText(const std::vector<std::string>& names, const std::vector<std::vector<double>>& rows) {
   std::string text;
-  for (std::size_t i = 0; i < record.names.size(); ++i) text += (i ? "," : "") + record.names[i];
+  for (std::size_t i = 0; i < names.size(); ++i) text += (i ? "," : "") + names[i];
   text += '\n';
-  for (const auto& row : record.rows) {
+  for (const auto& row : rows) {
     for (std::size_t i = 0; i < row.size(); ++i) {
       if (i) text += ',';
       Append(row[i], &text);
@@ -97,11 +103,46 @@ std::string CsvText(const Record& record) {
   return text;
 }
 
-std::string LabelText(const Case& c, const std::vector<std::string>& files) {
+Label LabelOf(const Case& c) {
   const RigNames& names = Names(c.rig);
+  Label label{.rig = RigName(c.rig),
+              .kind = c.kind,
+              .seed = c.seed,
+              .index = c.index,
+              .nominal_base = c.nominal_base,
+              .gap = c.gap,
+              .rough_refit = c.rough_refit,
+              .group = c.group,
+              .outside = c.outside,
+              .outside_parameters = c.outside_parameters,
+              .outside_severity = c.outside_severity};
+  for (const EffectLabel& e : c.effects) {
+    label.effects.push_back({e.choice.name, PlaceName(c.rig, e.choice.place), e.parameters, e.extra, e.choice.severity,
+                             e.gap, e.clear, e.beside_torques});
+  }
+  for (const RoughLabel& r : c.roughness) {
+    const Rough& rough = c.truth.rough[r.place == Place::kSecond ? 1 : 0];
+    label.roughness.push_back({PlaceName(c.rig, r.place), rough, r.rms_n_m, r.alone, r.refit, r.held});
+  }
+  const Base nominal = NominalBase(c.rig);
+  for (const BaseParameter& p : BaseParameters(c.rig)) {
+    label.base.push_back({p.name, p.unit, c.truth.base.*p.field, nominal.*p.field});
+  }
+  for (int s = 0; s < SignalCount(c.rig); ++s) {
+    label.sensors.emplace_back(s == 0 ? names.first_signal : names.second_signal,
+                               c.sensors.angle[static_cast<std::size_t>(s)]);
+  }
+  for (const LogSpec& log : c.logs) {
+    label.logs.push_back({ShapeName(log.excitation.shape), log.amplitude, log.as_reference, log.loop.On(), log.rate_hz,
+                          log.excitation.duration_s});
+  }
+  return label;
+}
+
+std::string LabelText(const Label& c, const std::vector<std::string>& files) {
   Json json;
   json["schema"] = "gapscope.twin.label/1";
-  json["rig"] = RigName(c.rig);
+  json["rig"] = c.rig;
   json["kind"] = KindName(c.kind);
   json["expected_verdicts"] = ExpectedVerdicts(c);
   json["seed"] = c.seed;
@@ -109,23 +150,21 @@ std::string LabelText(const Case& c, const std::vector<std::string>& files) {
   json["effect_to_floor"] = c.gap.raw;
   json["effect_to_floor_refit"] = c.gap.refit;
   json["effects"] = Json::array();
-  for (const EffectLabel& e : c.effects) {
-    json["effects"].push_back({{"name", e.choice.name},
-                               {"on", PlaceName(c.rig, e.choice.place)},
+  for (const Label::Effect& e : c.effects) {
+    json["effects"].push_back({{"name", e.name},
+                               {"on", e.on},
                                {"parameters", ToJson(e.parameters)},
                                {"twin_parameters", ToJson(e.extra)},
-                               {"severity", e.choice.severity},
+                               {"severity", e.severity},
                                {"effect_to_floor", e.gap.raw},
                                {"effect_to_floor_refit", e.gap.refit},
                                {"effect_to_floor_logs", e.gap.logs}});
     if (c.kind == Kind::kRough) {
-      json["effects"].back().update({{"stands_clear", e.clear},
-
-                                     {"beside_torques_to_floor", e.beside_torques}});
+      json["effects"].back().update({{"stands_clear", e.clear}, {"beside_torques_to_floor", e.beside_torques}});
     }
   }
   if (c.kind == Kind::kRough) {
-    json["roughness"] = RoughJson(c);
+    json["roughness"] = RoughJson(c.roughness);
     json["roughness_to_floor_refit"] = c.rough_refit;
   }
   json["ambiguous"] = Json::array();
@@ -140,28 +179,19 @@ std::string LabelText(const Case& c, const std::vector<std::string>& files) {
     json["outside"] = {
         {"name", c.outside}, {"parameters", ToJson(c.outside_parameters)}, {"severity", c.outside_severity}};
   }
-  const Base nominal = NominalBase(c.rig);
-  for (const BaseParameter& p : BaseParameters(c.rig)) {
-    json["base"][p.name] = {{"unit", p.unit}, {"true", c.truth.base.*p.field}, {"nominal", nominal.*p.field}};
+  for (const Label::BaseValue& p : c.base) {
+    json["base"][p.name] = {{"unit", p.unit}, {"true", p.truth}, {"nominal", p.nominal}};
   }
-  for (int s = 0; s < SignalCount(c.rig); ++s) {
-    const Sensor& sensor = c.sensors.angle[static_cast<std::size_t>(s)];
-    json["sensors"][s == 0 ? names.first_signal : names.second_signal] = {{"floor_rad", sensor.Floor()},
-                                                                          {"offset_rad", sensor.offset_rad},
-                                                                          {"resolution_rad", sensor.resolution_rad},
-                                                                          {"white_rad", sensor.white_rad},
-                                                                          {"coloured_rad", sensor.coloured_rad},
-                                                                          {"colour_time_s", sensor.colour_time_s}};
-  }
+  for (const auto& [signal, sensor] : c.sensors) json["sensors"][signal] = SensorJson(sensor);
   for (std::size_t i = 0; i < c.logs.size(); ++i) {
-    const LogSpec& log = c.logs[i];
+    const Label::LogLine& log = c.logs[i];
     json["logs"].push_back({{"file", i < files.size() ? files[i] : ""},
-                            {"excitation", ShapeName(log.excitation.shape)},
+                            {"excitation", log.excitation},
                             {"amplitude", log.amplitude},
                             {"reference_of_loop", log.as_reference},
-                            {"weak_loop", log.loop.On()},
+                            {"weak_loop", log.weak_loop},
                             {"rate_hz", log.rate_hz},
-                            {"duration_s", log.excitation.duration_s}});
+                            {"duration_s", log.duration_s}});
   }
   return json.dump(2) + "\n";
 }

@@ -11,33 +11,6 @@ namespace {
 constexpr double kLoopFilter_s = 0.02;  // of the weak loop's speed
 constexpr double kSpeedQuantum = 0.001, kTorqueQuantum = 0.02, kCurrentQuantum = 0.001;
 
-double Rounded(double value, double quantum) { return quantum > 0 ? quantum * std::round(value / quantum) : value; }
-
-double Late(const Drive& drive, double jitter) {
-  return std::max(0.0, drive.command_delay_s * (1 + std::clamp(drive.jitter * jitter, -0.5, 0.5)));
-}
-
-// Readings of one encoder, in order.
-class Encoder {
- public:
-  Encoder(const Sensor& sensor, double period_s, bool noise, Random* random)
-      : sensor_(sensor), noise_(noise), random_(random), keep_(std::exp(-period_s / sensor.colour_time_s)) {
-    if (noise) colour_ = sensor.coloured_rad * random->Normal();
-  }
-  double Read(double angle_rad) {
-    if (!noise_) return angle_rad;
-    colour_ = keep_ * colour_ + sensor_.coloured_rad * std::sqrt(1 - keep_ * keep_) * random_->Normal();
-    const double noisy = angle_rad + sensor_.offset_rad + colour_ + sensor_.white_rad * random_->Normal();
-    return Rounded(noisy, sensor_.resolution_rad);
-  }
-
- private:
-  Sensor sensor_;
-  bool noise_;
-  Random* random_;
-  double keep_, colour_ = 0;
-};
-
 // The angles of the past at every substep, for a late sensor.
 class Past {
  public:
@@ -107,8 +80,26 @@ Losses DrawLosses(const LogSpec& log, const Outside& outside, std::size_t rows, 
 
 }  // namespace
 
+double Rounded(double value, double quantum) { return quantum > 0 ? quantum * std::round(value / quantum) : value; }
+
+double Late(const Drive& drive, double jitter) {
+  return std::max(0.0, drive.command_delay_s * (1 + std::clamp(drive.jitter * jitter, -0.5, 0.5)));
+}
+
 double Sensor::Floor() const {
   return std::sqrt(white_rad * white_rad + coloured_rad * coloured_rad + resolution_rad * resolution_rad / 12);
+}
+
+Encoder::Encoder(const Sensor& sensor, double period_s, bool noise, Random* random)
+    : sensor_(sensor), noise_(noise), random_(random), keep_(std::exp(-period_s / sensor.colour_time_s)) {
+  if (noise) colour_ = sensor.coloured_rad * random->Normal();
+}
+
+double Encoder::Read(double angle_rad) {
+  if (!noise_) return angle_rad;
+  colour_ = keep_ * colour_ + sensor_.coloured_rad * std::sqrt(1 - keep_ * keep_) * random_->Normal();
+  const double noisy = angle_rad + sensor_.offset_rad + colour_ + sensor_.white_rad * random_->Normal();
+  return Rounded(noisy, sensor_.resolution_rad);
 }
 
 Commands Received(const Record& record, const Plant& plant) {

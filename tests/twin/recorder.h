@@ -10,6 +10,7 @@
 
 #include "tests/twin/excitation.h"
 #include "tests/twin/plant.h"
+#include "tests/twin/random.h"
 #include "tests/twin/simulator.h"
 
 namespace gapscope::twin {
@@ -22,6 +23,23 @@ struct Sensor {
   // Standard deviation of one reading about the offset.
   double Floor() const;
 };
+
+// Readings of one encoder, in order.
+class Encoder {
+ public:
+  Encoder(const Sensor& sensor, double period_s, bool noise, Random* random);
+  double Read(double angle_rad);
+
+ private:
+  Sensor sensor_;
+  bool noise_;
+  Random* random_;
+  double keep_, colour_ = 0;
+};
+double Rounded(double value, double quantum);  // 0: as it is
+
+// How late a command acts whose jitter, a standard normal draw, is that.
+double Late(const Drive& drive, double jitter);
 
 struct Sensors {
   std::array<Sensor, 2> angle;

@@ -112,6 +112,12 @@ double Remembered(const Rough& rough, double before_rad, double angle_rad) {
   return std::clamp(before_rad, angle_rad - half, angle_rad + half);
 }
 
+double RoughTorque(const Rough& rough, double before_rad, const AngleAndSpeed& now, double session_s) {
+  const double seen = Remembered(rough, before_rad, now.angle_rad);
+  return rough.scale_n_m *
+         (Waves(rough, seen, now.speed_rad_per_s, session_s) - Held(rough, now.angle_rad, now.speed_rad_per_s));
+}
+
 std::array<JointMotion, 2> JointMotions(const Plant& plant, const std::vector<LogSpec>& logs) {
   RecordOptions options;
   options.step_s = kSizing_s;

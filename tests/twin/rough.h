@@ -25,6 +25,12 @@ double Held(const Rough& rough, double angle_rad, double speed_rad_per_s);
 // The angle seen through the play, `angle_rad` being the joint's and `before_rad` what was seen until now.
 double Remembered(const Rough& rough, double before_rad, double angle_rad);
 
+// The torque on a joint that moves so, `before_rad` being what was seen of its angle until now.
+struct AngleAndSpeed {
+  double angle_rad, speed_rad_per_s;
+};
+double RoughTorque(const Rough& rough, double before_rad, const AngleAndSpeed& now, double session_s);
+
 // One joint over all logs of a plant; `begins` are the indices at which logs begin.
 struct JointMotion {
   std::vector<double> session_s, angle_rad, speed_rad_per_s;

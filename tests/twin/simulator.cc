@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tests/twin/laws.h"
 #include "tests/twin/rough.h"
 
 namespace gapscope::twin {
@@ -30,9 +31,13 @@ double ViscousFactor(const Outside& o, double time_s) {
   return o.warm_up == 0 ? 1.0 : 1 + o.warm_up * std::exp(-time_s / o.warm_up_time_s);
 }
 
-double Drag(const Dry& dry, double speed) { return dry.drag_n_m_s2_per_rad2 * speed * std::abs(speed); }
-
 }  // namespace
+
+std::size_t Acting(const Commands& commands, double time_s, std::size_t row) {
+  const double now = time_s + 1e-9;
+  while (row + 1 < commands.time_s.size() && commands.time_s[row + 1] + commands.delay_s[row + 1] <= now) ++row;
+  return row;
+}
 
 Simulator::Simulator(const Plant& plant, double step_s) : step_s_(step_s) {
   Become(plant);
@@ -100,11 +105,9 @@ double Simulator::DelayedDemand(double at_s, double newest) const {
 Simulator::Inputs Simulator::At(const Commands& commands, double time_s, std::size_t* cursor) const {
   Inputs in{0, 0, time_s, 0};
   if (commands.time_s.empty()) return in;
-  std::size_t& k = *cursor;
-  const double now = time_s + 1e-9;
-  while (k + 1 < commands.time_s.size() && commands.time_s[k + 1] + commands.delay_s[k + 1] <= now) ++k;
-  in.command = commands.value[k];
-  in.feedforward_n_m = commands.feedforward_n_m[k];
+  *cursor = Acting(commands, time_s, *cursor);
+  in.command = commands.value[*cursor];
+  in.feedforward_n_m = commands.feedforward_n_m[*cursor];
   return in;
 }
 
@@ -117,14 +120,8 @@ DriveOutput Simulator::DriveAt(const State& x, const Inputs& in, State* rate) co
   const double gain = Gain(plant_.outside, in.time_s);
   DriveOutput out;
 
-  const auto dead = [&](double u) {
-    return d.dead_zone == 0 ? u : std::copysign(std::max(std::abs(u) - d.dead_zone, 0.0), u);
-  };
-  const auto limited = [&](double u, double limit) {
-    if (limit == kNever) return u;
-    if (d.corner == 0) return std::clamp(u, -limit, limit);
-    return u / std::pow(1 + std::pow(std::abs(u / std::max(limit, 1e-9)), d.corner), 1 / d.corner);
-  };
+  const auto dead = [&](double u) { return BeyondDeadZone(u, d.dead_zone); };
+  const auto limited = [&](double u, double limit) { return Limited(u, limit, d.corner); };
   const auto ceiling = [&](double u) {
     return d.sag_ceiling == kNever ? u
                                    : limited(u, d.sag_ceiling * std::max(kLowestCeiling, 1 - d.sag_depth * x[kSag]));
@@ -169,10 +166,7 @@ DriveOutput Simulator::DriveAt(const State& x, const Inputs& in, State* rate) co
   torque = limited(torque, d.torque_limit_n_m);
   if (d.power_w < kNever && torque * speed > 0) torque = limited(torque, d.power_w / std::abs(speed));
   out.estimate_n_m = torque;
-  if (d.droop > 0) {
-    torque *= 1 - d.droop * std::pow(std::min(std::abs(torque) / d.droop_peak_n_m, 1.0), d.droop_exponent);
-  }
-  out.torque_n_m = gain * torque * (1 + d.asymmetry * std::copysign(1.0, torque));
+  out.torque_n_m = ByDirection(gain * Drooped(torque, d), d);
   if (d.sag_ceiling < kNever) (*rate)[kSag] = (std::abs(load) / d.sag_ceiling - x[kSag]) / d.sag_time_s;
   return out;
 }
@@ -187,31 +181,18 @@ double Simulator::Transmission(const State& x) const {
 }
 
 double Simulator::LoadTorque(const State& x, double time_s) const {
-  const Load& load = plant_.load;
   const Outside& o = plant_.outside;
-  const double q = x[kQ1];
-  double torque = load.bias_n_m;
-  if (load.cable_stiffness > 0) {
-    torque -= load.cable_stiffness * (q - load.cable_rest_rad) + cable_.Torque(load, q - start_[kQ1]);
-  }
-  if (load.cable_cubic != 0) torque -= load.cable_cubic * std::pow(q - load.cable_rest_rad, 3);
-  if (load.gravity_n_m != 0) torque -= load.gravity_n_m * std::sin(q - load.gravity_rest_rad);
-  if (load.cogging_n_m != 0) {
-    const double phase = load.cogging_periods * q;
-    torque += load.cogging_n_m * (std::sin(phase + load.cogging_phase_rad) +
-                                  load.cogging_second * std::sin(2 * phase + load.cogging_second_phase_rad));
-  }
+  double torque = Pull(plant_.load, cable_, x[kQ1], x[kQ1] - start_[kQ1]);
   if (o.torque_n_m != 0) torque += o.torque_n_m * std::sin(kTurn * o.torque_hz * time_s + o.torque_phase_rad);
-  if (plant_.rough[0].Any()) torque += RoughTorque(0, x, time_s);
+  if (plant_.rough[0].Any()) torque += RoughOf(0, x, time_s);
   return torque;
 }
 
-double Simulator::RoughTorque(int joint, const State& x, double time_s) const {
+double Simulator::RoughOf(int joint, const State& x, double time_s) const {
   const auto j = static_cast<std::size_t>(joint);
   const Rough& rough = plant_.rough[j];
   const double angle = x[joint == 0 ? kQ1 : kQ2], speed = x[joint == 0 ? kW1 : kW2];
-  const double seen = Remembered(rough, rough_angle_[j], angle);
-  return rough.scale_n_m * (Waves(rough, seen, speed, session_s_ + time_s) - Held(rough, angle, speed));
+  return RoughTorque(rough, rough_angle_[j], {angle, speed}, session_s_ + time_s);
 }
 
 Simulator::State Simulator::Derivative(const State& x, const Inputs& in) const {
@@ -260,7 +241,7 @@ Simulator::State Simulator::Derivative(const State& x, const Inputs& in) const {
   const double inertia2 = plant_.rig == Rig::kQube ? Second(b) : b.link_inertia_kg_m2;
   double second = -b.second_damping_n_m_s_per_rad * x[kW2] - Drag(plant_.dry[1], x[kW2]) -
                   bristles_[1].Torque(plant_.dry[1], x[kQ2] - start_[kQ2], x[kW2], 0, inertia2);
-  if (plant_.rough[1].Any()) second += RoughTorque(1, x, in.time_s);
+  if (plant_.rough[1].Any()) second += RoughOf(1, x, in.time_s);
   double m11, m12;
   const double m22 = inertia2;
   if (plant_.rig == Rig::kQube) {

@@ -33,6 +33,9 @@ struct Commands {
   }
 };
 
+// The row that acts at a time, `row` being one that acted before.
+std::size_t Acting(const Commands& commands, double time_s, std::size_t row);
+
 struct DriveOutput {
   double torque_n_m = 0;    // at the first joint
   double estimate_n_m = 0;  // what the drive believes: before droop and direction gain
@@ -82,7 +85,7 @@ class Simulator {
   double DelayedDemand(double at_s, double newest) const;
   double Transmission(const State& x) const;
   double LoadTorque(const State& x, double time_s) const;
-  double RoughTorque(int joint, const State& x, double time_s) const;
+  double RoughOf(int joint, const State& x, double time_s) const;
   Inputs At(const Commands& commands, double time_s, std::size_t* cursor) const;
 
   Plant plant_;

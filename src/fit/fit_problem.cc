@@ -115,6 +115,7 @@ void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
       start.qvel[source.dof] += state[signal.joint_state + 1];
     }
   }
+  MoveUnseen(worker, place);
   const mjModel& m = model_.compiled();
   const auto& motor_sides = model_.mirrored_joints();
   for (std::size_t i = 0; i < motor_sides.size(); ++i) {
@@ -126,6 +127,18 @@ void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
     start.qpos[m.jnt_qposadr[joint]] += beside[0];
     start.qvel[m.jnt_dofadr[joint]] += beside[1];
   }
+}
+
+// Along the manifold of poses: quaternions stay unit ones.
+void FitProblem::MoveUnseen(Worker& worker, const Place& place) const {
+  const UnseenStates& unseen = layout_.unseen[place.window.log];
+  if (unseen.dofs.empty()) return;
+  Eigen::Index i = unseen.first;
+  for (const int dof : unseen.dofs) {
+    worker.way[static_cast<std::size_t>(dof)] = place.state[i++];
+    worker.start.qvel[static_cast<std::size_t>(dof)] += place.state[i++];
+  }
+  mj_integratePos(&model_.compiled(), worker.start.qpos.data(), worker.way.data(), 1);
 }
 
 bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double>& predicted) const {

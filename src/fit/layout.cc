@@ -28,6 +28,47 @@ bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& lay
   return false;
 }
 
+// Joints that no position or speed of the log is of, in the model's order. Not those that an effect added or an equality
+// ties to another joint: they start with what they are tied to.
+std::vector<int> UnseenJoints(const Model& model, const Recording& recording) {
+  const mjModel& m = model.compiled();
+  std::vector<char> known(static_cast<std::size_t>(m.njnt), 0);
+  for (int j = 0; j < m.njnt; ++j) known[j] = m.jnt_type[j] != mjJNT_HINGE && m.jnt_type[j] != mjJNT_SLIDE;
+  for (const auto& measured : recording.measured) {
+    const SignalSource& source = model.source(measured.index);
+    const SignalTraits& traits = TraitsOf(source.kind);
+    if (traits.gives_angle || traits.gives_speed) known[source.joint] = 1;
+  }
+  for (const auto& [joint, from] : model.mirrored_joints()) known[joint] = 1;
+  for (int e = 0; e < m.neq; ++e) {
+    if (m.eq_type[e] != mjEQ_JOINT) continue;
+    for (const int joint : {m.eq_obj1id[e], m.eq_obj2id[e]}) {
+      if (joint >= 0) known[joint] = 1;
+    }
+  }
+  std::vector<int> unseen;
+  for (int j = 0; j < m.njnt; ++j) {
+    if (!known[j]) unseen.push_back(j);
+  }
+  return unseen;
+}
+
+// The window's states of joints that are not measured, and what is known of them.
+UnseenStates AddUnseen(const Model& model, const Recording& recording, std::vector<double>* prior) {
+  const mjModel& m = model.compiled();
+  UnseenStates states{.first = static_cast<Eigen::Index>(prior->size()), .dofs = {}};
+  for (const int joint : UnseenJoints(model, recording)) {
+    const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
+    double deviation = slides ? kFitPolicy.unseen_prior_m : kFitPolicy.unseen_prior_rad;
+    const double speed = deviation * kFitPolicy.unseen_rad_per_s;
+    if (m.jnt_limited[joint]) deviation = std::min(deviation, (m.jnt_range[2 * joint + 1] - m.jnt_range[2 * joint]) / 2);
+    states.dofs.push_back(m.jnt_dofadr[joint]);
+    prior->push_back(1 / deviation);
+    prior->push_back(1 / speed);
+  }
+  return states;
+}
+
 // One log's signals, and the bounds of the offsets that it brings.
 void AddLog(const Model& model, const Recording& recording, const FitOptions& options, FitLayout* layout,
             std::vector<double>* low, std::vector<double>* high) {
@@ -54,7 +95,8 @@ void AddLog(const Model& model, const Recording& recording, const FitOptions& op
       prior.push_back(weight * kFitPolicy.speed_prior_s);
     }
   }
-  // What no sensor shows comes last: each motor side beside its load.
+  layout->unseen.push_back(options.fit_states ? AddUnseen(model, recording, &prior) : UnseenStates{});
+  // What only some effects bring comes last: each motor side beside its load.
   for (std::size_t i = 0; i < model.mirrored_joints().size() && options.fit_states; ++i) {
     prior.push_back(1 / kFitPolicy.motor_side_prior_rad);
     prior.push_back(1 / kFitPolicy.motor_side_prior_rad * kFitPolicy.speed_prior_s);

@@ -1,6 +1,7 @@
 // What a fit's unknowns consist of. y: the search coordinates of parameters, one zero offset per measured position and
 // log, one command shift below a sample. x of a window: what its initial state differs by from what the log says (angle
-// and speed of each measured joint, then of each hidden motor side).
+// and speed of each measured joint), from the model's initial pose at rest (of each joint that no signal is of), and
+// from the pre-roll (of each hidden motor side).
 #ifndef GAPSCOPE_FIT_LAYOUT_H_
 #define GAPSCOPE_FIT_LAYOUT_H_
 
@@ -22,8 +23,16 @@ struct SignalLayout {
   int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
 };
 
+// Degrees of freedom whose start no joint's own signal gives: two numbers of a window's state each, displacement and
+// speed.
+struct UnseenStates {
+  Eigen::Index first = 0;  // index in the window's state
+  std::vector<int> dofs;
+};
+
 struct FitLayout {
   std::vector<std::vector<SignalLayout>> signals;  // per log, per signal
+  std::vector<UnseenStates> unseen;                // per log
   std::vector<Eigen::VectorXd> state_priors;       // per log: weight of each number of a window's state
   Eigen::VectorXd low, high;                       // of y
   Eigen::Index parameters = 0;                     // the first numbers of y

@@ -127,6 +127,7 @@ class FitProblem {
   std::size_t TakeSteps();
   // Writes where the window starts.
   void PlaceStart(Worker& worker, const Place& place) const;
+  void RemountBodies(Worker& worker, const Place& place) const;
   void MoveUnseen(Worker& worker, const Place& place) const;
   bool Simulate(Worker& worker, const Place& place, std::vector<double>& predicted) const;
   void ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,

@@ -241,8 +241,8 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     }
     if (spec.resolution < 0) map.Fail(item, {.what = "'resolution' is negative", .allowed = ">= 0"});
     const bool orients = spec.kind == SignalKind::kOrientation;
-    if (!elements.empty() &&
-        (TraitsOf(spec.kind).site != SignalSite::kSensor || map.Has("element") || map.Has("column") || map.Has("columns")))
+    if (!elements.empty() && (TraitsOf(spec.kind).site != SignalSite::kSensor || map.Has("element") ||
+                              map.Has("column") || map.Has("columns")))
       map.Fail(item, {.what = "'columns_of_elements' names a sensor's columns, one for each of its numbers",
                       .cure = "name the 'sensor', and drop 'element' and 'column'"});
     for (const MeasuredSpec& one : orients ? ReadOrientation(map, item, spec, elements) : EachElement(spec, elements)) {

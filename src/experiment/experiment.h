@@ -101,9 +101,9 @@ struct MeasuredSpec {
   bool scored = true;  // counts in the error
   WrapRepair wrap = WrapRepair::kKeep;
   double wrap_period = 0;
-  std::string offset_parameter;  // predicted = model + this parameter; empty: none
+  std::string offset_parameter;     // predicted = model + this parameter; empty: none
   std::optional<bool> starts = {};  // a free body's pose, from which windows start; none: where it is one
-  std::string where;             // file:line:column, for errors
+  std::string where;                // file:line:column, for errors
 };
 
 struct Parameter {

@@ -17,8 +17,9 @@ Error NoUnitQuaternion(const Log& log, std::size_t row, const std::array<const C
                .where = log.Where(row) + ", columns " + Join(names),
                .actual = "length " + std::to_string(length),
                .allowed = "1, to 0.01",
-               .cure = "name the four columns in the order w, x, y, z, or say 'order: xyzw'; rows without an orientation "
-                       "are left empty"};
+               .cure =
+                   "name the four columns in the order w, x, y, z, or say 'order: xyzw'; rows without an orientation "
+                   "are left empty"};
 }
 
 }  // namespace

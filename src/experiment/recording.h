@@ -22,7 +22,7 @@ struct Recording {
     MeasuredSpec spec;
     std::size_t index = 0;  // in experiment.measured
     std::string column;
-    std::vector<double> values;  // one per stamp; NaN where the log has no value and the policy keeps that
+    std::vector<double> values;          // one per stamp; NaN where the log has no value and the policy keeps that
     Quaternion reference = kNoRotation;  // of an orientation (orientation.h): the values are the turn from here
   };
 

@@ -53,8 +53,8 @@ struct DifferenceOptions {
 struct Derivatives {
   Residuals residuals;
   std::vector<Eigen::MatrixXd> jacobians;  // per window: y, then the window's state
-  Residuals quick;  // those that differences of quick steps are taken from; none where the model's own were needed
-  bool valid = false;                      // false: the point cannot be simulated
+  Residuals quick;     // those that differences of quick steps are taken from; none where the model's own were needed
+  bool valid = false;  // false: the point cannot be simulated
   Work work;
 };
 

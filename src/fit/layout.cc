@@ -30,8 +30,8 @@ bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& lay
   return false;
 }
 
-// Joints that no position or speed of the log is of, in the model's order. Not those that an effect added or an equality
-// ties to another joint: they start with what they are tied to.
+// Joints that no position or speed of the log is of, in the model's order. Not those that an effect added or an
+// equality ties to another joint: they start with what they are tied to.
 std::vector<int> UnseenJoints(const Model& model, const Recording& recording) {
   const mjModel& m = model.compiled();
   std::vector<char> known(static_cast<std::size_t>(m.njnt), 0);
@@ -92,7 +92,8 @@ UnseenStates AddUnseen(const Model& model, const Recording& recording, const std
     const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
     double deviation = slides ? kFitPolicy.unseen_prior_m : kFitPolicy.unseen_prior_rad;
     const double speed = deviation * kFitPolicy.unseen_rad_per_s;
-    if (m.jnt_limited[joint]) deviation = std::min(deviation, (m.jnt_range[2 * joint + 1] - m.jnt_range[2 * joint]) / 2);
+    if (m.jnt_limited[joint])
+      deviation = std::min(deviation, (m.jnt_range[2 * joint + 1] - m.jnt_range[2 * joint]) / 2);
     states.dofs.push_back({.dof = m.jnt_dofadr[joint]});
     prior->push_back(1 / deviation);
     prior->push_back(1 / speed);

@@ -17,11 +17,11 @@ namespace gapscope {
 
 // How a signal of a log enters the cost.
 struct SignalLayout {
-  double weight = 0;     // of a residual: 1 / standard deviation of the signal, or as asked; 0: not scored
-  double deviation = 1;  // of the signal over the log
-  int offset = -1;       // index in y of its zero offset, which counts in deviations
+  double weight = 0;        // of a residual: 1 / standard deviation of the signal, or as asked; 0: not scored
+  double deviation = 1;     // of the signal over the log
+  int offset = -1;          // index in y of its zero offset, which counts in deviations
   bool moves_start = true;  // the offset moves where windows start
-  int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
+  int joint_state = -1;     // index in the window's state of the joint's angle; its speed is the next one
 };
 
 // Degrees of freedom whose start no joint's own signal gives: two numbers of a window's state each, displacement and

@@ -110,11 +110,12 @@ Error NoStart(const mjModel& m, const MeasuredSpec& spec, int sensor) {
     const int body = BodyOf(m, sensor);
     error.actual = m.sensor_refid[sensor] >= 0 ? "the sensor '" + spec.on + "' has a 'reftype'"
                    : body < 0                  ? "the sensor '" + spec.on + "' is on no body"
-                              : "the body '" + NameOf(m, mjOBJ_BODY, body) + "' has no free joint";
-    error.allowed = free.empty() ? "a body with a free joint; the model has none"
-                                 : "sensors in the world's frame on " + Join(free);
+                                               : "the body '" + NameOf(m, mjOBJ_BODY, body) + "' has no free joint";
+    error.allowed =
+        free.empty() ? "a body with a free joint; the model has none" : "sensors in the world's frame on " + Join(free);
   } else {
-    error.actual = "not all of x, y, z of '" + spec.on + "' are measured, or another sensor of the body gives its start";
+    error.actual =
+        "not all of x, y, z of '" + spec.on + "' are measured, or another sensor of the body gives its start";
     error.allowed = "'columns_of_elements' with three columns, of one sensor a body";
   }
   error.cure = "drop 'start: true'; a body that is on 'hold' has no free joint";
@@ -130,7 +131,8 @@ Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& m, const Experiment
     FreeStart start{.qpos = m.jnt_qposadr[joint], .dof = m.jnt_dofadr[joint]};
     for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
       const MeasuredSpec& spec = experiment.measured[i];
-      const int sensor = TraitsOf(spec.kind).site == SignalSite::kSensor ? mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()) : -1;
+      const int sensor =
+          TraitsOf(spec.kind).site == SignalSite::kSensor ? mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()) : -1;
       if (sensor < 0 || !spec.starts.value_or(true) || FreeJointOf(m, sensor) != joint) continue;
       if (SaysPlace(m, spec, sensor) && start.position[0] < 0) {
         const std::array<int, 3> elements = ElementsOf(experiment, spec.on);

@@ -15,11 +15,11 @@ namespace gapscope {
 
 // Of one free joint: which measured signals say where its body is. Both sensors ride on the body.
 struct FreeStart {
-  int qpos = -1, dof = -1;                      // first of seven, of six
-  std::array<int, 3> position = {-1, -1, -1};   // indices in experiment.measured, x y z; -1: not measured
-  int rotation = -1;                            // index of the first of the orientation's three; -1: not measured
-  Vector3 place = {};                           // of the position's sensor on the body, in its frame, m
-  Quaternion mounted = kNoRotation;             // from the body's frame to the orientation's sensor
+  int qpos = -1, dof = -1;                     // first of seven, of six
+  std::array<int, 3> position = {-1, -1, -1};  // indices in experiment.measured, x y z; -1: not measured
+  int rotation = -1;                           // index of the first of the orientation's three; -1: not measured
+  Vector3 place = {};                          // of the position's sensor on the body, in its frame, m
+  Quaternion mounted = kNoRotation;            // from the body's frame to the orientation's sensor
 };
 
 // Those of the joints that a `framepos` with all three elements or a `framequat` measures, in the world's frame; the

@@ -35,7 +35,7 @@ Eigen::Matrix3d MatrixOf(const Quaternion& q) {
   return matrix;
 }
 
-const Vector3 kCases[] = {{0, 0, 0},         {1e-12, 0, -2e-12}, {1e-7, 2e-7, 0},  {0.3, -0.2, 0.5},
+const Vector3 kCases[] = {{0, 0, 0},          {1e-12, 0, -2e-12}, {1e-7, 2e-7, 0},  {0.3, -0.2, 0.5},
                           {0, 0, kPi - 1e-6}, {2, 1, -2},         {-3.1, 0.2, 0.1}, {0, -1.5, 0}};
 
 TEST(RotationTest, ExponentialIsRodrigues) {

@@ -22,9 +22,9 @@ class PosesFitTest : public ::testing::Test {
  protected:
   void Load(const std::string& measured) {
     scratch_.Write("robot.xml", SpinningTop::kMjcf);
-    rig_.experiment =
-        LoadExperiment(scratch_.Write("experiment.yaml", "model: robot.xml\nlog: {time: {column: t, unit: s}}\n" + measured))
-            .value();
+    rig_.experiment = LoadExperiment(scratch_.Write("experiment.yaml",
+                                                    "model: robot.xml\nlog: {time: {column: t, unit: s}}\n" + measured))
+                          .value();
     rig_.model = Model::Load(rig_.experiment).value();
   }
   // A log by closed forms: the top, and the arm that turns at 2 rad/s. Orientations are turned by `mount`.
@@ -54,8 +54,9 @@ class PosesFitTest : public ::testing::Test {
 
 TEST_F(PosesFitTest, TheMountOfASensorIsFoundForEachLog) {
   const Vector3d mount(0.05, -0.12, 0.2);
-  Load("measured:\n  - {signal: angle, column: angle, joint: hinge, unit: rad}\n"
-       "  - {signal: turn, sensor: arm_turn, columns_of_elements: [aw, ax, ay, az]}\n");
+  Load(
+      "measured:\n  - {signal: angle, column: angle, joint: hinge, unit: rad}\n"
+      "  - {signal: turn, sensor: arm_turn, columns_of_elements: [aw, ax, ay, az]}\n");
   Record(mount);
   FitProblem problem(*rig_.model, logs_, {.window_s = 0.25, .fit_shift = false}, rig_.Values(), pool_);
   const SolveResult found = Solve(problem, problem.Start(), {.tolerance = 1e-10});
@@ -79,7 +80,8 @@ const char kPose[] = R"(measured:
 TEST_F(PosesFitTest, AFreeBodysStatesAreOnTheManifoldOfPoses) {
   Load(kPose);
   Record(Vector3d::Zero());
-  FitProblem problem(*rig_.model, logs_, {.window_s = 0.25, .fit_offsets = false, .fit_shift = false}, rig_.Values(), pool_);
+  FitProblem problem(*rig_.model, logs_, {.window_s = 0.25, .fit_offsets = false, .fit_shift = false}, rig_.Values(),
+                     pool_);
   const FitPoint start = problem.Start();
   ASSERT_EQ(start.states[0].size(), 14);
   const double from_log = problem.Evaluate(start, Keep::kCost).cost;

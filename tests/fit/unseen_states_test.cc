@@ -66,9 +66,7 @@ class UnseenStatesTest : public ::testing::Test {
     }
     logs_ = {log};
   }
-  FitOptions Options() const {
-    return {.window_s = 0.25, .lead_in_s = 0, .fit_offsets = false, .fit_shift = false};
-  }
+  FitOptions Options() const { return {.window_s = 0.25, .lead_in_s = 0, .fit_offsets = false, .fit_shift = false}; }
 
   Scratch scratch_;
   Rig rig_;
@@ -84,7 +82,9 @@ FitPoint Solved(FitProblem& problem) {
 
 TEST_F(UnseenStatesTest, ALinkSeenByAGyroStartsWhereItReallyWas) {
   constexpr double kDeflection_rad = 2e-4, kSpeed_rad_per_s = 5e-3;  // of 0.05 rad and 1.5 rad/s
-  Load("  - {signal: hub, column: hub, joint: hub, unit: rad}\n  - {signal: gyro, sensor: gyro, element: 2, column: g}\n");
+  Load(
+      "  - {signal: hub, column: hub, joint: hub, unit: rad}\n  - {signal: gyro, sensor: gyro, element: 2, column: "
+      "g}\n");
   FitProblem problem(*rig_.model, logs_, Options(), rig_.Values(), pool_);
   ASSERT_EQ(problem.windows().size(), 4u);
   const FitPoint found = Solved(problem);
@@ -115,8 +115,9 @@ TEST_F(UnseenStatesTest, AGyroAloneFindsAllThatItCanSee) {
 }
 
 TEST_F(UnseenStatesTest, AJointWithASpeedColumnIsMeasured) {
-  Load("  - {signal: hub, column: hub, joint: hub, unit: rad}\n"
-       "  - {signal: link, kind: velocity, joint: link, column: g}\n");
+  Load(
+      "  - {signal: hub, column: hub, joint: hub, unit: rad}\n"
+      "  - {signal: link, kind: velocity, joint: link, column: g}\n");
   const FitProblem problem(*rig_.model, logs_, Options(), rig_.Values(), pool_);
   EXPECT_TRUE(problem.layout().unseen[0].dofs.empty());
   EXPECT_EQ(problem.windows()[0].prior.size(), 2);

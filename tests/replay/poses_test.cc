@@ -26,7 +26,8 @@ measured:
 
 class PosesTest : public ::testing::Test {
  protected:
-  // A log of the top's marker, whose orientation is turned by `mount` in its own frame. Signs of quaternions are random.
+  // A log of the top's marker, whose orientation is turned by `mount` in its own frame. Signs of quaternions are
+  // random.
   std::string Csv(const Vector3d& mount = Vector3d::Zero()) const {
     std::mt19937 random(4);
     std::string csv = "t,x,y,z,qw,qx,qy,qz\n";
@@ -87,7 +88,8 @@ TEST_F(PosesTest, ThePredictionIsTheClosedForm) {
   Load(kYaml);
   const InitialState start = Truth();
   const auto predicted = Predict(*model_, recording_, {}, &start);
-  for (std::size_t s = 0; s < 6; ++s) EXPECT_LT(LargestDifference(predicted[s], recording_.measured[s].values), kTolerance) << s;
+  for (std::size_t s = 0; s < 6; ++s)
+    EXPECT_LT(LargestDifference(predicted[s], recording_.measured[s].values), kTolerance) << s;
 }
 
 // predicted - measured = log(conj(measured) predicted), here the same turn at all times.
@@ -98,7 +100,8 @@ TEST_F(PosesTest, TheResidualIsTheRotationVectorInTheMeasuredFrame) {
   const auto predicted = Predict(*model_, recording_, {}, &start);
   for (std::size_t e = 0; e < 3; ++e) {
     for (std::size_t row = 0; row < recording_.rows(); ++row)
-      ASSERT_NEAR(predicted[3 + e][row] - recording_.measured[3 + e].values[row], off[static_cast<int>(e)], 1e-8) << row;
+      ASSERT_NEAR(predicted[3 + e][row] - recording_.measured[3 + e].values[row], off[static_cast<int>(e)], 1e-8)
+          << row;
   }
 }
 
@@ -110,7 +113,8 @@ TEST_F(PosesTest, AMountIsAParameterOfEachNumber) {
   Load(yaml, Vector3d(0.4, -0.3, 0.2));
   const InitialState start = Truth();
   const auto predicted = Predict(*model_, recording_, {}, &start);
-  for (std::size_t s = 3; s < 6; ++s) EXPECT_LT(LargestDifference(predicted[s], recording_.measured[s].values), 1e-8) << s;
+  for (std::size_t s = 3; s < 6; ++s)
+    EXPECT_LT(LargestDifference(predicted[s], recording_.measured[s].values), 1e-8) << s;
   // The body starts where its sensor, so mounted, says.
   const InitialState from_log = InitialStateAt(*model_, recording_, 0, model_->Nominal());
   for (std::size_t i = 3; i < 7; ++i) EXPECT_NEAR(std::abs(from_log.qpos[i]), std::abs(start.qpos[i]), 1e-6) << i;
@@ -141,8 +145,10 @@ TEST_F(PosesTest, OrderOfColumnsMayBeStated) {
 }
 
 TEST_F(PosesTest, AnOrientationAloneTurnsTheBodyWhereItStands) {
-  Load("log: {time: {column: t, unit: s}}\nmeasured:\n  - {signal: turn, sensor: turn, columns_of_elements: [qw, qx, qy, "
-       "qz]}\n");
+  Load(
+      "log: {time: {column: t, unit: s}}\nmeasured:\n  - {signal: turn, sensor: turn, columns_of_elements: [qw, qx, "
+      "qy, "
+      "qz]}\n");
   const InitialState start = InitialStateAt(*model_, recording_, 137, model_->Nominal());
   EXPECT_LT(Quaterniond(start.qpos[3], start.qpos[4], start.qpos[5], start.qpos[6])
                 .angularDistance(top_.Turn(recording_.time_s[137])),
@@ -177,7 +183,9 @@ TEST_F(PosesTest, ErrorsSayWhatAndWhere) {
   const std::vector<Case> cases = {
       {"[qw, qx, qy, qz]", "[qx, qy, qz]", {"experiment.yaml:5:5:", "another number of elements", "3", "4"}},
       {"[qw, qx, qy, qz]", "[qx, qy, qz], kind: orientation", {"experiment.yaml:5:5:", "needs four columns", "3"}},
-      {"columns_of_elements: [qw, qx, qy, qz]", "element: 1, column: qx", {"experiment.yaml:5:5:", "is an orientation"}},
+      {"columns_of_elements: [qw, qx, qy, qz]",
+       "element: 1, column: qx",
+       {"experiment.yaml:5:5:", "is an orientation"}},
       {"[x, y, z]", "[qw, qx, qy, qz], kind: sensor", {"experiment.yaml:4:5:", "another number of elements", "4", "3"}},
       {"[qw, qx, qy, qz]", "[qw, qx, qy, qz], kind: sensor", {"experiment.yaml:5:5:", "is an orientation"}},
       {"[qw, qx, qy, qz]", "[qw, qx, qy, qz], scale: 2", {"experiment.yaml:5:5:", "'scale'", "means nothing"}},

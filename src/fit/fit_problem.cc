@@ -98,11 +98,12 @@ void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
   // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log, a pose's
   // offsets turn and move a body.
   const bool from_log = options_.start == WindowStart::kLog;
+  const bool bodies = !model_.free_starts().empty();
   const bool late =
       from_log && std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) {
-        const bool of_sensor = TraitsOf(source.kind).site == SignalSite::kSensor;
+        const bool moved = source.offset >= 0 && values[source.offset] != first[source.offset];
         return (source.delay >= 0 && values[source.delay] != first[source.delay]) ||
-               (of_sensor && source.offset >= 0 && values[source.offset] != first[source.offset]);
+               (bodies && moved && TraitsOf(source.kind).site == SignalSite::kSensor);
       });
   InitialState& start = worker.start;
   start = late ? InitialStateAt(model_, recording, window.rows.begin, values) : window.start;

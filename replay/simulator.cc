@@ -195,19 +195,19 @@ int Simulator::StepToNext(const Recording& recording, std::size_t row) {
   if (!late_) SetCommands(recording, row, now, now);
   for (int step = 0; step < steps; ++step) {
     if (late_) SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
-    if (probe_.joint >= 0) ApplyProbe();
+    for (const ProbeTorque& probe : probes_) ApplyProbe(probe);
     mj_step(m, data_.get());
   }
   return steps;
 }
 
-void Simulator::ApplyProbe() {
+void Simulator::ApplyProbe(const ProbeTorque& probe) {
   const mjModel* m = mujoco_.get();
-  const int dof = m->jnt_dofadr[probe_.joint];
-  const double q = data_->qpos[m->jnt_qposadr[probe_.joint]], w = data_->qvel[dof];
-  const double u = probe_.actuator >= 0 ? probe_.per_command * data_->ctrl[probe_.actuator] : 0;
+  const int dof = m->jnt_dofadr[probe.joint];
+  const double q = data_->qpos[m->jnt_qposadr[probe.joint]], w = data_->qvel[dof];
+  const double u = probe.actuator >= 0 ? probe.per_command * data_->ctrl[probe.actuator] : 0;
   data_->qfrc_applied[dof] =
-      probe_.amplitude_n_m * std::sin(probe_.per_rad * q + probe_.s_per_rad * w + u + probe_.phase_rad);
+      probe.amplitude_n_m * std::sin(probe.per_rad * q + probe.s_per_rad * w + u + probe.phase_rad);
 }
 
 RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,

@@ -35,10 +35,11 @@ enum class StepKind { kOwn, kQuick };
 // A smooth torque that no catalogue holds: amplitude sin(per_rad q + per_speed w + per_command u + phase) on one joint,
 // held over each step. What a model may miss is judged beside such torques.
 struct ProbeTorque {
-  int joint = -1;  // hinge or slide; -1: none
+  int joint = -1;  // hinge or slide
   double amplitude_n_m = 0, per_rad = 0, s_per_rad = 0, phase_rad = 0;
   int actuator = -1;  // whose command u is; -1: none
   double per_command = 0;
+  bool operator==(const ProbeTorque&) const = default;
 };
 
 class Simulator {
@@ -59,13 +60,13 @@ class Simulator {
   // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next
   // SetParameters.
   void set_shift_s(double shift) { shift_s_ = shift; }
-  void set_probe(const ProbeTorque& probe) { probe_ = probe; }
+  void set_probes(std::span<const ProbeTorque> probes) { probes_.assign(probes.begin(), probes.end()); }
   void set_steps(StepKind steps);
   const mjModel& mujoco_model() const { return *mujoco_; }
   mjData& data() { return *data_; }
 
  private:
-  void ApplyProbe();
+  void ApplyProbe(const ProbeTorque& probe);
   // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp.
   void Begin(const Recording& recording, Window window, const InitialState& start);
   // From a row's stamp to the next one's, under its commands. Returns the steps that it took.
@@ -99,7 +100,7 @@ class Simulator {
   std::vector<double> delays_s_;  // per command: how late it acts
   bool late_ = false;             // one of them does not act at its stamp
   double latest_s_ = 0;
-  ProbeTorque probe_;
+  std::vector<ProbeTorque> probes_;
   SignalStage reads_ = SignalStage::kState;  // the latest stage of any signal of the log
   std::vector<std::size_t> orientations_;    // the log's orientations: the first signal of each
   bool remembers_ = false;                   // has states beside position and speed

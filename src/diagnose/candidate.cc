@@ -43,6 +43,7 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
                      .max_windows = train ? max_windows : (max_windows + 1) / 2,
                      .choice = train ? WindowChoice::kTelling : WindowChoice::kEven,
                      .windows = train ? windows : nullptr,
+                     .coupling = train ? coupling : nullptr,
                      .time_step_s = time_step_s,
                      .shift_range_s = sample_s,
                      .weights = weights,

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "src/diagnose/block_errors.h"
+#include "src/fit/coupling.h"
 #include "src/diagnose/diagnosis_journal.h"
 #include "src/tune/tune.h"
 
@@ -71,6 +72,8 @@ struct Workbench {
   // Of base parameters, where they were widened.
   std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
+  // Of the base model's joints, once that is fitted.
+  std::shared_ptr<Coupling> coupling = std::make_shared<Coupling>();
   bool by_windows = false;              // train and held-out logs are the same: every third window is held out
   DiagnosisJournal* journal = nullptr;  // null: none
 

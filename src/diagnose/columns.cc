@@ -65,14 +65,6 @@ struct Wanted {
   std::vector<Trial> trials;
   std::vector<ExtraColumn> columns;
   Eigen::Index first = 0;  // of the extra columns
-  Eigen::Index Add(std::string name, Candidate& child, const EffectUse& use, const Workbench& bench,
-                   const std::vector<double>& values) {
-    std::vector<double> all = bench.Nominal(*child.model);
-    const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
-    for (std::size_t i = 0; i < placed.size(); ++i) all[child.model->IndexOf(placed[i].name)] = values[i];
-    columns.push_back({.name = std::move(name), .child = child.problem.get(), .values = std::move(all)});
-    return first + static_cast<Eigen::Index>(columns.size()) - 1;
-  }
 };
 
 // Trial values of an effect: all, or of very many those that did best at the base model.
@@ -92,13 +84,26 @@ std::vector<std::vector<double>> TrialValues(const Workbench& bench, const Effec
   return all;
 }
 
-void AddTrials(const Workbench& bench, Candidate& child, const EffectUse& use, std::size_t effect,
-               const ColumnTable* scan, Wanted* wanted) {
+// One effect of a child model, its trials, and the values of its parameters for each of their columns.
+struct Asked {
+  EffectUse use;
+  MovedSignals moved;
+  std::vector<Trial> trials;
+  std::vector<std::vector<double>> columns;
+  std::vector<std::size_t> of_trial;  // each column's
+};
+
+Asked Ask(const Workbench& bench, const EffectUse& use, std::size_t effect, const ColumnTable* scan) {
+  Asked asked{.use = use, .moved = bench.coupling->OfPlace(use.on, *bench.rig)};
   const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
   const Pair pair = PairOf(use, *bench.rig);
+  const auto add = [&](std::vector<double> values) {
+    asked.columns.push_back(std::move(values));
+    asked.of_trial.push_back(asked.trials.size());
+  };
   for (const auto& values : TrialValues(bench, use, scan)) {
     Trial trial{.use = use, .effect = effect, .values = values};
-    trial.columns.push_back(wanted->Add(use.Text(), child, use, bench, values));
+    add(values);
     if (pair.other >= 0) {
       const auto other = static_cast<std::size_t>(pair.other);
       const bool angle = pair.with == Parameter::With::kAngle;
@@ -106,9 +111,71 @@ void AddTrials(const Workbench& bench, Candidate& child, const EffectUse& use, s
       std::vector<double> turned = values;
       turned[other] =
           angle ? std::numbers::pi / 2 : *std::max_element(placed[other].trials.begin(), placed[other].trials.end());
-      trial.columns.push_back(wanted->Add(use.Text(), child, use, bench, turned));
+      add(std::move(turned));
     }
-    wanted->trials.push_back(std::move(trial));
+    asked.trials.push_back(std::move(trial));
+  }
+  return asked;
+}
+
+// Column by column of the group's effects together.
+void AddTrials(const Workbench& bench, Candidate& child, std::vector<Asked> group, Wanted* wanted) {
+  const std::vector<double> neutral = bench.Nominal(*child.model);
+  const auto set = [&](const Asked& asked, std::size_t column, std::vector<double>* values) {
+    const auto placed = PlacedParameters(asked.use, *bench.rig, bench.scales);
+    for (std::size_t i = 0; i < placed.size(); ++i)
+      (*values)[static_cast<std::size_t>(child.model->IndexOf(placed[i].name))] = asked.columns[column][i];
+  };
+  std::size_t most = 0;
+  for (const Asked& asked : group) most = std::max(most, asked.columns.size());
+  for (std::size_t column = 0; column < most; ++column) {
+    std::vector<double> together = neutral;
+    for (const Asked& asked : group) {
+      if (column < asked.columns.size()) set(asked, column, &together);
+    }
+    for (Asked& asked : group) {
+      if (column >= asked.columns.size()) continue;
+      ExtraColumn extra{.name = asked.use.Text(), .child = child.problem.get(), .values = together};
+      if (group.size() > 1) {
+        extra.moved = asked.moved;
+        extra.own_values = neutral;
+        set(asked, column, &extra.own_values);
+      }
+      asked.trials[asked.of_trial[column]].columns.push_back(wanted->first +
+                                                             static_cast<Eigen::Index>(wanted->columns.size()));
+      wanted->columns.push_back(std::move(extra));
+    }
+  }
+  for (Asked& asked : group) std::move(asked.trials.begin(), asked.trials.end(), std::back_inserter(wanted->trials));
+}
+
+// Torques on joints that do not touch, in one replay.
+void AddTorques(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques, Wanted* wanted,
+                ColumnTable* table) {
+  const mjModel& m = parent.model->compiled();
+  std::map<int, std::vector<ProbeTorque>> of_joint;
+  for (const ProbeTorque& torque : torques) of_joint[torque.joint].push_back(torque);
+  std::vector<std::vector<ProbeTorque>> lists;
+  std::vector<MovedSignals> moved;
+  for (auto& [joint, list] : of_joint) {
+    lists.push_back(std::move(list));
+    moved.push_back(bench.coupling->OfPlace(mj_id2name(&m, mjOBJ_JOINT, joint), *bench.rig));
+  }
+  for (const auto& group : ApartGroups(moved)) {
+    for (std::size_t i = 0; i < lists[group.front()].size(); ++i) {
+      const auto probes = Collect(group, [&](std::size_t joint) { return lists[joint][i]; });
+      for (std::size_t k = 0; k < group.size(); ++k) {
+        table->torques.push_back(wanted->first + static_cast<Eigen::Index>(wanted->columns.size()));
+        ExtraColumn extra{
+            .name = "torque", .child = parent.problem.get(), .values = parent.values, .probes = probes};
+        if (group.size() > 1) {
+          extra.moved = moved[group[k]];
+          extra.own_values = parent.values;
+          extra.own_probes = {probes[k]};
+        }
+        wanted->columns.push_back(std::move(extra));
+      }
+    }
   }
 }
 
@@ -159,11 +226,7 @@ Eigen::MatrixXd Reduce(const ColumnTable& table) {
 
 ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, const std::vector<ProbeTorque>& torques) {
   ColumnTable table{.trials = std::move(wanted.trials)};
-  for (const ProbeTorque& torque : torques) {
-    table.torques.push_back(wanted.first + static_cast<Eigen::Index>(wanted.columns.size()));
-    wanted.columns.push_back(
-        {.name = "torque", .child = parent.problem.get(), .values = parent.values, .probe = torque});
-  }
+  AddTorques(bench, parent, torques, &wanted, &table);
   const auto make = [&] {
     // Not with the fit's own Jacobian, which is too fine to look ahead.
     return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01, .steps = StepKind::kQuick});
@@ -281,18 +344,46 @@ std::vector<ProbeTorque> MakeFreeForm(const Workbench& bench) {
   return DrawTorques(bench, kDiagnosePolicy.evidence.free_form, true);
 }
 
+namespace {
+
+// Numbers of uses that are looked at together: one effect on places that do not touch.
+std::vector<std::vector<std::size_t>> GroupsOf(const Workbench& bench, const std::vector<EffectUse>& have,
+                                               const std::vector<EffectUse>& uses) {
+  std::vector<std::pair<const Effect*, std::vector<std::size_t>>> effects;
+  for (std::size_t u = 0; u < uses.size(); ++u) {
+    if (Has(have, uses[u])) continue;
+    const Effect* effect = &EffectOf(uses[u], *bench.rig);
+    if (effects.empty() || effects.back().first != effect) effects.emplace_back(effect, std::vector<std::size_t>());
+    effects.back().second.push_back(u);
+  }
+  std::vector<std::vector<std::size_t>> groups;
+  for (const auto& [effect, numbers] : effects) {
+    const auto moved = Collect(numbers, [&](std::size_t u) { return bench.coupling->OfPlace(uses[u].on, *bench.rig); });
+    for (const auto& group : ApartGroups(moved))
+      groups.push_back(Collect(group, [&](std::size_t i) { return numbers[i]; }));
+  }
+  return groups;
+}
+
+}  // namespace
+
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
                         const std::vector<ProbeTorque>& torques, const ColumnTable* scan) {
   Wanted wanted = WantedOf(parent);
   std::vector<std::unique_ptr<Candidate>> children;  // until the columns are made
-  for (std::size_t u = 0; u < uses.size(); ++u) {
-    if (Has(parent.effects, uses[u])) continue;
+  const auto add = [&](const std::vector<std::size_t>& group) {
     std::vector<EffectUse> effects = parent.effects;
-    effects.push_back(uses[u]);
+    for (const std::size_t u : group) effects.push_back(uses[u]);
     auto made = MakeCandidate(bench, effects);
-    if (!made.ok()) continue;
+    if (!made.ok()) return false;
     children.push_back(std::make_unique<Candidate>(std::move(made).value()));
-    AddTrials(bench, *children.back(), uses[u], u, scan, &wanted);
+    AddTrials(bench, *children.back(), Collect(group, [&](std::size_t u) { return Ask(bench, uses[u], u, scan); }),
+              &wanted);
+    return true;
+  };
+  for (const auto& group : GroupsOf(bench, parent.effects, uses)) {
+    if (add(group) || group.size() == 1) continue;
+    for (const std::size_t u : group) add({u});
   }
   return Finish(bench, parent, std::move(wanted), torques);
 }

@@ -176,16 +176,19 @@ Result<std::unique_ptr<DiagnosisJournal>> OpenJournal(const Model& model, const 
       {.folder = options.journal, .key = key, .resume = options.resume, .deadline = deadline, .warn = options.warn});
 }
 
-// So many windows take so many steps of the simulator.
-std::size_t WindowsIn(std::size_t steps, const Workbench& bench) {
+// So many windows take so many steps of the simulator, each of a model of two joints or less: a step of a larger one
+// costs as much more as it has joints.
+std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& bench) {
+  constexpr double kFew = 2;
+  const double cost = std::max(1.0, static_cast<double>(model.compiled().nv) / kFew);
   return std::max<std::size_t>(
-      1, static_cast<std::size_t>(static_cast<double>(steps) * bench.time_step_s / bench.window_s));
+      1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }
 
 // The windows to fit are chosen once, not by every candidate: of long logs that is a look at every row.
 void ChooseFitted(const Model& model, std::size_t steps, bool by_windows, Workbench* bench) {
   bench->by_windows = by_windows;
-  bench->max_windows = WindowsIn(steps, *bench);
+  bench->max_windows = WindowsIn(steps, model, *bench);
   bench->windows.reset();
   bench->windows =
       std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));

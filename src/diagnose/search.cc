@@ -63,6 +63,7 @@ class Searcher {
 
   void Find() {
     say_("columns of all effects");
+    FindCoupling();
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
@@ -83,6 +84,16 @@ class Searcher {
   }
 
  private:
+  // Few joints, or one drive's, all touch.
+  void FindCoupling() {
+    constexpr std::size_t kFew = 2;
+    const std::vector<ProbeTorque> torques = MakeTorques(bench_);
+    const auto other = [&](const ProbeTorque& torque) { return torque.joint != torques.front().joint; };
+    if (bench_.rig->Actuators().size() <= kFew || std::none_of(torques.begin(), torques.end(), other)) return;
+    Candidate& base = *result_.base;
+    *bench_.coupling = Coupling::Measure(*base.problem, base.point, torques, bench_.work.get());
+  }
+
   // Members are taken out and others tried in their places, until neither changes the set.
   void Settle() {
     for (int round = 0; round < 3; ++round) {

@@ -59,37 +59,90 @@ class FitProblem::Differences {
   }
   void Difference(Eigen::Index column, double h) { jacobian_.col(column) = (worker_.other - base_) / h; }
 
+  // A column's difference in the signals that it moves.
+  void OwnDifference(Eigen::Index column, double h, const MovedSignals& moved) {
+    const auto& measured = problem_.recordings_[window_.log].measured;
+    for (std::size_t s = 0; s < measured.size(); ++s) {
+      if (!moved[measured[s].index]) continue;
+      const Eigen::Index first = static_cast<Eigen::Index>(s) * window_.scored(), count = window_.scored();
+      jacobian_.col(column).segment(first, count) =
+          (worker_.other.segment(first, count) - base_.segment(first, count)) / h;
+    }
+  }
+
+  // Column by column, or in groups where steps are quick: `together` makes a group's columns and says whether it could.
+  template <typename Wanted, typename One, typename InOne>
+  void InGroups(const Together& columns, Wanted wanted, One one, InOne in_one) {
+    for (const auto& all : columns.groups) {
+      std::vector<Eigen::Index> group;
+      std::copy_if(all.begin(), all.end(), std::back_inserter(group), wanted);
+      if (steps_ == StepKind::kQuick && group.size() > 1 && in_one(group)) continue;
+      for (const Eigen::Index column : group) one(column);
+    }
+  }
+
+  // Towards the inside, so that the step does not leave the bounds.
+  double StepOf(Eigen::Index i) const {
+    const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
+    return point_.y[i] + options_.step <= c.high ? options_.step : -options_.step;
+  }
+  void Set(Eigen::Index i, double h) {
+    problem_.space_.SetCoordinate(point_.y, i, point_.y[i] + h, &worker_.values);
+  }
+
   void Parameters() {
     worker_.values = values_;
-    const auto move = [&](Eigen::Index i, double h) {
-      problem_.space_.SetCoordinate(point_.y, i, point_.y[i] + h, &worker_.values);
+    const Together& columns = problem_.parameters_together_;
+    const auto in_one = [&](const std::vector<Eigen::Index>& group) {
+      for (const Eigen::Index i : group) Set(i, StepOf(i));
+      const bool good = Replay(point_, worker_.values, state_, shift_);
+      for (const Eigen::Index i : group) {
+        if (good) OwnDifference(i, StepOf(i), columns.moved[static_cast<std::size_t>(i)]);
+        Set(i, 0);
+      }
+      return good;
+    };
+    InGroups(columns, [&](Eigen::Index i) { return !Known(i); }, [&](Eigen::Index i) { Parameter(i); }, in_one);
+  }
+
+  void Parameter(Eigen::Index i) {
+    const auto move = [&](double h) {
+      Set(i, h);
       return Replay(point_, worker_.values, state_, shift_);
     };
-    for (Eigen::Index i = 0; i < layout_.parameters; ++i) {
-      if (Known(i)) continue;
-      const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
-      // Towards the inside, so that the step does not leave the bounds; the other way when that cannot be simulated.
-      double h = point_.y[i] + options_.step <= c.high ? options_.step : -options_.step;
-      for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
-        if (!move(i, h)) continue;
-        Difference(i, h);
-        break;
-      }
-      const bool inside = point_.y[i] - h >= c.low && point_.y[i] - h <= c.high;
-      if (options_.columns == Columns::kCentral && inside && move(i, -h))
-        jacobian_.col(i) = 0.5 * (jacobian_.col(i) - (worker_.other - base_) / h);
-      problem_.space_.SetCoordinate(point_.y, i, point_.y[i], &worker_.values);
+    const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
+    // The other way when that cannot be simulated.
+    double h = StepOf(i);
+    for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
+      if (!move(h)) continue;
+      Difference(i, h);
+      break;
     }
+    const bool inside = point_.y[i] - h >= c.low && point_.y[i] - h <= c.high;
+    if (options_.columns == Columns::kCentral && inside && move(-h))
+      jacobian_.col(i) = 0.5 * (jacobian_.col(i) - (worker_.other - base_) / h);
+    Set(i, 0);
   }
 
   void States(Eigen::Index first) {
     Eigen::VectorXd moved = state_;
-    for (Eigen::Index j = options_.known_states; j < state_.size(); ++j) {
-      const double h = kFitPolicy.state_step / window_.prior[j];
-      moved[j] += h;
-      if (Replay(point_, values_, moved, shift_)) Difference(first + j, h);
+    const Together& columns = problem_.states_together_[window_.log];
+    const auto step = [&](Eigen::Index j) { return kFitPolicy.state_step / window_.prior[j]; };
+    const auto in_one = [&](const std::vector<Eigen::Index>& group) {
+      for (const Eigen::Index j : group) moved[j] += step(j);
+      const bool good = Replay(point_, values_, moved, shift_);
+      for (const Eigen::Index j : group) {
+        if (good) OwnDifference(first + j, step(j), columns.moved[static_cast<std::size_t>(j)]);
+        moved[j] = state_[j];
+      }
+      return good;
+    };
+    const auto one = [&](Eigen::Index j) {
+      moved[j] += step(j);
+      if (Replay(point_, values_, moved, shift_)) Difference(first + j, step(j));
       moved[j] = state_[j];
-    }
+    };
+    InGroups(columns, [&](Eigen::Index j) { return j >= options_.known_states; }, one, in_one);
   }
 
   // An offset moves its own prediction, and a start that the log gave the other way.
@@ -137,17 +190,22 @@ class FitProblem::Differences {
 Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const {
   Work work;
   if (!base_known) work = {.evaluations = 1, .replays = 1};
+  const bool quick = options.steps == StepKind::kQuick && model_.HasQuickSteps();
+  const auto count = [&](const Together& columns, const auto& wanted, std::size_t each) {
+    for (const auto& group : columns.groups) {
+      const auto members = static_cast<std::size_t>(std::count_if(group.begin(), group.end(), wanted));
+      work.replays += each * (quick ? std::min<std::size_t>(members, 1) : members);
+    }
+  };
+  const auto wanted = [&](Eigen::Index i) {
+    return options.known.empty() || !options.known[static_cast<std::size_t>(i)];
+  };
   if (options.columns != Columns::kStates) {
-    const auto wanted = [&](Eigen::Index i) {
-      return options.known.empty() || !options.known[static_cast<std::size_t>(i)] ? std::size_t{1} : std::size_t{0};
-    };
-    for (Eigen::Index i = 0; i < layout_.parameters; ++i)
-      work.replays += wanted(i) * (options.columns == Columns::kCentral ? 2 : 1);
+    count(parameters_together_, wanted, options.columns == Columns::kCentral ? 2 : 1);
     if (layout_.shift() >= 0) work.replays += wanted(layout_.shift());
   }
   if (!windows_.empty())
-    work.replays +=
-        static_cast<std::size_t>(std::max<Eigen::Index>(0, windows_.front().prior.size() - options.known_states));
+    count(states_together_[windows_.front().log], [&](Eigen::Index j) { return j >= options.known_states; }, 1);
   return work;
 }
 

@@ -6,6 +6,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
+#include "src/fit/coupling.h"
 #include "src/fit/fit_worker.h"
 #include "src/fit/policy.h"
 
@@ -30,6 +31,23 @@ std::vector<Parameter> Bounded(std::vector<Parameter> parameters, const FitOptio
   return parameters;
 }
 
+std::vector<MovedSignals> MovedByParameters(const Model& model, const FitOptions& options, const SearchSpace& space) {
+  return Collect(space.coordinates(), [&](const Coordinate& c) {
+    return options.coupling ? options.coupling->OfParameter(space.parameter(c).name, *model.rig()) : MovedSignals();
+  });
+}
+
+std::vector<MovedSignals> MovedByStates(const Recording& recording, const std::vector<SignalLayout>& signals,
+                                        Eigen::Index states, const FitOptions& options) {
+  std::vector<MovedSignals> moved(static_cast<std::size_t>(states));
+  for (std::size_t s = 0; s < signals.size() && options.coupling; ++s) {
+    if (signals[s].joint_state < 0) continue;
+    const auto first = static_cast<std::size_t>(signals[s].joint_state);
+    moved[first] = moved[first + 1] = options.coupling->OfState(recording.measured[s].index);
+  }
+  return moved;
+}
+
 Eigen::VectorXd StartY(const SearchSpace& space, const FitLayout& layout) {
   Eigen::VectorXd y = Eigen::VectorXd::Zero(layout.low.size());
   y.head(space.size()) = space.ToSearch(space.start());
@@ -39,6 +57,11 @@ Eigen::VectorXd StartY(const SearchSpace& space, const FitLayout& layout) {
 }  // namespace
 
 FitProblem::~FitProblem() = default;
+
+FitProblem::Together::Together(std::vector<MovedSignals> of_columns) : moved(std::move(of_columns)) {
+  for (const auto& group : ApartGroups(moved))
+    groups.push_back(Collect(group, [](std::size_t i) { return static_cast<Eigen::Index>(i); }));
+}
 
 FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordings, FitOptions options,
                        std::vector<double> values, ThreadPool& pool)
@@ -50,9 +73,14 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       space_(parameters_, options_.free, std::move(values), options_.logarithmic_effects, options_.linear_terms),
       layout_(MakeLayout(model, recordings, options_, space_)),
       windows_(MakeFitWindows(model, recordings, options_, layout_, space_.start())),
+      parameters_together_(MovedByParameters(model, options_, space_)),
       prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), CountResiduals(layout_, windows_),
                        model.parameters())),
-      workers_(static_cast<std::size_t>(pool.workers())) {}
+      workers_(static_cast<std::size_t>(pool.workers())) {
+  for (std::size_t l = 0; l < recordings.size(); ++l)
+    states_together_.emplace_back(
+        MovedByStates(recordings[l], layout_.signals[l], layout_.state_priors[l].size(), options_));
+}
 
 std::size_t FitProblem::residuals() const { return CountResiduals(layout_, windows_); }
 
@@ -164,7 +192,7 @@ bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double
   const Recording& recording = recordings_[window.log];
   predicted.resize(window.rows.rows() * recording.measured.size());
   worker.simulator.set_shift_s(place.shift_s);
-  worker.simulator.set_probe(probe_);
+  worker.simulator.set_probes(probes_);
   worker.simulator.set_steps(options_.steps == StepKind::kQuick ? StepKind::kQuick : place.steps);
   if (!worker.simulator.SetParameters(place.values, recording)) return false;
   PlaceStart(worker, place);

@@ -103,7 +103,7 @@ class FitProblem {
   std::vector<LogReplay> Predict(const FitPoint& point);
 
   // In all replays from now on.
-  void SetProbe(const ProbeTorque& probe) { probe_ = probe; }
+  void SetProbes(std::vector<ProbeTorque> probes) { probes_ = std::move(probes); }
 
   // By the residuals of a point whose states are solved: weighs the states by the sensors' noise (StatePriorsByNoise),
   // and sets Huber's threshold where the options ask for one.
@@ -133,6 +133,12 @@ class FitProblem {
   void ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
                    Eigen::VectorXd& residual) const;
   class Differences;  // the columns of one window
+  // Columns that quick steps difference together, and the signals that each moves.
+  struct Together {
+    std::vector<std::vector<Eigen::Index>> groups;
+    std::vector<MovedSignals> moved;
+    explicit Together(std::vector<MovedSignals> of_columns);
+  };
 
   const Model& model_;
   const std::vector<Recording>& recordings_;
@@ -142,9 +148,11 @@ class FitProblem {
   SearchSpace space_;
   FitLayout layout_;
   std::vector<FitWindow> windows_;
+  Together parameters_together_;
+  std::vector<Together> states_together_;  // per log
   Huber huber_;
   Prior prior_;
-  ProbeTorque probe_;
+  std::vector<ProbeTorque> probes_;
   std::vector<std::unique_ptr<Worker>> workers_;
 };
 

@@ -61,6 +61,56 @@ std::optional<Residuals> Added(FitProblem& problem, const FitPoint& point, const
   return std::move(there.residuals);
 }
 
+// Makes columns at a point, those in one replay that may share it.
+class ExtraColumns {
+ public:
+  ExtraColumns(const FitProblem& parent, const FitPoint& point, const Derivatives& at, Work* work)
+      : parent_(parent), point_(point), at_(at), work_(*work) {}
+
+  // What the column adds to the residuals; none: it cannot be simulated.
+  std::optional<Residuals> Make(const ExtraColumn& column) {
+    if (!last_ || last_->child != column.child || last_->values != column.values || last_->probes != column.probes) {
+      together_ = Replay(*column.child, column.values, column.probes);
+      last_ = &column;
+    }
+    if (!together_ && !column.moved.empty()) return Replay(*column.child, column.own_values, column.own_probes);
+    if (!together_ || column.moved.empty()) return together_;
+    return Own(*together_, column.moved);
+  }
+
+ private:
+  std::optional<Residuals> Replay(FitProblem& child, const std::vector<double>& values,
+                                  const std::vector<ProbeTorque>& probes) {
+    const FitPoint there = CarryOver(parent_, point_, child, values);
+    child.SetProbes(probes);
+    std::optional<Residuals> added;
+    if (!at_.quick.empty() && child.model().HasQuickSteps())
+      added = Added(child, there, at_.quick, StepKind::kQuick, &work_);
+    if (!added) added = Added(child, there, at_.residuals, StepKind::kOwn, &work_);
+    child.SetProbes({});
+    return added;
+  }
+  // Zero on the other signals.
+  Residuals Own(Residuals added, const std::vector<char>& moved) const {
+    for (std::size_t w = 0; w < added.size(); ++w) {
+      const FitWindow& window = parent_.windows()[w];
+      const auto& measured = parent_.recordings()[window.log].measured;
+      for (std::size_t s = 0; s < measured.size(); ++s) {
+        if (!moved[measured[s].index])
+          added[w].segment(static_cast<Eigen::Index>(s) * window.scored(), window.scored()).setZero();
+      }
+    }
+    return added;
+  }
+
+  const FitProblem& parent_;
+  const FitPoint& point_;
+  const Derivatives& at_;
+  Work& work_;
+  const ExtraColumn* last_ = nullptr;
+  std::optional<Residuals> together_;
+};
+
 Residuals Zero(const Residuals& like) {
   return Collect(like, [](const Eigen::VectorXd& of) { return Eigen::VectorXd(Eigen::VectorXd::Zero(of.size())); });
 }
@@ -101,17 +151,12 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
   const Derivatives at = parent.Differentiate(point, options);
   gram.work = at.work;
   if (!at.valid) return gram;
+  ExtraColumns columns(parent, point, at, &gram.work);
   std::vector<Residuals> others;
   for (const ExtraColumn& column : extra) {
-    const FitPoint there = CarryOver(parent, point, *column.child, column.values);
-    column.child->SetProbe(column.probe);
-    std::optional<Residuals> added;
-    if (!at.quick.empty() && column.child->model().HasQuickSteps())
-      added = Added(*column.child, there, at.quick, StepKind::kQuick, &gram.work);
-    if (!added) added = Added(*column.child, there, at.residuals, StepKind::kOwn, &gram.work);
-    column.child->SetProbe({});
+    std::optional<Residuals> added = columns.Make(column);
     gram.failed.push_back(static_cast<char>(!added));
-    others.push_back(added ? std::move(*added) : Zero(at.residuals));
+    others.push_back(added ? *std::move(added) : Zero(at.residuals));
   }
   const std::size_t count = parent.windows().size();
   std::vector<std::vector<std::pair<RowBlock, Eigen::MatrixXd>>> parts(count);

@@ -39,8 +39,14 @@ struct GramSystem {
 struct ExtraColumn {
   std::string name;
   FitProblem* child = nullptr;  // of the same logs and windows, without parameters of its own that matter
-  std::vector<double> values;   // of the child's model
-  ProbeTorque probe = {};
+  // At these values of the child's model, under these torques. Columns in a row that have both in common are made in
+  // one replay, and each keeps its own signals alone.
+  std::vector<double> values;
+  std::vector<ProbeTorque> probes = {};
+  std::vector<char> moved = {};  // by the experiment's signals: those that are its own; empty: all
+  // Where that cannot be simulated together: its own part of it.
+  std::vector<double> own_values = {};
+  std::vector<ProbeTorque> own_probes = {};
 };
 
 // GramSystem::columns of a problem with these.

@@ -14,6 +14,7 @@
 namespace gapscope {
 
 struct LogWindow;
+class Coupling;
 
 // Which windows of each log a problem takes: with kTrain and kHeldOut every third one is held out, from
 // another one on in each log.
@@ -33,6 +34,9 @@ enum class WindowStart { kLog, kRest };
 // that say most (ChooseWindows).
 enum class WindowChoice { kEven, kTelling };
 
+// By the experiment's signals, nonzero: moved; empty: all, or nothing is known.
+using MovedSignals = std::vector<char>;
+
 struct FitOptions {
   std::vector<int> free;  // indices of tuned parameters
   ObjectiveKind objective = ObjectiveKind::kWindows;
@@ -44,6 +48,8 @@ struct FitOptions {
   WindowChoice choice = WindowChoice::kEven;
   // TakenWindows of these options, where many problems on the same logs share them; null: chosen anew.
   std::shared_ptr<const std::vector<LogWindow>> windows;
+  // What moves no signal in common is differenced together, where steps are quick; null: nothing is known.
+  std::shared_ptr<const Coupling> coupling;
   double time_step_s = 0;    // 0: the model's
   StepKind steps = StepKind::kOwn;  // of all replays
   bool fit_offsets = true;   // zero offsets of measured positions, per log

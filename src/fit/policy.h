@@ -32,6 +32,8 @@ struct FitPolicy {
   // within about +-20 % of nominal, and their bounds at nominal / 1.6 and nominal * 1.6; sensors are zeroed by hand or
   // at start, and what a rest angle could explain as well is the rest angle's.
   double known_share = 0.15, known_offset_rad = 0.03;
+  // What a change moves of a signal, as a share of all that it moves, from which on it moves that signal too.
+  double touches = 0.05;
   // Length of a block of residuals that is judged as one: longer than sensors' noise and slow residuals remember.
   double block_s = 0.5;
 };

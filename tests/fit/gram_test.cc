@@ -180,7 +180,7 @@ TEST(GramTest, ProbeOfAConstantIsABias) {
   const int joint = mj_name2id(&bench.rig.model->compiled(), mjOBJ_JOINT, "arm");
   ASSERT_GE(joint, 0);
   const Residuals plain = parent.Evaluate(parent.Start(), Keep::kResiduals).residuals;
-  parent.SetProbe({.joint = joint, .amplitude_n_m = kBias_n_m, .phase_rad = std::numbers::pi / 2});
+  parent.SetProbes({{.joint = joint, .amplitude_n_m = kBias_n_m, .phase_rad = std::numbers::pi / 2}});
   const Residuals probed = parent.Evaluate(parent.Start(), Keep::kResiduals).residuals;
   FitProblem biased(*with.model, bench.logs, bench.Options(bench.rig),
                     with.Values({{"torque_bias@arm.torque_n_m", kBias_n_m}}), bench.pool);

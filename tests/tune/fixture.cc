@@ -53,7 +53,8 @@ Rig LoadCubicCable() {
 
 // The model is read again by whoever builds a variant, so the files stay until the end.
 struct Folder {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / ("gapscope_cart_" + std::to_string(getpid()));
+  static inline int made = 0;
+  std::filesystem::path path = std::filesystem::temp_directory_path() / ("gapscope_cart_" + std::to_string(getpid()) + "_" + std::to_string(++made));
   Folder() { std::filesystem::create_directories(path); }
   ~Folder() { std::filesystem::remove_all(path); }
 };
@@ -75,6 +76,36 @@ Rig LoadCart(double low, double high) {
   WriteFile((folder / "cart.xml").string(), kCartXml).value();
   WriteFile((folder / "experiment.yaml").string(), yaml).value();
   return Build((folder / "experiment.yaml").string(), {});
+}
+
+Rig LoadThreeCarts(bool linked) {
+  static const Folder owner;
+  const std::string name = linked ? "linked" : "apart";
+  std::string bodies, motors, yaml = "schema: gapscope.experiment/1\nmodel: " + name + ".xml\n";
+  std::string commands = "commands:\n", measured = "measured:\n", parameters = "parameters:\n", set = "set:\n";
+  const std::string inertia = "<inertial pos='0 0 0' mass='2' diaginertia='1 1 1'/>";
+  for (const std::string cart : {"a", "b", "c"}) {
+    const std::string body =
+        "<body><joint name='" + cart + "' type='slide' axis='1 0 0' stiffness='8' damping='1'/>" + inertia;
+    // A linked cart stands on the one before.
+    const bool on_top = linked && cart == "c";
+    if (on_top) bodies.erase(bodies.size() - std::string("</body>").size());
+    bodies += body + "</body>" + (on_top ? "</body>" : "");
+    motors += "<general name='" + cart + "' joint='" + cart + "'/>";
+    commands += "  - {actuator: " + cart + ", column: u" + cart + ", unit: N}\n";
+    measured += "  - {signal: " + cart + "_m, column: " + cart + ", joint: " + cart + ", unit: m}\n";
+    parameters += "  " + cart + ".gain: {unit: \"1\", nominal: 1.5, bounds: [0.1, 10]}\n  " + cart +
+                  ".damping: {unit: N s/m, nominal: 1, bounds: [0, 4]}\n";
+    set += "  actuator/" + cart + "/gain: " + cart + ".gain\n  joint/" + cart + "/damping: " + cart + ".damping\n";
+  }
+  yaml += "log: {time: {column: t, unit: s}}\n" + commands + measured + parameters + set;
+  const std::string path = (owner.path / name).string();
+  WriteFile(path + ".xml", "<mujoco><option timestep='0.004' integrator='RK4' gravity='0 0 0'>"
+                           "<flag contact='disable'/></option><worldbody>" +
+                               bodies + "</worldbody><actuator>" + motors + "</actuator></mujoco>")
+      .value();
+  WriteFile(path + ".yaml", yaml).value();
+  return Build(path + ".yaml", {});
 }
 
 std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command) {

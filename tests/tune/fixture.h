@@ -31,6 +31,9 @@ Rig LoadCubicCable();
 // time. Parameters: cart.gain (1.5, within [low, high]; in units, not logarithmic), cart.damping (0, [0, 4], frozen).
 Rig LoadCart(double low = -10, double high = 10);
 inline constexpr double kCartMass_kg = 2, kCartStiffness_n_per_m = 8, kCartStep_s = 0.004;
+// Three such carts side by side, by Runge-Kutta: a, b, c; the second one drags the third along where `linked`.
+// Parameters: CART.gain, CART.damping, free.
+Rig LoadThreeCarts(bool linked);
 // The cart's positions at the stamps of `command`, by an integrator of the test's own (semi-implicit Euler, as
 // MuJoCo's), without damping.
 std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command);

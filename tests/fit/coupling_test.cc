@@ -1,0 +1,119 @@
+// What is measured of joints that touch, and columns made together against columns made one by one.
+#include "src/fit/coupling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "src/fit/gram.h"
+#include "tests/tune/fixture.h"
+
+namespace gapscope::testing {
+namespace {
+
+constexpr double kStep = 0.01;
+const DifferenceOptions kQuick{.step = kStep, .steps = StepKind::kQuick};
+
+// Three carts, each under its own command.
+struct Bench {
+  Rig rig;
+  std::vector<Recording> logs;
+  ThreadPool pool{1};
+  explicit Bench(bool linked) : rig(LoadThreeCarts(linked)) {
+    logs = {MakeLog(rig, rig.model->Nominal(), [](double) { return 0.0; }, 2, kCartStep_s, 1e-4, 1)};
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t k = 0; k < logs[0].rows(); ++k)
+        logs[0].commands[c].values[k] = std::sin((3.0 + static_cast<double>(c)) * logs[0].time_s[k]);
+    }
+  }
+  FitOptions Options(std::shared_ptr<const Coupling> coupling = nullptr) const {
+    return {.free = rig.model->FreeParameters(), .coupling = std::move(coupling), .time_step_s = kCartStep_s};
+  }
+  FitProblem Problem(std::shared_ptr<const Coupling> coupling = nullptr) {
+    return {*rig.model, logs, Options(std::move(coupling)), rig.model->Nominal(), pool};
+  }
+  std::vector<ProbeTorque> Probes() const {
+    std::vector<ProbeTorque> probes;
+    for (int joint = 0; joint < 3; ++joint)
+      probes.push_back({.joint = joint, .amplitude_n_m = 0.1, .per_rad = 2, .phase_rad = 1.0 + joint});
+    return probes;
+  }
+  std::shared_ptr<const Coupling> Measured() {
+    FitProblem problem = Problem();
+    Work work;
+    return std::make_shared<const Coupling>(Coupling::Measure(problem, problem.Start(), Probes(), &work));
+  }
+};
+
+using Groups = std::vector<std::vector<std::size_t>>;
+
+TEST(ApartGroupsTest, MembersShareNoSignal) {
+  EXPECT_EQ(ApartGroups({{1, 0, 0}, {1, 1, 0}, {0, 0, 1}, {0, 1, 0}}), (Groups{{0, 2, 3}, {1}}));
+  EXPECT_EQ(ApartGroups({{}, {1, 0}, {}, {0, 1}}), (Groups{{0}, {1, 3}, {2}}));  // what moves all is alone
+}
+
+TEST(CouplingTest, CartsThatStandApartMoveTheirOwnSignals) {
+  Bench bench(false);
+  const auto coupling = bench.Measured();
+  const gapscope::Rig& rig = *bench.rig.model->rig();
+  EXPECT_EQ(coupling->OfPlace("b", rig), (MovedSignals{0, 1, 0}));
+  EXPECT_EQ(coupling->OfPlace("c_m", rig), (MovedSignals{0, 0, 1}));
+  EXPECT_EQ(coupling->OfParameter("a.damping", rig), (MovedSignals{1, 0, 0}));
+  EXPECT_EQ(coupling->OfParameter("coulomb_friction@c.friction_n_m", rig), (MovedSignals{0, 0, 1}));
+  EXPECT_EQ(coupling->OfState(1), (MovedSignals{0, 1, 0}));
+  EXPECT_TRUE(coupling->OfPlace("all", rig).empty());
+}
+
+// A force on the lower cart moves the upper one relative to it, and the other way round.
+TEST(CouplingTest, ACartOnAnotherTouchesIt) {
+  Bench bench(true);
+  const auto coupling = bench.Measured();
+  const gapscope::Rig& rig = *bench.rig.model->rig();
+  EXPECT_EQ(coupling->OfPlace("a", rig), (MovedSignals{1, 0, 0}));
+  EXPECT_EQ(coupling->OfPlace("b", rig), (MovedSignals{0, 1, 1}));
+  EXPECT_EQ(coupling->OfPlace("c", rig), (MovedSignals{0, 1, 1}));
+}
+
+TEST(CouplingTest, AJacobianMadeTogetherIsTheOneMadeColumnByColumn) {
+  for (const bool linked : {false, true}) {
+    Bench bench(linked);
+    FitProblem alone = bench.Problem(), together = bench.Problem(bench.Measured());
+    const Derivatives a = alone.Differentiate(alone.Start(), kQuick),
+                      b = together.Differentiate(together.Start(), kQuick);
+    ASSERT_TRUE(a.valid && b.valid);
+    for (std::size_t w = 0; w < a.jacobians.size(); ++w) {
+      for (Eigen::Index i = 0; i < a.jacobians[w].cols(); ++i)
+        EXPECT_LT((a.jacobians[w].col(i) - b.jacobians[w].col(i)).norm(), 1e-9 + 1e-6 * a.jacobians[w].col(i).norm())
+            << linked << w << " " << i;
+    }
+    // Residuals, and what is differenced: the same by quick steps, gains, dampings, angles, speeds and the shift.
+    if (!linked) EXPECT_EQ(b.work.replays, 7u);
+    EXPECT_LT(b.work.replays, a.work.replays);
+    EXPECT_LT(b.work.steps, a.work.steps);
+    // What the bottom of a fit rests on is never made together.
+    EXPECT_EQ(together.Differentiate(together.Start(), {.step = kStep}).jacobians[0],
+              alone.Differentiate(alone.Start(), {.step = kStep}).jacobians[0]);
+  }
+}
+
+TEST(CouplingTest, TorquesInOneReplayAreThoseOfThreeReplays) {
+  Bench bench(false);
+  FitProblem problem = bench.Problem();
+  const auto coupling = bench.Measured();
+  const std::vector<double> values = bench.rig.model->Nominal();
+  std::vector<ExtraColumn> apart, together;
+  for (const ProbeTorque& probe : bench.Probes()) {
+    apart.push_back({.name = "torque", .child = &problem, .values = values, .probes = {probe}});
+    ExtraColumn column{.name = "torque", .child = &problem, .values = values, .probes = bench.Probes()};
+    column.moved = coupling->OfPlace(std::string(1, static_cast<char>('a' + probe.joint)), *bench.rig.model->rig());
+    together.push_back(std::move(column));
+  }
+  const GramSystem a = MakeGram(problem, problem.Start(), apart, kQuick),
+                   b = MakeGram(problem, problem.Start(), together, kQuick);
+  const Eigen::MatrixXd sum = Sum(a);
+  EXPECT_LT((sum - Sum(b)).norm(), 1e-9 * sum.norm());
+  EXPECT_EQ(a.work.replays, b.work.replays + 2);
+}
+
+}  // namespace
+}  // namespace gapscope::testing

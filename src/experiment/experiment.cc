@@ -173,21 +173,33 @@ std::vector<MeasuredSpec> ReadOrientation(YamlMap& map, const YAML::Node& item, 
   return each;
 }
 
+// The sensor of a body's or a site's pose, which need not be in the MJCF; empty: neither is named.
+std::string ReadPosed(YamlMap& map, bool orients, MeasuredSpec* spec) {
+  spec->body = map.Text("body", "");
+  spec->site = map.Text("site", "");
+  if (spec->body.empty() == spec->site.empty()) return "";
+  const std::string of = orients ? "orientation of " : "position of ";
+  return of + (spec->site.empty() ? "body " + spec->body : "site " + spec->site);
+}
+
 // What of the model the signal is, and its unit. `elements`: how many columns `columns_of_elements` names; four are an
 // orientation unless the kind is said.
 void ReadSource(YamlMap& map, const YAML::Node& item, std::size_t elements, MeasuredSpec* spec) {
   std::vector<std::string> kinds;
   for (const auto& row : AllSignalTraits()) kinds.emplace_back(row.name);
-  const std::string sites[] = {map.Text("joint", ""), map.Text("actuator", ""), map.Text("sensor", "")};
-  const bool of_sensor = !sites[static_cast<int>(SignalSite::kSensor)].empty();
+  const bool of_sensor = map.Has("sensor") || map.Has("body") || map.Has("site");
   const SignalKind of_columns = elements == kQuaternion ? SignalKind::kOrientation : SignalKind::kSensor;
   const SignalTraits& traits =
       of_sensor && !map.Has("kind") ? TraitsOf(of_columns) : AllSignalTraits()[map.Choice("kind", kinds, 0)];
   spec->kind = traits.kind;
-  spec->on = sites[static_cast<int>(traits.site)];
-  if (spec->on.empty() || std::ranges::count(sites, "") != 2) {
+  const std::string named[] = {map.Text("joint", ""), map.Text("actuator", ""), map.Text("sensor", ""),
+                               ReadPosed(map, traits.kind == SignalKind::kOrientation, spec)};
+  spec->on = named[static_cast<int>(traits.site)];
+  if (spec->on.empty() && traits.site == SignalSite::kSensor) spec->on = named[3];
+  if (spec->on.empty() || std::ranges::count(named, "") != 3 || (!spec->body.empty() && !spec->site.empty())) {
     map.Fail(item, {.what = "the signal '" + spec->signal +
-                            "' needs exactly one of 'joint' (position, velocity), 'actuator' (torque) or 'sensor'"});
+                            "' needs exactly one of 'joint' (position, velocity), 'actuator' (torque), 'sensor', or "
+                            "'body' or 'site' (a pose)"});
   }
   if (map.Has("element")) {
     const double element = map.Number("element");

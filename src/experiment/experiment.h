@@ -102,6 +102,7 @@ struct MeasuredSpec {
   WrapRepair wrap = WrapRepair::kKeep;
   double wrap_period = 0;
   std::string offset_parameter;     // predicted = model + this parameter; empty: none
+  std::string body, site;           // whose pose `on` is, a sensor that the experiment adds; empty: `on` is the MJCF's
   std::optional<bool> starts = {};  // a free body's pose, from which windows start; none: where it is one
   std::string where;                // file:line:column, for errors
 };

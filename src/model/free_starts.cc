@@ -28,7 +28,7 @@ int BodyOf(const mjModel& m, int sensor) {
 }
 
 // The free joint of the body that the sensor's object is fixed to; -1: it has another joint, or none.
-int FreeJointOf(const mjModel& m, int sensor) {
+int CarryingJoint(const mjModel& m, int sensor) {
   const int body = BodyOf(m, sensor);
   if (body < 0 || m.sensor_refid[sensor] >= 0) return -1;
   const int carrier = m.body_weldid[body];
@@ -106,7 +106,7 @@ Error NoStart(const mjModel& m, const MeasuredSpec& spec, int sensor) {
   if (!pose) {
     error.actual = "the sensor '" + spec.on + "' measures no pose";
     error.allowed = "'framepos' and 'framequat'";
-  } else if (FreeJointOf(m, sensor) < 0) {
+  } else if (CarryingJoint(m, sensor) < 0) {
     const int body = BodyOf(m, sensor);
     error.actual = m.sensor_refid[sensor] >= 0 ? "the sensor '" + spec.on + "' has a 'reftype'"
                    : body < 0                  ? "the sensor '" + spec.on + "' is on no body"
@@ -133,7 +133,7 @@ Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& m, const Experiment
       const MeasuredSpec& spec = experiment.measured[i];
       const int sensor =
           TraitsOf(spec.kind).site == SignalSite::kSensor ? mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()) : -1;
-      if (sensor < 0 || !spec.starts.value_or(true) || FreeJointOf(m, sensor) != joint) continue;
+      if (sensor < 0 || !spec.starts.value_or(true) || CarryingJoint(m, sensor) != joint) continue;
       if (SaysPlace(m, spec, sensor) && start.position[0] < 0) {
         const std::array<int, 3> elements = ElementsOf(experiment, spec.on);
         if (std::ranges::find(elements, -1) != elements.end()) continue;

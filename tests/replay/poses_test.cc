@@ -137,6 +137,23 @@ TEST_F(PosesTest, AFreeBodyStartsFromItsMeasuredPose) {
   }
 }
 
+// The MJCF's sensors and those that the experiment adds read the same: of the site, and of the body itself.
+TEST_F(PosesTest, BodiesAndSitesNeedNoSensorInTheMjcf) {
+  Load(Replaced(Replaced(kYaml, "sensor: place", "site: marker"), "sensor: turn", "site: marker"));
+  ASSERT_EQ(model_->free_starts().size(), 1u);
+  InitialState start = Truth();
+  const auto predicted = Predict(*model_, recording_, {}, &start);
+  for (std::size_t s = 0; s < 6; ++s)
+    EXPECT_LT(LargestDifference(predicted[s], recording_.measured[s].values), 1e-8) << s;
+  Load(Replaced(Replaced(kYaml, "sensor: place", "body: top"), "sensor: turn", "body: top"));
+  start = Truth();
+  const auto of_body = Predict(*model_, recording_, {}, &start);
+  for (std::size_t row = 0; row < recording_.rows(); ++row) {
+    for (std::size_t i = 0; i < 3; ++i)
+      ASSERT_NEAR(of_body[i][row], top_.Place(recording_.time_s[row])[static_cast<int>(i)], 1e-8) << row;
+  }
+}
+
 TEST_F(PosesTest, OrderOfColumnsMayBeStated) {
   const std::string yaml = Replaced(kYaml, "[qw, qx, qy, qz]", "[qx, qy, qz, qw], order: xyzw");
   Load(yaml);
@@ -196,6 +213,12 @@ TEST_F(PosesTest, ErrorsSayWhatAndWhere) {
       {"sensor: turn", "sensor: arm_turn, start: true", {"experiment.yaml:5:5:", "'arm' has no free joint", "top"}},
       {"sensor: place", "sensor: gyro, start: true", {"experiment.yaml:4:5:", "no pose", "framepos"}},
       {"columns_of_elements: [x, y, z]", "element: 1, column: y, start: true", {"experiment.yaml:4:5:", "not all of"}},
+      {"sensor: turn", "body: tob", {"experiment.yaml:5:5:", "body that the MJCF lacks", "did you mean 'top'?"}},
+      {"sensor: place", "site: maker", {"experiment.yaml:4:5:", "site that the MJCF lacks", "'marker'"}},
+      {"sensor: place", "sensor: place, body: top", {"experiment.yaml:4:5:", "exactly one of"}},
+      {"sensor: place", "body: top, site: tip", {"experiment.yaml:4:5:", "exactly one of"}},
+      {"columns_of_elements: [x, y, z]", "column: x", {"experiment.yaml:4:5:", "has several elements"}},
+      {"sensor: turn", "body: arm, start: true", {"experiment.yaml:5:5:", "'arm' has no free joint"}},
       {"sensor: turn", "sensor: tern", {"experiment.yaml:5:5:", "that the MJCF lacks", "'turn'"}},
   };
   const std::string good = Replaced(kYaml, "unit: mm", "unit: \"1\"");

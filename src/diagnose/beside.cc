@@ -104,10 +104,9 @@ std::vector<EffectEstimate> BoundsOfEffect(const Workbench& bench, const ColumnT
   return bounds;
 }
 
-// A free-form torque fitted to one half of the blocks, judged on the other one, and the other way round.
+// A free-form torque fitted to one of two parts of each log, judged on the other one, and the other way round.
 double FreeFormShare(const ColumnTable& table, const TorquePrior& torques) {
   if (!(torques.ratio > 0)) return 0;
-  const long kBlocks = 4;  // half seconds in a row are one fold's
   const Eigen::Index residual = table.sum.cols() - 1;
   std::vector<Eigen::Index> columns = table.FreeCoordinates();
   const std::size_t own = columns.size();
@@ -115,8 +114,8 @@ double FreeFormShare(const ColumnTable& table, const TorquePrior& torques) {
   double before = 0, after = 0;
   for (const long fold : {0L, 1L}) {
     std::vector<double> fitted, judged;
-    for (const GramBlock& block : table.gram.blocks) {
-      const bool in = (block.half_second / kBlocks + static_cast<long>(block.log)) % 2 == fold;
+    for (const GramPart& part : table.gram.parts) {
+      const bool in = (part.number + static_cast<long>(part.log)) % 2 == fold;
       fitted.push_back(in ? 1 : 0), judged.push_back(in ? 0 : 1);
     }
     const Eigen::MatrixXd a = Sum(table.gram, fitted), b = Sum(table.gram, judged);

@@ -176,11 +176,10 @@ Result<std::unique_ptr<DiagnosisJournal>> OpenJournal(const Model& model, const 
       {.folder = options.journal, .key = key, .resume = options.resume, .deadline = deadline, .warn = options.warn});
 }
 
-// So many windows take so many steps of the simulator, each of a model of two joints or less: a step of a larger one
-// costs as much more as it has joints.
+// So many windows take so many steps of the simulator, each of a model of two joints or less: with each more joint a
+// step costs as much again.
 std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& bench) {
-  constexpr double kFew = 2;
-  const double cost = std::max(1.0, static_cast<double>(model.compiled().nv) / kFew);
+  const double cost = std::max(1.0, static_cast<double>(model.compiled().nv) - 1);
   return std::max<std::size_t>(
       1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }

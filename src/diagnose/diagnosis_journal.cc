@@ -71,12 +71,13 @@ std::vector<double> Pack(const GramSystem& g) {
   out.push_back(static_cast<double>(g.failed.size()));
   out.insert(out.end(), g.failed.begin(), g.failed.end());
   PutAll(out, g.of_priors);
-  out.push_back(static_cast<double>(g.blocks.size()));
-  for (const GramBlock& block : g.blocks) {
+  out.push_back(static_cast<double>(g.half_seconds));
+  out.push_back(static_cast<double>(g.parts.size()));
+  for (const GramPart& part : g.parts) {
     for (const double n :
-         {static_cast<double>(block.log), static_cast<double>(block.half_second), static_cast<double>(block.rows)})
+         {static_cast<double>(part.log), static_cast<double>(part.number), static_cast<double>(part.rows)})
       out.push_back(n);
-    Put(out, block.products);
+    Put(out, part.products);
   }
   return out;
 }
@@ -89,12 +90,13 @@ GramSystem UnpackGram(const std::vector<double>& numbers) {
   g.failed.resize(in.Count());
   for (char& failed : g.failed) failed = static_cast<char>(in.Number());
   g.of_priors = TakeAll<Eigen::MatrixXd>(in);
-  g.blocks.resize(in.Count());
-  for (GramBlock& block : g.blocks) {
-    block.log = in.Count();
-    block.half_second = static_cast<long>(in.Number());
-    block.rows = in.Count();
-    block.products = in.Matrix();
+  g.half_seconds = in.Count();
+  g.parts.resize(in.Count());
+  for (GramPart& part : g.parts) {
+    part.log = in.Count();
+    part.number = static_cast<long>(in.Number());
+    part.rows = in.Count();
+    part.products = in.Matrix();
   }
   return g;
 }

@@ -32,7 +32,7 @@ TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double sh
 }
 
 TorquePrior TorquesBeside(const ColumnTable& table, std::size_t residuals) {
-  const double numbers = kDiagnosePolicy.evidence.per_block * static_cast<double>(table.gram.blocks.size()),
+  const double numbers = kDiagnosePolicy.evidence.per_block * static_cast<double>(table.gram.half_seconds),
                share = numbers / static_cast<double>(std::max<std::size_t>(1, residuals));
   std::vector<Eigen::Index> kept = Collect(table.torques, [&](Eigen::Index c) { return table.Reduced(c); });
   kept.push_back(table.reduced.cols() - 1);

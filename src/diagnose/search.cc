@@ -43,6 +43,7 @@ class Searcher {
                    .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
     }
     ScoreCandidate(bench_, &nominal);
+    FindCoupling(nominal);
     result_.nominal = std::make_unique<Candidate>(std::move(nominal));
     result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kFinish);
     for (std::size_t round = 0; round < kPolicy.widenings && WidenBounds(*result_.base); ++round) {
@@ -63,7 +64,7 @@ class Searcher {
 
   void Find() {
     say_("columns of all effects");
-    FindCoupling();
+    FindCoupling(*result_.base);
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
@@ -85,13 +86,12 @@ class Searcher {
 
  private:
   // Few joints, or one drive's, all touch.
-  void FindCoupling() {
+  void FindCoupling(Candidate& at) {
     constexpr std::size_t kFew = 2;
     const std::vector<ProbeTorque> torques = MakeTorques(bench_);
     const auto other = [&](const ProbeTorque& torque) { return torque.joint != torques.front().joint; };
     if (bench_.rig->Actuators().size() <= kFew || std::none_of(torques.begin(), torques.end(), other)) return;
-    Candidate& base = *result_.base;
-    *bench_.coupling = Coupling::Measure(*base.problem, base.point, torques, bench_.work.get());
+    *bench_.coupling = Coupling::Measure(*at.problem, at.point, torques, bench_.work.get());
   }
 
   // Members are taken out and others tried in their places, until neither changes the set.

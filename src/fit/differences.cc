@@ -70,13 +70,14 @@ class FitProblem::Differences {
     }
   }
 
-  // Column by column, or in groups where steps are quick: `together` makes a group's columns and says whether it could.
+  // Column by column, or in groups but for central differences: `in_one` makes a group's columns and says whether it
+  // could.
   template <typename Wanted, typename One, typename InOne>
   void InGroups(const Together& columns, Wanted wanted, One one, InOne in_one) {
     for (const auto& all : columns.groups) {
       std::vector<Eigen::Index> group;
       std::copy_if(all.begin(), all.end(), std::back_inserter(group), wanted);
-      if (steps_ == StepKind::kQuick && group.size() > 1 && in_one(group)) continue;
+      if (options_.columns != Columns::kCentral && group.size() > 1 && in_one(group)) continue;
       for (const Eigen::Index column : group) one(column);
     }
   }
@@ -190,11 +191,11 @@ class FitProblem::Differences {
 Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const {
   Work work;
   if (!base_known) work = {.evaluations = 1, .replays = 1};
-  const bool quick = options.steps == StepKind::kQuick && model_.HasQuickSteps();
+  const bool alone = options.columns == Columns::kCentral;
   const auto count = [&](const Together& columns, const auto& wanted, std::size_t each) {
     for (const auto& group : columns.groups) {
       const auto members = static_cast<std::size_t>(std::count_if(group.begin(), group.end(), wanted));
-      work.replays += each * (quick ? std::min<std::size_t>(members, 1) : members);
+      work.replays += each * (alone ? members : std::min<std::size_t>(members, 1));
     }
   };
   const auto wanted = [&](Eigen::Index i) {

@@ -133,7 +133,7 @@ class FitProblem {
   void ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
                    Eigen::VectorXd& residual) const;
   class Differences;  // the columns of one window
-  // Columns that quick steps difference together, and the signals that each moves.
+  // Columns that one-sided differences make together, and the signals that each moves.
   struct Together {
     std::vector<std::vector<Eigen::Index>> groups;
     std::vector<MovedSignals> moved;

@@ -6,6 +6,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include "src/core/collect.h"
 #include "src/core/dense.h"
@@ -115,14 +116,31 @@ Residuals Zero(const Residuals& like) {
   return Collect(like, [](const Eigen::VectorXd& of) { return Eigen::VectorXd(Eigen::VectorXd::Zero(of.size())); });
 }
 
-// Rows of all signals that lie in a block of rows.
-Eigen::MatrixXd Products(const Eigen::MatrixXd& rows, const RowBlock& block, Eigen::Index scored) {
-  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(rows.cols(), rows.cols());
-  for (Eigen::Index first = block.begin; first < rows.rows(); first += scored) {
-    const auto part = rows.middleRows(first, block.count);
-    products.noalias() += part.transpose() * part;
-  }
-  return products;
+// Scored rows of a window that belong to a part.
+struct PartRows {
+  std::size_t window = 0;
+  RowBlock rows;
+};
+
+// Products of the part's rows, of all signals: the lower half stripe by stripe, so that the sums are the same on any
+// number of workers, and no worker holds a matrix of its own.
+Eigen::MatrixXd Products(const FitProblem& problem, const std::vector<StateFree>& columns,
+                         const std::vector<PartRows>& part) {
+  constexpr Eigen::Index kStripe = 64;
+  const Eigen::Index size = columns.front().rows.cols();
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(size, size);
+  problem.pool().ForEach(static_cast<std::size_t>((size + kStripe - 1) / kStripe), [&](std::size_t k, int) {
+    const Eigen::Index first = static_cast<Eigen::Index>(k) * kStripe, width = std::min(kStripe, size - first);
+    for (const auto& [window, block] : part) {
+      const Eigen::MatrixXd& all = columns[window].rows;
+      for (Eigen::Index row = block.begin; row < all.rows(); row += problem.windows()[window].scored()) {
+        const auto rows = all.middleRows(row, block.count);
+        products.block(first, first, size - first, width).noalias() +=
+            rows.rightCols(size - first).transpose() * rows.middleCols(first, width);
+      }
+    }
+  });
+  return products.selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace
@@ -146,7 +164,7 @@ std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const 
 }
 
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options) {
+                    const DifferenceOptions& options, const std::function<long(long)>& part_of) {
   GramSystem gram{.columns = ColumnNames(parent, extra), .parameters = parent.layout().low.size()};
   const Derivatives at = parent.Differentiate(point, options);
   gram.work = at.work;
@@ -159,46 +177,43 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
     others.push_back(added ? *std::move(added) : Zero(at.residuals));
   }
   const std::size_t count = parent.windows().size();
-  std::vector<std::vector<std::pair<RowBlock, Eigen::MatrixXd>>> parts(count);
-  std::vector<Eigen::MatrixXd> priors(count);
-  parent.pool().ForEach(count, [&](std::size_t w, int) {
-    const FitWindow& window = parent.windows()[w];
-    const StateFree columns = WindowColumns(parent, w, point, at, others);
-    for (const RowBlock& block : RowBlocks(parent.recordings()[window.log], window))
-      parts[w].emplace_back(block, Products(columns.rows, block, window.scored()));
-    priors[w] = columns.prior.transpose() * columns.prior;
-  });
+  std::vector<StateFree> state_free(count);
+  parent.pool().ForEach(count,
+                        [&](std::size_t w, int) { state_free[w] = WindowColumns(parent, w, point, at, others); });
   const auto size = static_cast<Eigen::Index>(gram.columns.size());
   gram.of_priors.assign(parent.recordings().size(), Eigen::MatrixXd::Zero(size, size));
-  std::map<std::pair<std::size_t, long>, GramBlock> blocks;
+  std::map<std::pair<std::size_t, long>, std::vector<PartRows>> parts;
+  std::set<std::pair<std::size_t, long>> half_seconds;
   for (std::size_t w = 0; w < count; ++w) {
-    const std::size_t log = parent.windows()[w].log, signals = parent.recordings()[log].measured.size();
-    gram.of_priors[log] += priors[w];
-    for (auto& [rows, products] : parts[w]) {
-      GramBlock& block = blocks[{log, rows.half_second}];
-      if (block.products.size() == 0) {
-        block = {.log = log, .half_second = rows.half_second, .products = Eigen::MatrixXd::Zero(size, size)};
-      }
-      block.rows += static_cast<std::size_t>(rows.count) * signals;
-      block.products += products;
+    const FitWindow& window = parent.windows()[w];
+    gram.of_priors[window.log].noalias() += state_free[w].prior.transpose() * state_free[w].prior;
+    for (const RowBlock& block : RowBlocks(parent.recordings()[window.log], window)) {
+      half_seconds.insert({window.log, block.half_second});
+      parts[{window.log, part_of ? part_of(block.half_second) : 0}].push_back({w, block});
     }
   }
-  for (auto& [key, block] : blocks) gram.blocks.push_back(std::move(block));
+  gram.half_seconds = half_seconds.size();
+  for (const auto& [key, rows] : parts) {
+    GramPart part{.log = key.first, .number = key.second, .products = Products(parent, state_free, rows)};
+    for (const PartRows& of : rows)
+      part.rows += static_cast<std::size_t>(of.rows.count) * parent.recordings()[part.log].measured.size();
+    gram.parts.push_back(std::move(part));
+  }
   gram.valid = true;
   return gram;
 }
 
 Eigen::MatrixXd Sum(const GramSystem& gram, std::span<const double> weights) {
-  GS_CHECK(weights.empty() || weights.size() == gram.blocks.size());
+  GS_CHECK(weights.empty() || weights.size() == gram.parts.size());
   const auto size = static_cast<Eigen::Index>(gram.columns.size());
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
   std::vector<double> weight_of_log(gram.of_priors.size(), 0.0), rows_of_log(gram.of_priors.size(), 0.0);
-  for (std::size_t b = 0; b < gram.blocks.size(); ++b) {
-    const GramBlock& block = gram.blocks[b];
+  for (std::size_t b = 0; b < gram.parts.size(); ++b) {
+    const GramPart& part = gram.parts[b];
     const double weight = weights.empty() ? 1 : weights[b];
-    sum += weight * block.products;
-    weight_of_log[block.log] += weight * static_cast<double>(block.rows);
-    rows_of_log[block.log] += static_cast<double>(block.rows);
+    sum += weight * part.products;
+    weight_of_log[part.log] += weight * static_cast<double>(part.rows);
+    rows_of_log[part.log] += static_cast<double>(part.rows);
   }
   for (std::size_t l = 0; l < gram.of_priors.size(); ++l) {
     if (rows_of_log[l] > 0) sum += weight_of_log[l] / rows_of_log[l] * gram.of_priors[l];

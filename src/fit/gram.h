@@ -1,13 +1,14 @@
-// Products of a fit's columns, half second by half second of the logs: what sets of effects are compared with by
-// arithmetic, without another replay.
+// Products of a fit's columns over parts of the logs: what sets of effects are compared with by arithmetic, without
+// another replay.
 //
 // Columns are [y | extra | residual]: the Jacobian of y at a point, what an effect at a trial value adds to the
 // residuals there, and the residuals. Each window's state is taken out of all of them by an orthogonal projection (its
-// columns and its prior's rows), so that sums of blocks are the normal equations with the states eliminated (Reduce;
-// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the blocks.
+// columns and its prior's rows), so that sums of parts are the normal equations with the states eliminated (Reduce;
+// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the parts.
 #ifndef GAPSCOPE_FIT_GRAM_H_
 #define GAPSCOPE_FIT_GRAM_H_
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,10 +17,10 @@
 
 namespace gapscope {
 
-// Products of one half second of one log, all windows there together.
-struct GramBlock {
+// Products of one part of one log, all windows there together.
+struct GramPart {
   std::size_t log = 0;
-  long half_second = 0;
+  long number = 0;
   std::size_t rows = 0;      // residuals
   Eigen::MatrixXd products;  // columns x columns
 };
@@ -27,7 +28,8 @@ struct GramBlock {
 struct GramSystem {
   std::vector<std::string> columns;  // "arm.mass", "offset arm_rad log 0", "shift", the extra ones' names, "residual"
   Eigen::Index parameters = 0;       // y's part of them
-  std::vector<GramBlock> blocks;     // in the order of logs and time
+  std::vector<GramPart> parts;       // in the order of logs and numbers
+  std::size_t half_seconds = 0;      // of the logs that have residuals
   std::vector<Eigen::MatrixXd> of_priors;  // per log: the rows of its states' priors
   std::vector<char> failed;                // per extra column: cannot be simulated, and is zero
   bool valid = false;                      // false: the point cannot be simulated
@@ -52,12 +54,13 @@ struct ExtraColumn {
 // GramSystem::columns of a problem with these.
 std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra);
 
+// `part_of`: the part to which a half second of a log belongs; null: each log is one part.
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options);
+                    const DifferenceOptions& options, const std::function<long(long half_second)>& part_of = {});
 
-// Weighted sum over blocks; a fold that is left out weighs 0. `block_weights`: one per block, or empty for all ones.
-// The states' priors of a log weigh as much as its blocks do on average.
-Eigen::MatrixXd Sum(const GramSystem& gram, std::span<const double> block_weights = {});
+// Weighted sum over parts; a fold that is left out weighs 0. `weights`: one per part, or empty for all ones. The
+// states' priors of a log weigh as much as its parts do on average.
+Eigen::MatrixXd Sum(const GramSystem& gram, std::span<const double> weights = {});
 
 // The best of a set of columns by arithmetic.
 struct BoundedSolution {

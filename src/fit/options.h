@@ -48,7 +48,7 @@ struct FitOptions {
   WindowChoice choice = WindowChoice::kEven;
   // TakenWindows of these options, where many problems on the same logs share them; null: chosen anew.
   std::shared_ptr<const std::vector<LogWindow>> windows;
-  // What moves no signal in common is differenced together, where steps are quick; null: nothing is known.
+  // What moves no signal in common is differenced together, but in central differences; null: nothing is known.
   std::shared_ptr<const Coupling> coupling;
   double time_step_s = 0;    // 0: the model's
   StepKind steps = StepKind::kOwn;  // of all replays

@@ -24,7 +24,7 @@ struct Bank {
   ColumnTable Of(const Eigen::MatrixXd& columns) const {
     ColumnTable made = table;
     made.reduced = columns.transpose() * columns;
-    made.gram.blocks.resize(50);
+    made.gram.half_seconds = 50;
     return made;
   }
   // Of the fit with the effect over that without it: what is left beside its column, and all.

@@ -76,7 +76,7 @@ TEST(GramTest, LogThatWeighsNothingIsNotThere) {
   FitProblem alone(*bench.rig.model, one, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
   const GramSystem gram = MakeGram(both, both.Start(), {}, {}), wanted = MakeGram(alone, alone.Start(), {}, {});
   std::vector<double> weights;
-  for (const GramBlock& block : gram.blocks) weights.push_back(block.log == 0 ? 1 : 0);
+  for (const GramPart& part : gram.parts) weights.push_back(part.log == 0 ? 1 : 0);
   const Eigen::MatrixXd sum = Sum(gram, weights), expected = Sum(wanted);
   const Eigen::Index r = gram.parameters, q = wanted.parameters;
   for (Eigen::Index i = 0; i < 3; ++i) {

@@ -55,6 +55,9 @@ PoseTrack MeasuredPoses(const Model& model, std::span<const double> values, cons
     }
   }
   WriteMeasuredJoints(model, values, recording, nullptr, track);
+  std::vector<double> speeds(static_cast<std::size_t>(model.compiled().nv));
+  for (std::size_t row = 0; row < track.time_s.size() && !model.free_starts().empty(); ++row)
+    PlaceFreeBodies(model, recording, row, values, std::span(track.qpos).subspan(row * nq, nq), speeds);
   return track;
 }
 

@@ -8,6 +8,7 @@
 #include "replay/sensors.h"
 #include "src/core/statistics.h"
 #include "src/experiment/local_fit.h"
+#include "src/experiment/orientation.h"
 #include "src/plugins/motor/history.h"
 
 namespace gapscope {
@@ -63,54 +64,7 @@ double MeanHeld(const std::vector<double>& time, const std::vector<double>& valu
   return sum / (to - from);
 }
 
-// What the log says `later_s` after a row: a late sensor shows the row's own state only then.
-LocalFit FitLater(const Recording& recording, const Recording::Measured& measured, std::size_t row, double later_s) {
-  if (later_s == 0) return FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
-  const auto& time = recording.time_s;
-  const double at = time[row] + later_s;
-  while (row + 2 < time.size() && time[row + 1] <= at) ++row;
-  const LocalFit a = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
-  if (row + 1 >= time.size()) return a;
-  const LocalFit b = FitLocally(recording, measured, row + 1, kInitialFitHalfWidth_s);
-  const double share = std::clamp((at - time[row]) / (time[row + 1] - time[row]), 0.0, 1.0);
-  LocalFit between = a;
-  between.value =
-      (1 - share) * (a.value + a.slope * (at - time[row])) + share * (b.value + b.slope * (at - time[row + 1]));
-  between.slope = (1 - share) * a.slope + share * b.slope;
-  return between;
-}
-
 }  // namespace
-
-InitialState AtRest(const Model& model) {
-  const mjModel& m = model.compiled();
-  return {.qpos = {m.qpos0, m.qpos0 + m.nq}, .qvel = std::vector<double>(static_cast<std::size_t>(m.nv), 0.0)};
-}
-
-InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row,
-                            std::span<const double> values) {
-  const mjModel& m = model.compiled();
-  InitialState state = AtRest(model);
-  std::vector<bool> known(m.nv, false);
-  for (const auto& measured : recording.measured) {
-    const SignalSource& source = model.source(measured.index);
-    if (!TraitsOf(source.kind).gives_angle) continue;
-    const LocalFit fit = FitLater(recording, measured, row, source.delay >= 0 ? values[source.delay] : 0);
-    state.qpos[source.qpos] = fit.value - (source.offset >= 0 ? values[source.offset] : 0);
-    state.qvel[source.dof] = fit.slope;
-    known[source.dof] = true;
-  }
-  for (const auto& measured : recording.measured) {
-    const SignalSource& source = model.source(measured.index);
-    if (!TraitsOf(source.kind).gives_speed || known[source.dof]) continue;
-    state.qvel[source.dof] = FitLater(recording, measured, row, source.delay >= 0 ? values[source.delay] : 0).value;
-  }
-  for (const auto& [joint, from] : model.mirrored_joints()) {
-    state.qpos[m.jnt_qposadr[joint]] = state.qpos[m.jnt_qposadr[from]];
-    state.qvel[m.jnt_dofadr[joint]] = state.qvel[m.jnt_dofadr[from]];
-  }
-  return state;
-}
 
 Simulator::Simulator(const Model& model, double max_step_s)
     : model_(model),
@@ -134,6 +88,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
     moves_.push_back(plugin < 0 || actuator == 0 || plugin != mujoco_->actuator_plugin[actuator - 1]);
   }
   apart_.resize(model.mirrored_joints().size());
+  orientations_.reserve(model.sources().size());
   remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nactuator,
                                               [](int plugin) { return plugin >= 0; });
 }
@@ -173,6 +128,8 @@ double Simulator::Read(const SignalSource& source) const {
       return data_->qvel[source.dof];
     case SignalKind::kSensor:
       return data_->sensordata[source.sensor];
+    case SignalKind::kOrientation:
+      return 0;  // ReadTurn writes all three
     case SignalKind::kTorque:
       break;
   }
@@ -206,8 +163,12 @@ void Simulator::Begin(const Recording& recording, Window window, const InitialSt
   d->time = recording.time_s[window.begin];
   // Forces cost a pass over the actuators at each stamp, sensors all of a step's work: only when this log has one.
   reads_ = SignalStage::kState;
-  for (const auto& measured : recording.measured)
-    reads_ = std::max(reads_, TraitsOf(model_.source(measured.index).kind).stage);
+  orientations_.clear();
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    const SignalKind kind = model_.source(recording.measured[s].index).kind;
+    reads_ = std::max(reads_, TraitsOf(kind).stage);
+    if (kind == SignalKind::kOrientation && recording.measured[s].spec.element == 0) orientations_.push_back(s);
+  }
 }
 
 void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
@@ -265,6 +226,8 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     ComputeSignals(recording, row);
     double* out = predicted.data() + (row - window.begin) * signals;
     for (std::size_t s = 0; s < signals; ++s) out[s] = Read(model_.source(recording.measured[s].index));
+    for (const std::size_t s : orientations_)
+      ReadTurn(recording, row, s, out + s, row > window.begin ? out + s - signals : nullptr);
     if (!qpos.empty())
       std::copy(d->qpos, d->qpos + nq, qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin) * nq));
     if (row + 1 == window.end) break;
@@ -291,7 +254,8 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
     const auto& measured = recording.measured[s];
     const SignalSource& source = model_.source(measured.index);
     const double delay = source.delay >= 0 ? values_[source.delay] : 0;
-    const double offset = source.offset >= 0 ? values_[source.offset] : 0;
+    const bool turns = source.kind == SignalKind::kOrientation;
+    const double offset = source.offset >= 0 && !turns ? values_[source.offset] : 0;
     if (rows > 1 && (delay != 0 || source.cutoff >= 0)) {
       if (column_.size() < rows) column_.resize(rows), shaped_.resize(rows);
       std::span<double> column(column_.data(), rows), shaped(shaped_.data(), rows);
@@ -314,6 +278,39 @@ void Simulator::ApplySensors(const Recording& recording, Window window, std::spa
       for (std::size_t r = 0; r < rows; ++r) predicted[r * signals + s] += offset;
     }
   }
+  for (const std::size_t s : orientations_) CompareTurns(recording, window, s, predicted);
+}
+
+void Simulator::ReadTurn(const Recording& recording, std::size_t row, std::size_t signal, double* out,
+                         const double* before) {
+  const Recording::Measured* turns = recording.measured.data() + signal;
+  const double* q = data_->sensordata + model_.source(turns->index).sensor;
+  Vector3 near = {};
+  for (std::size_t e = 0; e < kTurns; ++e) near[e] = before ? before[e] : turns[e].values[row];
+  if (!std::isfinite(near[0] + near[1] + near[2])) near = {};
+  const Vector3 turn = NearestTurn(LogRotation(Conjugate(turns->reference) * Quaternion{q[0], q[1], q[2], q[3]}), near);
+  std::copy(turn.begin(), turn.end(), out);
+}
+
+void Simulator::CompareTurns(const Recording& recording, Window window, std::size_t signal,
+                             std::span<double> predicted) {
+  const Recording::Measured* turns = recording.measured.data() + signal;
+  Vector3 mount = {};
+  for (std::size_t e = 0; e < kTurns; ++e) {
+    const int offset = model_.source(turns[e].index).offset;
+    if (offset >= 0) mount[e] = values_[offset];
+  }
+  const Quaternion mounted = ExpRotation(mount);
+  for (std::size_t r = 0; r < window.rows(); ++r) {
+    double* p = predicted.data() + r * recording.measured.size() + signal;
+    const Quaternion q = ExpRotation({p[0], p[1], p[2]}) * mounted;
+    const std::size_t row = window.begin + r;
+    const Vector3 m = {turns[0].values[row], turns[1].values[row], turns[2].values[row]};
+    const bool known = std::isfinite(m[0] + m[1] + m[2]);
+    const Vector3 turn =
+        known ? LogRotation(Conjugate(ExpRotation(m)) * q) : NearestTurn(LogRotation(q), {p[0], p[1], p[2]});
+    for (std::size_t e = 0; e < kTurns; ++e) p[e] = known ? m[e] + turn[e] : turn[e];
+  }
 }
 
 double Simulator::Past() const {
@@ -332,6 +329,8 @@ void Simulator::Follow(const Recording& recording, std::size_t row) {
     data_->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
     data_->qvel[source.dof] = fit.slope;
   }
+  const auto nq = static_cast<std::size_t>(mujoco_->nq), nv = static_cast<std::size_t>(mujoco_->nv);
+  PlaceFreeBodies(model_, recording, row, values_, {data_->qpos, nq}, {data_->qvel, nv});
 }
 
 void Simulator::StandAt(const Recording& recording, std::size_t row) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "replay/initial_state.h"
 #include "src/core/mujoco_handles.h"
 #include "src/experiment/recording.h"
 #include "src/model/model.h"
@@ -24,20 +25,12 @@ enum class Outcome { kCompleted, kDiverged };
 struct RunResult {
   Outcome outcome = Outcome::kCompleted;
   double diverged_at_s = 0;  // the recording's time at the last good stamp
-  std::size_t steps = 0;  // of the model's integrator, each as long as four quick ones
-};
-
-// Where a window starts. Joints that are not measured start at the model's initial pose, at rest.
-struct InitialState {
-  std::vector<double> qpos, qvel;
+  std::size_t steps = 0;     // of the model's integrator, each as long as four quick ones
 };
 
 // Each step as the model's integrator makes it, or by one evaluation (semi-implicit Euler) where that one makes four: a
 // third of the time, for differences of motions that are both made so (Model::HasQuickSteps).
 enum class StepKind { kOwn, kQuick };
-
-// The model's initial pose, at rest.
-InitialState AtRest(const Model& model);
 
 // A smooth torque that no catalogue holds: amplitude sin(per_rad q + per_speed w + per_command u + phase) on one joint,
 // held over each step. What a model may miss is judged beside such torques.
@@ -48,15 +41,6 @@ struct ProbeTorque {
   double per_command = 0;
   bool operator==(const ProbeTorque&) const = default;
 };
-
-// Half width of the fit that gives the initial state from a log (see FitLocally).
-inline constexpr double kInitialFitHalfWidth_s = 0.02;
-
-// The initial state at a row: measured joints from a local quadratic fit of their position (less their offset
-// parameter) and its slope, or the measured velocity where only that exists; joints that an effect added start with the
-// joint they belong to.
-InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row,
-                            std::span<const double> values);
 
 class Simulator {
  public:
@@ -99,6 +83,10 @@ class Simulator {
   double Read(const SignalSource& source) const;
   // What signals beside the state are at a stamp: still under the command that went before.
   void ComputeSignals(const Recording& recording, std::size_t row);
+  // The sensor's orientation at a row, as turn from the log's reference, nearest to the one before.
+  void ReadTurn(const Recording& recording, std::size_t row, std::size_t signal, double* out, const double* before);
+  // Turns become what compares with the measured ones (src/experiment/orientation.h), the mount's parameters in them.
+  void CompareTurns(const Recording& recording, Window window, std::size_t signal, std::span<double> predicted);
   // What the sensors make of the states: filter, delay, offset.
   void ApplySensors(const Recording& recording, Window window, std::span<double> predicted);
 
@@ -114,6 +102,7 @@ class Simulator {
   double latest_s_ = 0;
   std::vector<ProbeTorque> probes_;
   SignalStage reads_ = SignalStage::kState;  // the latest stage of any signal of the log
+  std::vector<std::size_t> orientations_;    // the log's orientations: the first signal of each
   bool remembers_ = false;                   // has states beside position and speed
   std::vector<std::pair<double, double>>
       apart_;  // per mirrored joint: angle and speed beside its load at the start of a run

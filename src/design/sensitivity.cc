@@ -70,6 +70,7 @@ double FloorOf(const MeasuredSpec& spec, const std::vector<double>& values) {
       return std::sqrt(kSpeed * kSpeed + quantisation);
     case SignalKind::kTorque:
     case SignalKind::kSensor:
+    case SignalKind::kOrientation:
       break;
   }
   return std::sqrt(std::pow(std::max(kTorqueShare * LargestMagnitude(values), 1e-9), 2) + quantisation);

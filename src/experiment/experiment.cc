@@ -9,6 +9,7 @@
 
 #include "src/core/units.h"
 #include "src/experiment/added_actuators.h"
+#include "src/experiment/orientation.h"
 #include "src/experiment/own_effects.h"
 #include "src/experiment/yaml_reader.h"
 
@@ -140,19 +141,65 @@ std::vector<MeasuredSpec> EachElement(const MeasuredSpec& spec, const std::vecto
   return each;
 }
 
-// What of the model the signal is, and its unit.
-void ReadSource(YamlMap& map, const YAML::Node& item, MeasuredSpec* spec) {
+// An orientation's four columns, in their order, become the signals of its rotation vector. `mount`: a parameter for
+// each, the turn from the model's frame to the sensor's.
+std::vector<MeasuredSpec> ReadOrientation(YamlMap& map, const YAML::Node& item, const MeasuredSpec& spec,
+                                          std::vector<std::string> columns) {
+  const bool scalar_last = map.Choice("order", {"wxyz", "xyzw"}, 0) == 1;
+  const std::vector<std::string> mount = map.TextList("mount");
+  if (columns.size() != kQuaternion)
+    map.Fail(item, {.what = "the orientation '" + spec.signal + "' needs four columns, those of a quaternion",
+                    .actual = std::to_string(columns.size()),
+                    .allowed = "columns_of_elements: [W, X, Y, Z]"});
+  for (const char* key : {"filter", "wrap", "offset", "scale", "add"}) {
+    if (map.Has(key))
+      map.Fail(item, {.what = std::string("'") + key + "' means nothing of an orientation",
+                      .cure = "drop it; 'mount' turns the sensor's frame"});
+  }
+  if (!mount.empty() && mount.size() != kTurns)
+    map.Fail(item, {.what = "'mount' names a parameter for each number of a rotation vector",
+                    .actual = std::to_string(mount.size()),
+                    .allowed = "3"});
+  if (scalar_last && !columns.empty()) std::rotate(columns.begin(), columns.end() - 1, columns.end());
+  std::vector<MeasuredSpec> each(kTurns, spec);
+  for (std::size_t i = 0; i < kTurns; ++i) {
+    each[i].signal += "[" + std::to_string(i) + "]";
+    each[i].columns = columns;
+    each[i].element = static_cast<int>(i);
+    each[i].elements = static_cast<int>(columns.size());
+    each[i].unit = "rad";
+    if (mount.size() == kTurns) each[i].offset_parameter = mount[i];
+  }
+  return each;
+}
+
+// The sensor of a body's or a site's pose, which need not be in the MJCF; empty: neither is named.
+std::string ReadPosed(YamlMap& map, bool orients, MeasuredSpec* spec) {
+  spec->body = map.Text("body", "");
+  spec->site = map.Text("site", "");
+  if (spec->body.empty() == spec->site.empty()) return "";
+  const std::string of = orients ? "orientation of " : "position of ";
+  return of + (spec->site.empty() ? "body " + spec->body : "site " + spec->site);
+}
+
+// What of the model the signal is, and its unit. `elements`: how many columns `columns_of_elements` names; four are an
+// orientation unless the kind is said.
+void ReadSource(YamlMap& map, const YAML::Node& item, std::size_t elements, MeasuredSpec* spec) {
   std::vector<std::string> kinds;
   for (const auto& row : AllSignalTraits()) kinds.emplace_back(row.name);
-  const std::string sites[] = {map.Text("joint", ""), map.Text("actuator", ""), map.Text("sensor", "")};
-  const bool of_sensor = !sites[static_cast<int>(SignalSite::kSensor)].empty();
+  const bool of_sensor = map.Has("sensor") || map.Has("body") || map.Has("site");
+  const SignalKind of_columns = elements == kQuaternion ? SignalKind::kOrientation : SignalKind::kSensor;
   const SignalTraits& traits =
-      of_sensor && !map.Has("kind") ? TraitsOf(SignalKind::kSensor) : AllSignalTraits()[map.Choice("kind", kinds, 0)];
+      of_sensor && !map.Has("kind") ? TraitsOf(of_columns) : AllSignalTraits()[map.Choice("kind", kinds, 0)];
   spec->kind = traits.kind;
-  spec->on = sites[static_cast<int>(traits.site)];
-  if (spec->on.empty() || std::ranges::count(sites, "") != 2) {
+  const std::string named[] = {map.Text("joint", ""), map.Text("actuator", ""), map.Text("sensor", ""),
+                               ReadPosed(map, traits.kind == SignalKind::kOrientation, spec)};
+  spec->on = named[static_cast<int>(traits.site)];
+  if (spec->on.empty() && traits.site == SignalSite::kSensor) spec->on = named[3];
+  if (spec->on.empty() || std::ranges::count(named, "") != 3 || (!spec->body.empty() && !spec->site.empty())) {
     map.Fail(item, {.what = "the signal '" + spec->signal +
-                            "' needs exactly one of 'joint' (position, velocity), 'actuator' (torque) or 'sensor'"});
+                            "' needs exactly one of 'joint' (position, velocity), 'actuator' (torque), 'sensor', or "
+                            "'body' or 'site' (a pose)"});
   }
   if (map.Has("element")) {
     const double element = map.Number("element");
@@ -184,7 +231,12 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
     spec.where = YamlPlace(path, item);
     spec.columns = ReadColumns(map, item, false);
     if (spec.columns.empty()) spec.columns = {spec.signal};
-    ReadSource(map, item, &spec);
+    const std::vector<std::string> elements = map.TextList("columns_of_elements");
+    ReadSource(map, item, elements.size(), &spec);
+    if (map.Has("start")) spec.starts = map.Flag("start", false);
+    if (spec.starts && TraitsOf(spec.kind).site != SignalSite::kSensor)
+      map.Fail(item, {.what = "'start' is of a sensor that measures a body's pose",
+                      .cure = "drop it: a measured joint starts where its column says"});
     spec.resolution = map.Number("resolution", 0);
     if (map.Has("filter")) {
       YamlMap filter(item["filter"], path, "'filter'");
@@ -200,12 +252,12 @@ Status ReadMeasured(const YAML::Node& node, const std::string& path, Experiment*
       if (!(spec.wrap_period > 0)) map.Fail(item, {.what = "'wrap' is the period to remove, in SI", .allowed = "> 0"});
     }
     if (spec.resolution < 0) map.Fail(item, {.what = "'resolution' is negative", .allowed = ">= 0"});
-    const std::vector<std::string> elements = map.TextList("columns_of_elements");
-    if (!elements.empty() &&
-        (spec.kind != SignalKind::kSensor || map.Has("element") || map.Has("column") || map.Has("columns")))
+    const bool orients = spec.kind == SignalKind::kOrientation;
+    if (!elements.empty() && (TraitsOf(spec.kind).site != SignalSite::kSensor || map.Has("element") ||
+                              map.Has("column") || map.Has("columns")))
       map.Fail(item, {.what = "'columns_of_elements' names a sensor's columns, one for each of its numbers",
                       .cure = "name the 'sensor', and drop 'element' and 'column'"});
-    for (const MeasuredSpec& one : EachElement(spec, elements)) {
+    for (const MeasuredSpec& one : orients ? ReadOrientation(map, item, spec, elements) : EachElement(spec, elements)) {
       for (const auto& other : experiment->measured) {
         if (other.signal == one.signal)
           map.Fail(item, {.what = "the signal '" + one.signal + "' stands twice", .cure = "rename one"});
@@ -328,6 +380,14 @@ std::span<const SignalTraits> AllSignalTraits() {
                                               .units = {"", ""},
                                               .site = SignalSite::kSensor,
                                               .has_zero = false,
+                                              .gives_angle = false,
+                                              .gives_speed = false,
+                                              .stage = SignalStage::kSensors},
+                                             {.kind = kOrientation,
+                                              .name = "orientation",
+                                              .units = {"rad", "rad"},
+                                              .site = SignalSite::kSensor,
+                                              .has_zero = true,
                                               .gives_angle = false,
                                               .gives_speed = false,
                                               .stage = SignalStage::kSensors}};

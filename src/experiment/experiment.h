@@ -56,7 +56,8 @@ struct HeldBody {
   std::string name, where = "";  // of the body, or of its free joint; file:line:column
 };
 
-enum class SignalKind { kPosition, kVelocity, kTorque, kSensor };
+// kOrientation: one of the three numbers of a sensor's rotation vector (orientation.h).
+enum class SignalKind { kPosition, kVelocity, kTorque, kSensor, kOrientation };
 
 // Of what in the model a signal is.
 enum class SignalSite { kJoint, kActuator, kSensor };
@@ -87,7 +88,7 @@ struct SensorFilter {
 // A column that is compared with the model.
 struct MeasuredSpec {
   std::string signal;                // name in results: "arm_rad"
-  std::vector<std::string> columns;  // the first one that the log has
+  std::vector<std::string> columns;  // the first one that the log has; of an orientation all four, w x y z
   SignalKind kind = SignalKind::kPosition;
   std::string on;                 // joint, actuator or sensor: SignalTraits::site
   int element = -1;               // of a sensor of several numbers; -1: it is not said which
@@ -100,8 +101,10 @@ struct MeasuredSpec {
   bool scored = true;  // counts in the error
   WrapRepair wrap = WrapRepair::kKeep;
   double wrap_period = 0;
-  std::string offset_parameter;  // predicted = model + this parameter; empty: none
-  std::string where;             // file:line:column, for errors
+  std::string offset_parameter;     // predicted = model + this parameter; empty: none
+  std::string body, site;           // whose pose `on` is, a sensor that the experiment adds; empty: `on` is the MJCF's
+  std::optional<bool> starts = {};  // a free body's pose, from which windows start; none: where it is one
+  std::string where;                // file:line:column, for errors
 };
 
 struct Parameter {

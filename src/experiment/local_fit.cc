@@ -10,14 +10,13 @@ namespace {
 // A log that begins at rest: nothing leaves the first sample's count for the first 10 ms, or so much more of the way is
 // made in the 40 ms after them (24 times at a constant acceleration from rest, 4 times at a constant speed) that the
 // motion had only begun.
-bool StartsAtRest(const Recording& recording, const Recording::Measured& measured) {
+bool StartsAtRest(const Sampled& samples) {
   constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
-  const auto& t = recording.time_s;
-  const auto& values = measured.values;
+  const auto t = samples.time_s, values = samples.values;
   std::size_t k = 1;
   bool stays = true;
   for (; k < t.size() && (k < 3 || t[k] - t[0] <= kBegin_s); ++k)
-    stays = stays && std::abs(values[k] - values[0]) <= 1.01 * measured.spec.resolution;
+    stays = stays && std::abs(values[k] - values[0]) <= 1.01 * samples.resolution;
   if (stays) return true;
   std::size_t begin = 1, end = 1;
   while (begin + 1 < t.size() && t[begin] - t[0] < kBegin_s) ++begin;
@@ -31,7 +30,7 @@ struct Reach {
   std::size_t first = 0, last = 0;
 };
 
-Reach ReachOf(const std::vector<double>& t, std::size_t row, double half_width_s) {
+Reach ReachOf(std::span<const double> t, std::size_t row, double half_width_s) {
   std::size_t first = row, last = row;
   while (first > 0 && t[row] - t[first - 1] <= half_width_s) --first;
   while (last + 1 < t.size() && t[last + 1] - t[row] <= half_width_s) ++last;
@@ -55,8 +54,9 @@ struct Normal {
   bool both_sides = false;
 };
 
-Normal NormalOf(const std::vector<double>& t, const std::vector<double>& values, std::size_t row, const Reach& reach) {
+Normal NormalOf(const Sampled& samples, std::size_t row, const Reach& reach) {
   constexpr double kBothSides = 0.75;
+  const auto t = samples.time_s, values = samples.values;
   const double before = t[row] - t[reach.first], after = t[reach.last] - t[row];
   Normal normal{.scale = std::max(before, after),
                 .both_sides = std::min(before, after) > kBothSides * std::max(before, after)};
@@ -76,14 +76,13 @@ Normal NormalOf(const std::vector<double>& t, const std::vector<double>& values,
 
 }  // namespace
 
-LocalFit FitLocally(const Recording& recording, const Recording::Measured& measured, std::size_t row,
-                    double half_width_s) {
-  if (row == 0 && std::isfinite(measured.values[0]) && StartsAtRest(recording, measured))
-    return {measured.values[0], 0};
-  const Normal normal = NormalOf(recording.time_s, measured.values, row, ReachOf(recording.time_s, row, half_width_s));
-  const LocalFit rest{std::isfinite(measured.values[row]) ? measured.values[row] : 0, 0};
+LocalFit FitLocally(const Sampled& samples, std::size_t row, double half_width_s) {
+  const auto t = samples.time_s, values = samples.values;
+  if (row == 0 && std::isfinite(values[0]) && StartsAtRest(samples)) return {values[0], 0};
+  const Normal normal = NormalOf(samples, row, ReachOf(t, row, half_width_s));
+  const LocalFit rest{std::isfinite(values[row]) ? values[row] : 0, 0};
   if (normal.count < 4) return rest;
-  const double quantisation = measured.spec.resolution * measured.spec.resolution / 12;
+  const double quantisation = samples.resolution * samples.resolution / 12;
   // The leading blocks of one triangular factor are those of all degrees: what a power adds is its square in `parts`.
   const Eigen::LLT<decltype(normal.matrix)> whole(normal.matrix);
   const Powers parts = whole.matrixL().solve(normal.right);
@@ -102,7 +101,7 @@ LocalFit FitLocally(const Recording& recording, const Recording::Measured& measu
   // A slope that the samples cannot tell from rest is rest: at a log's first row the fit is one-sided and weak.
   constexpr double kSignificant = 2;
   const double slope_error = std::sqrt(std::max(scatter_at(degree), quantisation) * slope_variance);
-  if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(measured.values[row])) return rest;
+  if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(values[row])) return rest;
   return {normal.y0 + fit[0], fit[1] / normal.scale};
 }
 

@@ -6,6 +6,7 @@
 
 #include "src/core/names.h"
 #include "src/experiment/expression.h"
+#include "src/experiment/orientation.h"
 
 namespace gapscope {
 namespace {
@@ -15,6 +16,20 @@ const Column* FindFirst(const Log& log, const std::vector<std::string>& names) {
     if (const Column* column = log.Find(name)) return column;
   }
   return nullptr;
+}
+
+// The columns of a signal: the first that the log has; of an orientation all four. None where one lacks.
+std::vector<const Column*> ColumnsOf(const Log& log, const MeasuredSpec& spec) {
+  std::vector<const Column*> columns;
+  if (spec.kind != SignalKind::kOrientation) {
+    if (const Column* column = FindFirst(log, spec.columns)) columns.push_back(column);
+    return columns;
+  }
+  for (const std::string& name : spec.columns) {
+    if (const Column* column = log.Find(name)) columns.push_back(column);
+  }
+  if (columns.size() != spec.columns.size()) columns.clear();
+  return columns;
 }
 
 Error MissingColumn(const Log& log, const std::vector<std::string>& names, const std::string& purpose) {
@@ -97,6 +112,39 @@ Result<std::map<std::string, double>> BindValues(const Experiment& experiment, c
   return values;
 }
 
+// Of a signal whose columns are not all there: the first that lacks.
+Error MissingOf(const Log& log, const MeasuredSpec& spec) {
+  std::vector<std::string> names = spec.columns;
+  while (spec.kind == SignalKind::kOrientation && names.size() > 1 && log.Find(names.front()))
+    names.erase(names.begin());
+  return MissingColumn(log, names, "the signal '" + spec.signal + "'");
+}
+
+Status BindMeasured(const Experiment& experiment, const Log& log, const Timeline& timeline, Recording* recording) {
+  for (std::size_t index = 0; index < experiment.measured.size(); ++index) {
+    const MeasuredSpec& spec = experiment.measured[index];
+    const std::vector<const Column*> columns = ColumnsOf(log, spec);
+    if (columns.empty() && spec.optional) continue;
+    if (columns.empty()) return MissingOf(log, spec);
+    if (spec.kind == SignalKind::kOrientation) {
+      if (spec.element > 0) continue;  // bound with the first
+      GS_ASSIGN(auto turns, BindOrientation(log, timeline, {columns[0], columns[1], columns[2], columns[3]}, &spec,
+                                            index, experiment.timeline.missing, &recording->findings));
+      for (auto& turn : turns) recording->measured.push_back(std::move(turn));
+      continue;
+    }
+    Recording::Measured measured{.spec = spec, .index = index, .column = columns.front()->name, .values = {}};
+    const ColumnOptions options{.factor = spec.factor,
+                                .offset = spec.offset,
+                                .missing = experiment.timeline.missing,
+                                .wrap = spec.wrap,
+                                .wrap_period = spec.wrap_period};
+    GS_ASSIGN(measured.values, ExtractColumn(log, timeline, *columns.front(), options, &recording->findings));
+    recording->measured.push_back(std::move(measured));
+  }
+  return Ok();
+}
+
 }  // namespace
 
 Result<Recording> LoadRecording(const Experiment& experiment, const std::string& log_path) {
@@ -111,7 +159,7 @@ Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
     if (const Column* column = FindFirst(log, spec.columns)) timeline_options.required.push_back(column->name);
   }
   for (const auto& spec : experiment.measured) {
-    if (const Column* column = FindFirst(log, spec.columns)) timeline_options.required.push_back(column->name);
+    for (const Column* column : ColumnsOf(log, spec)) timeline_options.required.push_back(column->name);
   }
   GS_ASSIGN(Timeline timeline, BuildTimeline(log, timeline_options));
   GS_RETURN_IF_ERROR(CutTimeline(experiment, log, &timeline));
@@ -139,20 +187,7 @@ Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
     }
     recording.commands.push_back(std::move(command));
   }
-  for (std::size_t index = 0; index < experiment.measured.size(); ++index) {
-    const MeasuredSpec& spec = experiment.measured[index];
-    const Column* column = FindFirst(log, spec.columns);
-    if (!column && spec.optional) continue;
-    if (!column) return MissingColumn(log, spec.columns, "the signal '" + spec.signal + "'");
-    Recording::Measured measured{.spec = spec, .index = index, .column = column->name};
-    const ColumnOptions options{.factor = spec.factor,
-                                .offset = spec.offset,
-                                .missing = experiment.timeline.missing,
-                                .wrap = spec.wrap,
-                                .wrap_period = spec.wrap_period};
-    GS_ASSIGN(measured.values, ExtractColumn(log, timeline, *column, options, &recording.findings));
-    recording.measured.push_back(std::move(measured));
-  }
+  GS_RETURN_IF_ERROR(BindMeasured(experiment, log, timeline, &recording));
   if (std::none_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) { return m.spec.scored; })) {
     return Error{.what = "the log has none of the signals that are scored",
                  .where = log_path,

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "src/core/rotation.h"
 #include "src/experiment/experiment.h"
 
 namespace gapscope {
@@ -21,7 +22,8 @@ struct Recording {
     MeasuredSpec spec;
     std::size_t index = 0;  // in experiment.measured
     std::string column;
-    std::vector<double> values;  // one per stamp; NaN where the log has no value and the policy keeps that
+    std::vector<double> values;          // one per stamp; NaN where the log has no value and the policy keeps that
+    Quaternion reference = kNoRotation;  // of an orientation (orientation.h): the values are the turn from here
   };
 
   std::string log_path;

@@ -154,7 +154,7 @@ class FitProblem::Differences {
       const SignalLayout& signal = signals[s];
       if (signal.offset < 0 || Known(signal.offset)) continue;
       auto column = jacobian_.col(signal.offset);
-      if (problem_.options_.start == WindowStart::kRest) {
+      if (problem_.options_.start == WindowStart::kRest || !signal.moves_start) {
         column.setZero();
       } else if (signal.joint_state >= 0) {
         column = -signal.deviation * jacobian_.col(first_state + signal.joint_state);

@@ -123,11 +123,15 @@ void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
   const auto& [window, point, values, state, shift_s, steps] = place;
   const Recording& recording = recordings_[window.log];
   const std::vector<double>& first = space_.start();
-  // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log.
+  // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log, a pose's
+  // offsets turn and move a body.
   const bool from_log = options_.start == WindowStart::kLog;
+  const bool bodies = !model_.free_starts().empty();
   const bool late =
       from_log && std::any_of(model_.sources().begin(), model_.sources().end(), [&](const SignalSource& source) {
-        return source.delay >= 0 && values[source.delay] != first[source.delay];
+        const bool moved = source.offset >= 0 && values[source.offset] != first[source.offset];
+        return (source.delay >= 0 && values[source.delay] != first[source.delay]) ||
+               (bodies && moved && TraitsOf(source.kind).site == SignalSite::kSensor);
       });
   InitialState& start = worker.start;
   start = late ? InitialStateAt(model_, recording, window.rows.begin, values) : window.start;
@@ -143,6 +147,8 @@ void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
       start.qvel[source.dof] += state[signal.joint_state + 1];
     }
   }
+  if (from_log) RemountBodies(worker, place);
+  MoveUnseen(worker, place);
   const mjModel& m = model_.compiled();
   const auto& motor_sides = model_.mirrored_joints();
   for (std::size_t i = 0; i < motor_sides.size(); ++i) {
@@ -154,6 +160,31 @@ void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
     start.qpos[m.jnt_qposadr[joint]] += beside[0];
     start.qvel[m.jnt_dofadr[joint]] += beside[1];
   }
+}
+
+// An orientation's zero offsets are a turn of its sensor, and so of the body where the log says it starts.
+void FitProblem::RemountBodies(Worker& worker, const Place& place) const {
+  const Recording& recording = recordings_[place.window.log];
+  for (const FreeStart& start : model_.free_starts()) {
+    const int signal = FindMeasured(recording, start.rotation);
+    if (signal < 0) continue;
+    Vector3 turn = {};
+    for (std::size_t e = 0; e < turn.size(); ++e)
+      turn[e] = layout_.Offset(place.point.y, place.window.log, static_cast<std::size_t>(signal) + e);
+    Remount(model_, start, place.values, turn, &worker.start);
+  }
+}
+
+// Along the manifold of poses: quaternions stay unit ones.
+void FitProblem::MoveUnseen(Worker& worker, const Place& place) const {
+  const UnseenStates& unseen = layout_.unseen[place.window.log];
+  if (unseen.dofs.empty()) return;
+  Eigen::Index i = unseen.first;
+  for (const auto& [dof, signal] : unseen.dofs) {
+    worker.way[static_cast<std::size_t>(dof)] = place.state[i++];
+    worker.start.qvel[static_cast<std::size_t>(dof)] += place.state[i++];
+  }
+  mj_integratePos(&model_.compiled(), worker.start.qpos.data(), worker.way.data(), 1);
 }
 
 bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double>& predicted) const {

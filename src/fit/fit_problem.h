@@ -53,8 +53,8 @@ struct DifferenceOptions {
 struct Derivatives {
   Residuals residuals;
   std::vector<Eigen::MatrixXd> jacobians;  // per window: y, then the window's state
-  Residuals quick;  // those that differences of quick steps are taken from; none where the model's own were needed
-  bool valid = false;                      // false: the point cannot be simulated
+  Residuals quick;     // those that differences of quick steps are taken from; none where the model's own were needed
+  bool valid = false;  // false: the point cannot be simulated
   Work work;
 };
 
@@ -127,6 +127,8 @@ class FitProblem {
   std::size_t TakeSteps();
   // Writes where the window starts.
   void PlaceStart(Worker& worker, const Place& place) const;
+  void RemountBodies(Worker& worker, const Place& place) const;
+  void MoveUnseen(Worker& worker, const Place& place) const;
   bool Simulate(Worker& worker, const Place& place, std::vector<double>& predicted) const;
   void ResidualsOf(const FitWindow& window, const FitPoint& point, const std::vector<double>& predicted,
                    Eigen::VectorXd& residual) const;

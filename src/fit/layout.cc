@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "replay/initial_state.h"
 #include "src/compare/score.h"
 #include "src/core/statistics.h"
+#include "src/experiment/orientation.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -28,6 +30,78 @@ bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& lay
   return false;
 }
 
+// Joints that no position or speed of the log is of, in the model's order. Not those that an effect added or an
+// equality ties to another joint: they start with what they are tied to.
+std::vector<int> UnseenJoints(const Model& model, const Recording& recording) {
+  const mjModel& m = model.compiled();
+  std::vector<char> known(static_cast<std::size_t>(m.njnt), 0);
+  for (int j = 0; j < m.njnt; ++j) known[j] = m.jnt_type[j] != mjJNT_HINGE && m.jnt_type[j] != mjJNT_SLIDE;
+  for (const auto& measured : recording.measured) {
+    const SignalSource& source = model.source(measured.index);
+    const SignalTraits& traits = TraitsOf(source.kind);
+    if (traits.gives_angle || traits.gives_speed) known[source.joint] = 1;
+  }
+  for (const auto& [joint, from] : model.mirrored_joints()) known[joint] = 1;
+  for (int e = 0; e < m.neq; ++e) {
+    if (m.eq_type[e] != mjEQ_JOINT) continue;
+    for (const int joint : {m.eq_obj1id[e], m.eq_obj2id[e]}) {
+      if (joint >= 0) known[joint] = 1;
+    }
+  }
+  std::vector<int> unseen;
+  for (int j = 0; j < m.njnt; ++j) {
+    if (!known[j]) unseen.push_back(j);
+  }
+  return unseen;
+}
+
+// Whether the signal is of an orientation that a free body starts from.
+bool StartsABody(const Model& model, std::size_t measured) {
+  const int index = static_cast<int>(measured);
+  return std::ranges::any_of(model.free_starts(), [&](const FreeStart& start) {
+    return start.rotation >= 0 && index >= start.rotation && index < start.rotation + kTurns;
+  });
+}
+
+// What the log's own start counts, as so many samples of the signal that gives it.
+double PriorOf(const SignalLayout& signal) {
+  return std::sqrt(kFitPolicy.state_prior_samples) * (signal.weight > 0 ? signal.weight : 1 / signal.deviation);
+}
+
+// The six of a free body: as well known as its pose's signals say, half of it not at all where half is not measured.
+void AddBody(const FreeStart& start, const Recording& recording, const std::vector<SignalLayout>& signals,
+             UnseenStates* states, std::vector<double>* prior) {
+  const int rotation = FindMeasured(recording, start.rotation);
+  if (rotation < 0 && FindMeasured(recording, start.position[0]) < 0) return;
+  for (int i = 0; i < 6; ++i) {
+    const bool turns = i >= 3;
+    const int signal = turns ? (rotation < 0 ? -1 : rotation + i - 3) : FindMeasured(recording, start.position[i]);
+    states->dofs.push_back({.dof = start.dof + i, .signal = signal});
+    const double unseen = 1 / (turns ? kFitPolicy.unseen_prior_rad : kFitPolicy.unseen_prior_m);
+    prior->push_back(signal >= 0 ? PriorOf(signals[static_cast<std::size_t>(signal)]) : unseen);
+    prior->push_back(signal >= 0 ? prior->back() * kFitPolicy.speed_prior_s : unseen / kFitPolicy.unseen_rad_per_s);
+  }
+}
+
+// The window's states of joints that are not measured, and what is known of them.
+UnseenStates AddUnseen(const Model& model, const Recording& recording, const std::vector<SignalLayout>& signals,
+                       std::vector<double>* prior) {
+  const mjModel& m = model.compiled();
+  UnseenStates states{.first = static_cast<Eigen::Index>(prior->size()), .dofs = {}};
+  for (const int joint : UnseenJoints(model, recording)) {
+    const bool slides = m.jnt_type[joint] == mjJNT_SLIDE;
+    double deviation = slides ? kFitPolicy.unseen_prior_m : kFitPolicy.unseen_prior_rad;
+    const double speed = deviation * kFitPolicy.unseen_rad_per_s;
+    if (m.jnt_limited[joint])
+      deviation = std::min(deviation, (m.jnt_range[2 * joint + 1] - m.jnt_range[2 * joint]) / 2);
+    states.dofs.push_back({.dof = m.jnt_dofadr[joint]});
+    prior->push_back(1 / deviation);
+    prior->push_back(1 / speed);
+  }
+  for (const FreeStart& start : model.free_starts()) AddBody(start, recording, signals, &states, prior);
+  return states;
+}
+
 // One log's signals, and the bounds of the offsets that it brings.
 void AddLog(const Model& model, const Recording& recording, const FitOptions& options, FitLayout* layout,
             std::vector<double>* low, std::vector<double>* high) {
@@ -46,15 +120,16 @@ void AddLog(const Model& model, const Recording& recording, const FitOptions& op
       low->push_back(-kFitPolicy.offset_bound_rad / deviation);
       high->push_back(kFitPolicy.offset_bound_rad / deviation);
     }
-    if (options.fit_states) {
+    signals[s].moves_start = TraitsOf(measured.spec.kind).gives_angle || StartsABody(model, measured.index);
+    if (options.fit_states && TraitsOf(measured.spec.kind).gives_angle) {
       signals[s].joint_state = static_cast<int>(prior.size());
-      const double weight =
-          std::sqrt(kFitPolicy.state_prior_samples) * (signals[s].weight > 0 ? signals[s].weight : 1 / deviation);
+      const double weight = PriorOf(signals[s]);
       prior.push_back(weight);
       prior.push_back(weight * kFitPolicy.speed_prior_s);
     }
   }
-  // What no sensor shows comes last: each motor side beside its load.
+  layout->unseen.push_back(options.fit_states ? AddUnseen(model, recording, signals, &prior) : UnseenStates{});
+  // What only some effects bring comes last: each motor side beside its load.
   for (std::size_t i = 0; i < model.mirrored_joints().size() && options.fit_states; ++i) {
     prior.push_back(1 / kFitPolicy.motor_side_prior_rad);
     prior.push_back(1 / kFitPolicy.motor_side_prior_rad * kFitPolicy.speed_prior_s);

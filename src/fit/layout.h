@@ -1,6 +1,7 @@
 // What a fit's unknowns consist of. y: the search coordinates of parameters, one zero offset per measured position and
 // log, one command shift below a sample. x of a window: what its initial state differs by from what the log says (angle
-// and speed of each measured joint, then of each hidden motor side).
+// and speed of each measured joint), from the model's initial pose at rest (of each joint that no signal is of), and
+// from the pre-roll (of each hidden motor side).
 #ifndef GAPSCOPE_FIT_LAYOUT_H_
 #define GAPSCOPE_FIT_LAYOUT_H_
 
@@ -16,14 +17,27 @@ namespace gapscope {
 
 // How a signal of a log enters the cost.
 struct SignalLayout {
-  double weight = 0;     // of a residual: 1 / standard deviation of the signal, or as asked; 0: not scored
-  double deviation = 1;  // of the signal over the log
-  int offset = -1;       // index in y of its zero offset, which counts in deviations
-  int joint_state = -1;  // index in the window's state of the joint's angle; its speed is the next one
+  double weight = 0;        // of a residual: 1 / standard deviation of the signal, or as asked; 0: not scored
+  double deviation = 1;     // of the signal over the log
+  int offset = -1;          // index in y of its zero offset, which counts in deviations
+  bool moves_start = true;  // the offset moves where windows start
+  int joint_state = -1;     // index in the window's state of the joint's angle; its speed is the next one
+};
+
+// Degrees of freedom whose start no joint's own signal gives: two numbers of a window's state each, displacement and
+// speed.
+struct UnseenStates {
+  struct Dof {
+    int dof = 0;
+    int signal = -1;  // of a free body's pose: that gives its start; -1: the model's initial pose does
+  };
+  Eigen::Index first = 0;  // index in the window's state
+  std::vector<Dof> dofs;
 };
 
 struct FitLayout {
   std::vector<std::vector<SignalLayout>> signals;  // per log, per signal
+  std::vector<UnseenStates> unseen;                // per log
   std::vector<Eigen::VectorXd> state_priors;       // per log: weight of each number of a window's state
   Eigen::VectorXd low, high;                       // of y
   Eigen::Index parameters = 0;                     // the first numbers of y

@@ -15,6 +15,9 @@ struct FitPolicy {
   double speed_prior_s = 0.25 * kInitialFitHalfWidth_s;
   // How well the pre-roll knows where a transmission's motor side stands beside its load.
   double motor_side_prior_rad = 0.02;
+  // How far a joint that no signal is of may stand from the model's initial pose, and how fast it may move there, as a
+  // rate of that way. Wide beside what any sensor says of it.
+  double unseen_prior_rad = 0.5, unseen_prior_m = 0.05, unseen_rad_per_s = 10;
   // Largest zero offset of a position sensor.
   double offset_bound_rad = 0.3;
   // The pull to the start, of the sum of squares, per residual and squared range of a coordinate: only holds what the

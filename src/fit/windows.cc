@@ -88,19 +88,28 @@ std::vector<Eigen::VectorXd> StatePriorsByNoise(const Model& model, const std::v
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     const auto& signals = layout.signals[l];
     const std::vector<double> mismatch = MismatchOf(l, signals.size(), windows, residuals);
-    for (std::size_t s = 0; s < signals.size(); ++s) {
+    // Of two numbers of a window's state, from `state` on, that signal `s` gives.
+    const auto weigh = [&](std::size_t s, Eigen::Index state) {
       const auto& measured = recordings[l].measured[s];
       // Behind a filter a joint is not where the log says.
-      if (signals[s].joint_state < 0 || model.source(measured.index).cutoff >= 0) continue;
+      if (model.source(measured.index).cutoff >= 0) return;
       const double noise =
           EstimateNoise(recordings[l].time_s, measured.values, {.resolution = measured.spec.resolution}).total_std;
-      if (!(noise > 0)) continue;
+      if (!(noise > 0)) return;
       for (std::size_t w = 0; w < windows.size(); ++w) {
         if (windows[w].log != l) continue;
-        double* prior = priors[w].data() + signals[s].joint_state;
+        double* prior = priors[w].data() + state;
         prior[0] = std::max(prior[0], mismatch[s] / noise);
         prior[1] = std::max(prior[1], mismatch[s] / noise * kFitPolicy.speed_prior_s);
       }
+    };
+    for (std::size_t s = 0; s < signals.size(); ++s) {
+      if (signals[s].joint_state >= 0) weigh(s, signals[s].joint_state);
+    }
+    const UnseenStates& unseen = layout.unseen[l];
+    for (std::size_t i = 0; i < unseen.dofs.size(); ++i) {
+      if (unseen.dofs[i].signal >= 0)
+        weigh(static_cast<std::size_t>(unseen.dofs[i].signal), unseen.first + 2 * static_cast<Eigen::Index>(i));
     }
   }
   return priors;

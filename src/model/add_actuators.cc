@@ -78,6 +78,24 @@ Status Hold(const HeldBody& held, mjSpec* spec) {
   return NoSuch("a body is held that the MJCF lacks", held.name, NamesIn(spec, mjOBJ_BODY), held.where);
 }
 
+// The sensor of a body's or a site's pose in the world.
+Status AddPoseSensor(const MeasuredSpec& measured, mjSpec* spec) {
+  const bool of_body = !measured.body.empty();
+  const std::string& name = of_body ? measured.body : measured.site;
+  if (name.empty() || mjs_findElement(spec, mjOBJ_SENSOR, measured.on.c_str())) return Ok();
+  const mjtObj type = of_body ? mjOBJ_BODY : mjOBJ_SITE;
+  if (!mjs_findElement(spec, type, name.c_str())) {
+    return NoSuch(std::string("a measured signal is of a ") + (of_body ? "body" : "site") + " that the MJCF lacks",
+                  name, NamesIn(spec, type), measured.where);
+  }
+  mjsSensor* sensor = mjs_addSensor(spec);
+  mjs_setName(sensor->element, measured.on.c_str());
+  sensor->type = measured.kind == SignalKind::kOrientation ? mjSENS_FRAMEQUAT : mjSENS_FRAMEPOS;
+  sensor->objtype = of_body ? mjOBJ_XBODY : mjOBJ_SITE;
+  mjs_setString(sensor->objname, name.c_str());
+  return Ok();
+}
+
 // Keyframes are of the model with its free joints.
 void DeleteKeys(mjSpec* spec) {
   while (mjsElement* key = mjs_firstElement(spec, mjOBJ_KEY)) mjs_delete(spec, key);
@@ -89,6 +107,7 @@ Status AddToSpec(const Experiment& experiment, mjSpec* spec) {
   for (const AddedActuator& actuator : experiment.actuators) GS_RETURN_IF_ERROR(AddActuator(actuator, spec));
   for (const HeldBody& held : experiment.hold) GS_RETURN_IF_ERROR(Hold(held, spec));
   if (!experiment.hold.empty()) DeleteKeys(spec);
+  for (const MeasuredSpec& measured : experiment.measured) GS_RETURN_IF_ERROR(AddPoseSensor(measured, spec));
   for (const CommandSpec& command : experiment.commands) {
     if (mjs_findElement(spec, mjOBJ_ACTUATOR, command.actuator.c_str())) continue;
     return NoSuch("a command drives an actuator that the MJCF lacks", command.actuator, NamesIn(spec, mjOBJ_ACTUATOR),

@@ -1,4 +1,5 @@
-// What the experiment adds to the MJCF before anything else happens to it: actuators, and a stand for floating bodies.
+// What the experiment adds to the MJCF before anything else happens to it: actuators, a stand for floating bodies, and
+// sensors of the poses that are measured.
 #ifndef GAPSCOPE_MODEL_ADD_ACTUATORS_H_
 #define GAPSCOPE_MODEL_ADD_ACTUATORS_H_
 
@@ -8,8 +9,8 @@
 namespace gapscope {
 
 // Changes a spec that has not been compiled. Errors, with file:line: an actuator whose name the MJCF has already, or on
-// a joint that is not there or no hinge or slide; a body to hold that is not there or has no free joint; a command for
-// an actuator that neither has.
+// a joint that is not there or no hinge or slide; a body to hold that is not there or has no free joint; a pose of a
+// body or a site that is not there; a command for an actuator that neither has.
 Status AddToSpec(const Experiment& experiment, mjSpec* spec);
 
 }  // namespace gapscope

@@ -150,6 +150,7 @@ Status Model::ResolveNames() {
     }
     sources_.push_back(source);
   }
+  GS_ASSIGN(free_starts_, FindFreeStarts(m, experiment()));
   return Ok();
 }
 

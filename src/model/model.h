@@ -13,6 +13,7 @@
 #include "src/experiment/experiment.h"
 #include "src/model/effect.h"
 #include "src/model/fields.h"
+#include "src/model/free_starts.h"
 #include "src/model/rig.h"
 
 namespace gapscope {
@@ -23,7 +24,7 @@ struct SignalSource {
   int joint = -1, qpos = -1, dof = -1;
   int actuator = -1;  // torque: of this actuator's joint
   int estimate = -1;  // torque: address in plugin_state of a gapscope.motor's own estimate; -1: qfrc_actuator of `dof`
-  int sensor = -1;    // address in sensordata
+  int sensor = -1;    // address in sensordata; of an orientation that of its quaternion
   int offset = -1;    // parameter that is added to the prediction
   int delay = -1;     // parameter: how late the signal is logged
   int cutoff = -1, damping_ratio = -1;  // parameters of the low-pass between mechanism and log
@@ -78,6 +79,8 @@ class Model {
   const std::vector<int>& memories() const { return memories_; }
   // {joint, joint that it starts with}: unmeasured joints that an effect added.
   const std::vector<std::pair<int, int>>& mirrored_joints() const { return mirrored_; }
+  // Bodies that start where a measured pose is.
+  const std::vector<FreeStart>& free_starts() const { return free_starts_; }
   // Whether quick steps (StepKind) are another thing than its own: two bodies on a stiff link always take their own.
   bool HasQuickSteps() const { return compiled().opt.integrator == mjINT_RK4 && mirrored_.empty(); }
 
@@ -123,6 +126,7 @@ class Model {
   std::vector<int> command_ctrl_;
   std::vector<SignalSource> sources_;
   std::vector<std::pair<int, int>> mirrored_;
+  std::vector<FreeStart> free_starts_;
   std::vector<int> command_delays_;
   std::vector<int> memories_;
 };

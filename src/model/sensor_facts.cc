@@ -81,11 +81,10 @@ Result<int> AddressOfSensor(const mjModel& m, const MeasuredSpec& measured) {
     return NoSuch("a measured signal is of a sensor that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_SENSOR),
                   measured.where);
   const int type = m.sensor_type[sensor], numbers = m.sensor_dim[sensor];
-  if (type == mjSENS_USER || type == mjSENS_FRAMEQUAT || type == mjSENS_BALLQUAT) {
-    return Error{.what = of + (type == mjSENS_USER ? " has no model: a program's own callback gives its numbers"
-                                                   : " is an orientation, whose numbers mean nothing one by one"),
+  if (type == mjSENS_USER) {
+    return Error{.what = of + " has no model: a program's own callback gives its numbers",
                  .where = measured.where,
-                 .cure = type == mjSENS_USER ? "take another sensor" : "measure 'framexaxis' and 'frameyaxis' instead"};
+                 .cure = "take another sensor"};
   }
   if (m.sensor_delay[sensor] != 0 || m.sensor_interval[2 * sensor] != 0) {
     return Error{.what = of + " has a delay or an interval of its own",
@@ -98,6 +97,15 @@ Result<int> AddressOfSensor(const mjModel& m, const MeasuredSpec& measured) {
                  .actual = std::to_string(measured.elements),
                  .allowed = std::to_string(numbers)};
   }
+  const bool orients = type == mjSENS_FRAMEQUAT || type == mjSENS_BALLQUAT;
+  if (orients != (measured.kind == SignalKind::kOrientation)) {
+    return Error{.what = of + (orients ? " is an orientation, whose numbers mean nothing one by one"
+                                       : " is no orientation, though four columns are"),
+                 .where = measured.where,
+                 .cure = orients ? "name all four columns: 'columns_of_elements: [W, X, Y, Z]'"
+                                 : "add 'kind: sensor', and the columns are numbers of their own"};
+  }
+  if (orients) return m.sensor_adr[sensor];
   if (measured.element >= numbers || (measured.element < 0 && numbers > 1)) {
     return Error{.what = of + (measured.element < 0 ? " has several elements" : " has no such element"),
                  .where = measured.where,

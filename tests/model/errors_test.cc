@@ -64,7 +64,7 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
       {"column: q, joint: hinge, unit: rad",
        "sensor: centre, columns_of_elements: [x, y]",
        {"experiment.yaml:5:5:", "another number of elements", "got 2", "allowed: 3"}},
-      {"joint: hinge, unit: rad", "sensor: turn, element: 1", {"is an orientation", "framexaxis"}},
+      {"joint: hinge, unit: rad", "sensor: turn, element: 1", {"is an orientation", "columns_of_elements"}},
       {"joint: hinge, unit: rad", "sensor: own", {"a program's own callback"}},
       {"joint: hinge, unit: rad", "sensor: late", {"a delay or an interval of its own", "sensor_delay@q"}},
       {"joint/hinge/damping:", "joint/hinge/dampin:", {"experiment.yaml:9:3:", "did you mean 'damping'?"}},

@@ -7,6 +7,7 @@
 #include "tests/model/synthetic.h"
 #include "tests/models/rig_facts.h"
 #include "tests/replay/count_new.h"
+#include "tests/replay/spinning_top.h"
 
 namespace gapscope::testing {
 namespace {
@@ -58,6 +59,29 @@ TEST(AllocationTest, RunAllocatesNothing) {
   const long before = NewsSoFar();
   ::operator delete(::operator new(64));
   EXPECT_GT(NewsSoFar(), before) << "the counter counts";
+}
+
+// Poses are compared in place.
+TEST(AllocationTest, AMeasuredPoseAllocatesNothing) {
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(scratch, SpinningTop::kMjcf, R"(measured:
+  - {signal: place, sensor: place, columns_of_elements: [x, y, z]}
+  - {signal: turn, sensor: turn, columns_of_elements: [qw, qx, qy, qz]}
+)");
+  const auto model = MakeModel(experiment);
+  ASSERT_NE(model, nullptr);
+  const Recording recording = MakeRecording(experiment, 200, 0.002, [](int, double) { return 0.0; });
+  Simulator simulator(*model, 0);
+  std::vector<double> predicted(recording.rows() * recording.measured.size());
+  const InitialState start = AtRest(*model);
+  ASSERT_TRUE(simulator.SetParameters(model->Nominal(), recording));
+  const auto news = [&](std::size_t rows) {
+    const long before = NewsSoFar();
+    (void)simulator.Run(recording, {0, rows}, start, predicted);
+    return NewsSoFar() - before;
+  };
+  news(200);
+  EXPECT_EQ(news(200), news(20)) << "none a row";
 }
 
 }  // namespace

@@ -1,0 +1,160 @@
+#include "src/model/free_starts.h"
+
+#include <algorithm>
+
+#include "src/core/mujoco_handles.h"
+#include "src/core/names.h"
+#include "src/model/element_names.h"
+
+namespace gapscope {
+namespace {
+
+// The body that a sensor's object rides on; -1: on none.
+int BodyOf(const mjModel& m, int sensor) {
+  const int object = m.sensor_objid[sensor];
+  switch (m.sensor_objtype[sensor]) {
+    case mjOBJ_BODY:
+    case mjOBJ_XBODY:
+      return object;
+    case mjOBJ_SITE:
+      return m.site_bodyid[object];
+    case mjOBJ_GEOM:
+      return m.geom_bodyid[object];
+    case mjOBJ_CAMERA:
+      return m.cam_bodyid[object];
+    default:
+      return -1;
+  }
+}
+
+// The free joint of the body that the sensor's object is fixed to; -1: it has another joint, or none.
+int CarryingJoint(const mjModel& m, int sensor) {
+  const int body = BodyOf(m, sensor);
+  if (body < 0 || m.sensor_refid[sensor] >= 0) return -1;
+  const int carrier = m.body_weldid[body];
+  const bool free = m.body_jntnum[carrier] == 1 && m.jnt_type[m.body_jntadr[carrier]] == mjJNT_FREE;
+  return free ? m.body_jntadr[carrier] : -1;
+}
+
+struct Frame {
+  Vector3 place = {};
+  Quaternion turn = kNoRotation;
+};
+Frame FrameOf(const mjtNum* place, const mjtNum* matrix) {
+  Frame frame{.place = {place[0], place[1], place[2]}};
+  mju_mat2Quat(frame.turn.data(), matrix);
+  return frame;
+}
+
+// Of a sensor's object, in the world.
+Frame ObjectFrame(const mjModel& m, const mjData& d, int sensor) {
+  const int object = m.sensor_objid[sensor];
+  switch (m.sensor_objtype[sensor]) {
+    case mjOBJ_BODY:
+      return FrameOf(d.xipos + 3 * object, d.ximat + 9 * object);
+    case mjOBJ_SITE:
+      return FrameOf(d.site_xpos + 3 * object, d.site_xmat + 9 * object);
+    case mjOBJ_GEOM:
+      return FrameOf(d.geom_xpos + 3 * object, d.geom_xmat + 9 * object);
+    case mjOBJ_CAMERA:
+      return FrameOf(d.cam_xpos + 3 * object, d.cam_xmat + 9 * object);
+    default:
+      return FrameOf(d.xpos + 3 * object, d.xmat + 9 * object);
+  }
+}
+
+// As the body carries it.
+Frame OnBody(const mjModel& m, int sensor, int joint) {
+  const DataPtr d(mj_makeData(&m));
+  mj_kinematics(&m, d.get());
+  mj_camlight(&m, d.get());
+  const int body = m.jnt_bodyid[joint];
+  const Frame carrier = FrameOf(d->xpos + 3 * body, d->xmat + 9 * body), object = ObjectFrame(m, *d, sensor);
+  const Quaternion back = Conjugate(carrier.turn);
+  const Vector3 apart = {object.place[0] - carrier.place[0], object.place[1] - carrier.place[1],
+                         object.place[2] - carrier.place[2]};
+  return {.place = Rotate(back, apart), .turn = back * object.turn};
+}
+
+bool SaysPlace(const mjModel& m, const MeasuredSpec& spec, int sensor) {
+  return spec.kind == SignalKind::kSensor && m.sensor_type[sensor] == mjSENS_FRAMEPOS;
+}
+bool SaysTurn(const mjModel& m, const MeasuredSpec& spec, int sensor) {
+  return spec.kind == SignalKind::kOrientation && m.sensor_type[sensor] == mjSENS_FRAMEQUAT;
+}
+
+// The signals of the sensor's three elements; -1 where one is not measured.
+std::array<int, 3> ElementsOf(const Experiment& experiment, const std::string& sensor) {
+  std::array<int, 3> found = {-1, -1, -1};
+  for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
+    const MeasuredSpec& spec = experiment.measured[i];
+    if (spec.kind == SignalKind::kSensor && spec.on == sensor && spec.element >= 0 && spec.element < 3 &&
+        spec.starts.value_or(true) && found[spec.element] < 0)
+      found[spec.element] = static_cast<int>(i);
+  }
+  return found;
+}
+
+// Why a signal that is asked to give a start gives none.
+Error NoStart(const mjModel& m, const MeasuredSpec& spec, int sensor) {
+  const bool pose = SaysPlace(m, spec, sensor) || SaysTurn(m, spec, sensor);
+  std::vector<std::string> free;
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_type[j] == mjJNT_FREE) free.push_back(NameOf(m, mjOBJ_BODY, m.jnt_bodyid[j]));
+  }
+  Error error{.what = "no window can start from the signal '" + spec.signal + "'", .where = spec.where};
+  if (!pose) {
+    error.actual = "the sensor '" + spec.on + "' measures no pose";
+    error.allowed = "'framepos' and 'framequat'";
+  } else if (CarryingJoint(m, sensor) < 0) {
+    const int body = BodyOf(m, sensor);
+    error.actual = m.sensor_refid[sensor] >= 0 ? "the sensor '" + spec.on + "' has a 'reftype'"
+                   : body < 0                  ? "the sensor '" + spec.on + "' is on no body"
+                                               : "the body '" + NameOf(m, mjOBJ_BODY, body) + "' has no free joint";
+    error.allowed =
+        free.empty() ? "a body with a free joint; the model has none" : "sensors in the world's frame on " + Join(free);
+  } else {
+    error.actual =
+        "not all of x, y, z of '" + spec.on + "' are measured, or another sensor of the body gives its start";
+    error.allowed = "'columns_of_elements' with three columns, of one sensor a body";
+  }
+  error.cure = "drop 'start: true'; a body that is on 'hold' has no free joint";
+  return error;
+}
+
+}  // namespace
+
+Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& m, const Experiment& experiment) {
+  std::vector<FreeStart> starts;
+  for (int joint = 0; joint < m.njnt; ++joint) {
+    if (m.jnt_type[joint] != mjJNT_FREE) continue;
+    FreeStart start{.qpos = m.jnt_qposadr[joint], .dof = m.jnt_dofadr[joint]};
+    for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
+      const MeasuredSpec& spec = experiment.measured[i];
+      const int sensor =
+          TraitsOf(spec.kind).site == SignalSite::kSensor ? mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()) : -1;
+      if (sensor < 0 || !spec.starts.value_or(true) || CarryingJoint(m, sensor) != joint) continue;
+      if (SaysPlace(m, spec, sensor) && start.position[0] < 0) {
+        const std::array<int, 3> elements = ElementsOf(experiment, spec.on);
+        if (std::ranges::find(elements, -1) != elements.end()) continue;
+        start.position = elements;
+        start.place = OnBody(m, sensor, joint).place;
+      } else if (SaysTurn(m, spec, sensor) && start.rotation < 0) {
+        start.rotation = static_cast<int>(i);
+        start.mounted = OnBody(m, sensor, joint).turn;
+      }
+    }
+    if (start.position[0] >= 0 || start.rotation >= 0) starts.push_back(start);
+  }
+  for (int i = 0; i < static_cast<int>(experiment.measured.size()); ++i) {
+    const MeasuredSpec& spec = experiment.measured[static_cast<std::size_t>(i)];
+    const bool used = std::ranges::any_of(starts, [&](const FreeStart& start) {
+      return std::ranges::find(start.position, i) != start.position.end() ||
+             (start.rotation >= 0 && i >= start.rotation && i < start.rotation + 3);
+    });
+    if (spec.starts.value_or(false) && !used) return NoStart(m, spec, mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()));
+  }
+  return starts;
+}
+
+}  // namespace gapscope

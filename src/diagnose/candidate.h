@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "src/diagnose/block_errors.h"
-#include "src/fit/coupling.h"
 #include "src/diagnose/diagnosis_journal.h"
+#include "src/fit/coupling.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {

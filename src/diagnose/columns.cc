@@ -166,8 +166,7 @@ void AddTorques(const Workbench& bench, Candidate& parent, const std::vector<Pro
       const auto probes = Collect(group, [&](std::size_t joint) { return lists[joint][i]; });
       for (std::size_t k = 0; k < group.size(); ++k) {
         table->torques.push_back(wanted->first + static_cast<Eigen::Index>(wanted->columns.size()));
-        ExtraColumn extra{
-            .name = "torque", .child = parent.problem.get(), .values = parent.values, .probes = probes};
+        ExtraColumn extra{.name = "torque", .child = parent.problem.get(), .values = parent.values, .probes = probes};
         if (group.size() > 1) {
           extra.moved = moved[group[k]];
           extra.own_values = parent.values;

@@ -1,6 +1,6 @@
 // Which joints of a rig touch: whose signals move when a joint is pushed, or a parameter changes. What moves no signal
-// in common is looked at in one replay, each in its own signals (columns of a sparse Jacobian that share no row: Curtis,
-// Powell and Reid, "On the estimation of sparse Jacobian matrices", J. Inst. Maths Applics 13, 1974).
+// in common is looked at in one replay, each in its own signals (columns of a sparse Jacobian that share no row:
+// Curtis, Powell and Reid, "On the estimation of sparse Jacobian matrices", J. Inst. Maths Applics 13, 1974).
 #ifndef GAPSCOPE_FIT_COUPLING_H_
 #define GAPSCOPE_FIT_COUPLING_H_
 

@@ -87,9 +87,7 @@ class FitProblem::Differences {
     const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
     return point_.y[i] + options_.step <= c.high ? options_.step : -options_.step;
   }
-  void Set(Eigen::Index i, double h) {
-    problem_.space_.SetCoordinate(point_.y, i, point_.y[i] + h, &worker_.values);
-  }
+  void Set(Eigen::Index i, double h) { problem_.space_.SetCoordinate(point_.y, i, point_.y[i] + h, &worker_.values); }
 
   void Parameters() {
     worker_.values = values_;

@@ -50,13 +50,13 @@ struct FitOptions {
   std::shared_ptr<const std::vector<LogWindow>> windows;
   // What moves no signal in common is differenced together, but in central differences; null: nothing is known.
   std::shared_ptr<const Coupling> coupling;
-  double time_step_s = 0;    // 0: the model's
+  double time_step_s = 0;           // 0: the model's
   StepKind steps = StepKind::kOwn;  // of all replays
-  bool fit_offsets = true;   // zero offsets of measured positions, per log
-  bool fit_shift = true;     // command shift within +-1 sample, common to all logs
-  bool fit_states = true;    // initial state of each window
-  double shift_range_s = 0;  // the shift lies within +- this; 0: one sample
-  double shift_s = 0;        // where no shift is fitted: this one
+  bool fit_offsets = true;          // zero offsets of measured positions, per log
+  bool fit_shift = true;            // command shift within +-1 sample, common to all logs
+  bool fit_states = true;           // initial state of each window
+  double shift_range_s = 0;         // the shift lies within +- this; 0: one sample
+  double shift_s = 0;               // where no shift is fitted: this one
   // Per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation.
   std::vector<double> weights;
   Normalization normalization = Normalization::kDeviation;

@@ -54,7 +54,8 @@ Rig LoadCubicCable() {
 // The model is read again by whoever builds a variant, so the files stay until the end.
 struct Folder {
   static inline int made = 0;
-  std::filesystem::path path = std::filesystem::temp_directory_path() / ("gapscope_cart_" + std::to_string(getpid()) + "_" + std::to_string(++made));
+  std::filesystem::path path = std::filesystem::temp_directory_path() /
+                               ("gapscope_cart_" + std::to_string(getpid()) + "_" + std::to_string(++made));
   Folder() { std::filesystem::create_directories(path); }
   ~Folder() { std::filesystem::remove_all(path); }
 };
@@ -100,9 +101,10 @@ Rig LoadThreeCarts(bool linked) {
   }
   yaml += "log: {time: {column: t, unit: s}}\n" + commands + measured + parameters + set;
   const std::string path = (owner.path / name).string();
-  WriteFile(path + ".xml", "<mujoco><option timestep='0.004' integrator='RK4' gravity='0 0 0'>"
-                           "<flag contact='disable'/></option><worldbody>" +
-                               bodies + "</worldbody><actuator>" + motors + "</actuator></mujoco>")
+  WriteFile(path + ".xml",
+            "<mujoco><option timestep='0.004' integrator='RK4' gravity='0 0 0'>"
+            "<flag contact='disable'/></option><worldbody>" +
+                bodies + "</worldbody><actuator>" + motors + "</actuator></mujoco>")
       .value();
   WriteFile(path + ".yaml", yaml).value();
   return Build(path + ".yaml", {});

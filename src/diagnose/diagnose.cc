@@ -193,6 +193,23 @@ void ChooseFitted(const Model& model, std::size_t steps, bool by_windows, Workbe
       std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
 }
 
+// Where a time is asked for: fewer windows to fit, if so many replays of them as even a short search and its judging
+// take would not fit into it. True: some were left out.
+bool KeepToTime(const Model& model, const DiagnoseOptions& options, Workbench* bench) {
+  if (!(options.budget_s > 0)) return false;
+  const auto made = MakeCandidate(*bench, {});
+  if (!made.ok()) return false;
+  const Candidate& candidate = made.value();
+  const auto begin = std::chrono::steady_clock::now();
+  (void)candidate.problem->Evaluate(candidate.problem->Start(), Keep::kCost);
+  const double replay_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double share = options.budget_s / (replay_s * static_cast<double>(kDiagnosePolicy.search.least_replays));
+  if (share >= 1) return false;
+  ChooseFitted(model, static_cast<std::size_t>(share * static_cast<double>(options.replay_steps)), bench->by_windows,
+               bench);
+  return true;
+}
+
 double FinestStep(const DataSplit& data) {
   double step_s = kInfinity;
   for (const auto* logs : {&data.train, &data.held_out}) {
@@ -224,6 +241,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   const Say say = options.progress ? options.progress : [](const std::string&) {};
   const Deadline deadline = DeadlineOf(options, begin);
   GS_ASSIGN(const auto journal, OpenJournal(*model, fine, options, deadline));
+  bool fewer_windows = false;
   const auto make_bench = [&](const DataSplit& part, bool by_windows) {
     Workbench bench{.rig = model->rig(),
                     .data = part,
@@ -242,6 +260,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
     ChooseFitted(*model, options.replay_steps, by_windows, &bench);
+    fewer_windows = KeepToTime(*model, options, &bench) || fewer_windows;
     bench.deadline = deadline;
     bench.journal = journal.get();
     bench.most_steps =
@@ -268,6 +287,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     for (const auto& recording : data.held_out) result.held_out_logs.push_back(recording.log_path);
     result.split = data.how;
   }
+  if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

@@ -215,6 +215,7 @@ ordered_json JsonPolicy() {
           {"search.tie_share", policy.search.tie_share},
           {"search.simpler", policy.search.simpler},
           {"search.jacobians", policy.search.jacobians},
+          {"search.least_replays", policy.search.least_replays},
           {"search.replays", policy.search.replays},
           {"search.until_grown", policy.search.until_grown},
           {"search.until_exchanged", policy.search.until_exchanged},

@@ -24,14 +24,16 @@ Error NoUnitQuaternion(const Log& log, std::size_t row, const std::array<const C
 
 }  // namespace
 
-Result<std::array<Recording::Measured, kTurns>> BindOrientation(const Log& log, const Timeline& timeline,
+Result<std::array<Recording::Measured, kTurns>> BindOrientation(const Experiment& experiment, std::size_t index,
+                                                                const Log& log, const Timeline& timeline,
                                                                 const std::array<const Column*, kQuaternion>& columns,
-                                                                const MeasuredSpec* specs, std::size_t index,
-                                                                MissingRepair missing, std::vector<Finding>* findings) {
+                                                                std::vector<Finding>* findings) {
   std::array<std::vector<double>, kQuaternion> numbers;
   for (std::size_t i = 0; i < kQuaternion; ++i) {
-    GS_ASSIGN(numbers[i], ExtractColumn(log, timeline, *columns[i], {.missing = missing}, findings));
+    GS_ASSIGN(numbers[i],
+              ExtractColumn(log, timeline, *columns[i], {.missing = experiment.timeline.missing}, findings));
   }
+  const MeasuredSpec* specs = experiment.measured.data() + index;
   const std::size_t rows = timeline.time_s.size();
   std::array<Recording::Measured, kTurns> turns;
   for (std::size_t e = 0; e < kTurns; ++e) {

@@ -19,12 +19,12 @@ namespace gapscope {
 
 inline constexpr int kTurns = 3, kQuaternion = 4;  // numbers of a rotation vector and of a quaternion
 
-// The three signals of one orientation, by their specs: one after the other in the experiment. Errors: a row that is no
-// unit quaternion, to a hundredth; those of ExtractColumn.
-Result<std::array<Recording::Measured, kTurns>> BindOrientation(const Log& log, const Timeline& timeline,
+// The three signals of one orientation, which stand one after the other in the experiment, from `index` on. Errors: a
+// row that is no unit quaternion, to a hundredth; those of ExtractColumn.
+Result<std::array<Recording::Measured, kTurns>> BindOrientation(const Experiment& experiment, std::size_t index,
+                                                                const Log& log, const Timeline& timeline,
                                                                 const std::array<const Column*, kQuaternion>& columns,
-                                                                const MeasuredSpec* specs, std::size_t index,
-                                                                MissingRepair missing, std::vector<Finding>* findings);
+                                                                std::vector<Finding>* findings);
 
 // The orientation at a row, from the first of its three signals.
 inline Quaternion OrientationAt(const Recording::Measured* turns, std::size_t row) {

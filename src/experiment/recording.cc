@@ -128,8 +128,8 @@ Status BindMeasured(const Experiment& experiment, const Log& log, const Timeline
     if (columns.empty()) return MissingOf(log, spec);
     if (spec.kind == SignalKind::kOrientation) {
       if (spec.element > 0) continue;  // bound with the first
-      GS_ASSIGN(auto turns, BindOrientation(log, timeline, {columns[0], columns[1], columns[2], columns[3]}, &spec,
-                                            index, experiment.timeline.missing, &recording->findings));
+      GS_ASSIGN(auto turns, BindOrientation(experiment, index, log, timeline,
+                                            {columns[0], columns[1], columns[2], columns[3]}, &recording->findings));
       for (auto& turn : turns) recording->measured.push_back(std::move(turn));
       continue;
     }

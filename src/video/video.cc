@@ -210,15 +210,15 @@ Status PaintAll(const Stage& stage, const std::vector<double>& times, const Vide
 }
 
 // What can be asked of a recording: `to_s` becomes its end where it is later, or not given.
-Status Validate(const Recording& recording, VideoOptions* options) {
+Status Validate(const Recording& recording, const Model& model, VideoOptions* options) {
   const std::string extension = std::filesystem::path(options->out).extension().string();
   if (extension != ".png" && extension != ".mp4" && extension != ".gif")
     return Error{.what = "unknown kind of picture",
                  .where = "--out " + options->out,
                  .actual = "'" + extension + "'",
                  .allowed = ".mp4, .gif, .png"};
-  if (std::none_of(recording.measured.begin(), recording.measured.end(),
-                   [](const auto& q) { return TraitsOf(q.spec.kind).gives_angle; })) {
+  if (model.free_starts().empty() && std::none_of(recording.measured.begin(), recording.measured.end(),
+                                                  [](const auto& q) { return TraitsOf(q.spec.kind).gives_angle; })) {
     return Error{.what = "no position is measured: there is no real mechanism to draw", .where = recording.log_path};
   }
   const double end = recording.time_s.back();
@@ -330,7 +330,7 @@ Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<V
   const auto begin = std::chrono::steady_clock::now();
   GS_CHECK(!models.empty());
   VideoOptions options = asked;
-  GS_RETURN_IF_ERROR(Validate(recording, &options));
+  GS_RETURN_IF_ERROR(Validate(recording, *models.front().model, &options));
   VideoSummary summary;
   GS_ASSIGN(summary.gl, OpenGl(options.gl, pool.workers(), &summary.note));
   GS_ASSIGN(const std::vector<Actor> actors, RehearseAll(recording, models, options, pool));

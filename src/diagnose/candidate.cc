@@ -107,6 +107,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
                          .tolerance = limits.tolerance,
                          .coarse_step = kCoarseStep,
                          .fine_step = kFineStep,
+                         .coarse_steps = StepKind::kQuick,
                          .give_up = std::move(give_up),
                          .deadline = bench.deadline};
     Work inheriting;

@@ -128,9 +128,10 @@ double LmRun::TryStep(const Derivatives& derivatives, const Linearization& at, c
 
 void LmRun::Iterate() {
   // What looks far ahead needs no exact motion; the bottom does.
-  const DifferenceOptions differences{.step = s_.difference,
-                                      .columns = options_.central ? Columns::kCentral : Columns::kAll,
-                                      .steps = s_.difference > options_.fine_step ? StepKind::kQuick : StepKind::kOwn};
+  const DifferenceOptions differences{
+      .step = s_.difference,
+      .columns = options_.central ? Columns::kCentral : Columns::kAll,
+      .steps = s_.difference > options_.fine_step ? options_.coarse_steps : StepKind::kOwn};
   s_.derivatives =
       std::make_shared<Derivatives>(problem_.Differentiate(s_.point, differences, std::move(s_.residuals)));
   Derivatives& derivatives = *s_.derivatives;

@@ -32,6 +32,9 @@ struct SolveOptions {
   double tolerance = 1e-4;       // stop when a step lowers the cost by less than this share
   // Finite differences, in search coordinates: first coarse, once converged fine.
   double coarse_step = 0.05, fine_step = 0.01;
+  // lm: of coarse differences. Quick ones do for windows of about a second; over a long free run their motion is
+  // another.
+  StepKind coarse_steps = StepKind::kOwn;
   double damping = 1e-2;  // lm: of the first step, relative to the diagonal
   // lm: central differences, whose columns of parameters that only act as a ratio are parallel.
   bool central = false;

@@ -94,12 +94,12 @@ class Searcher {
     *bench_.coupling = Coupling::Measure(*at.problem, at.point, torques, bench_.work.get());
   }
 
-  // Members are taken out and others tried in their places, until neither changes the set.
+  // Members are taken out and others tried in their places, until neither changes the set. What is known of members
+  // at the end is of the set that was chosen.
   void Settle() {
-    for (int round = 0; round < 3; ++round) {
-      TakeOut();
-      if (!Exchange()) break;
-    }
+    constexpr int kExchanges = 3;
+    TakeOut();
+    for (int round = 0; round < kExchanges && Exchange(); ++round) TakeOut();
   }
 
   // Of the work, `share` may be spent when `what` begins.

@@ -226,6 +226,12 @@ std::size_t StepsOfReplay(const Workbench& bench) {
   return candidate.problem->Evaluate(candidate.problem->Start(), Keep::kCost).work.steps;
 }
 
+void NameLogs(const DataSplit& data, Diagnosis* result) {
+  for (const auto& recording : data.train) result->train_logs.push_back(recording.log_path);
+  for (const auto& recording : data.held_out) result->held_out_logs.push_back(recording.log_path);
+  result->split = data.how;
+}
+
 }  // namespace
 
 Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, const DiagnoseOptions& options,
@@ -278,14 +284,10 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     const Workbench again = make_bench(blocks, true);
     GS_ASSIGN(const auto second, Search(again, false, say));
     GS_ASSIGN(result, Describe(*second, again, describe, say));
-    for (const auto& recording : blocks.train) result.train_logs.push_back(recording.log_path);
-    result.held_out_logs = result.train_logs;
-    result.split = blocks.how;
+    NameLogs(blocks, &result);
   } else {
     GS_ASSIGN(result, Describe(*found, bench, describe, say));
-    for (const auto& recording : data.train) result.train_logs.push_back(recording.log_path);
-    for (const auto& recording : data.held_out) result.held_out_logs.push_back(recording.log_path);
-    result.split = data.how;
+    NameLogs(data, &result);
   }
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "src/core/collect.h"
 #include "src/core/names.h"
 
 namespace gapscope {
@@ -11,8 +12,7 @@ constexpr double kUnit = 0.01;  // of the length: a log of two decimals is as fa
 
 Error NoUnitQuaternion(const Log& log, std::size_t row, const std::array<const Column*, kQuaternion>& columns,
                        const std::string& signal, double length) {
-  std::vector<std::string> names;
-  for (const Column* column : columns) names.push_back(column->name);
+  const std::vector<std::string> names = Collect(columns, [](const Column* column) { return column->name; });
   return Error{.what = "the columns of the orientation '" + signal + "' are no unit quaternion",
                .where = log.Where(row) + ", columns " + Join(names),
                .actual = "length " + std::to_string(length),

@@ -190,7 +190,7 @@ ordered_json Json(const NextExperiment& next) {
   return json;
 }
 
-ordered_json JsonPolicy() {
+ordered_json JsonSearchPolicy() {
   constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
   return {{"search.widenings", policy.search.widenings},
           {"search.beam", policy.search.beam},
@@ -218,39 +218,46 @@ ordered_json JsonPolicy() {
           {"search.least_replays", policy.search.least_replays},
           {"search.replays", policy.search.replays},
           {"search.until_grown", policy.search.until_grown},
-          {"search.until_exchanged", policy.search.until_exchanged},
-          {"evidence.torques", policy.evidence.torques},
-          {"evidence.free_form", policy.evidence.free_form},
-          {"evidence.bound_deviations", policy.evidence.bound_deviations},
-          {"evidence.ratio_share", policy.evidence.ratio_share},
-          {"evidence.least_data_s", policy.evidence.least_data_s},
-          {"evidence.angle_waves", policy.evidence.angle_waves},
-          {"evidence.speed_waves", policy.evidence.speed_waves},
-          {"evidence.torque_share", policy.evidence.torque_share},
-          {"evidence.per_block", policy.evidence.per_block},
-          {"evidence.free_run_s", policy.evidence.free_run_s},
-          {"evidence.free_runs", policy.evidence.free_runs},
-          {"evidence.draws", policy.evidence.draws},
-          {"evidence.most_gain", policy.evidence.most_gain},
-          {"evidence.alone", policy.evidence.alone},
-          {"evidence.alike", policy.evidence.alike},
-          {"probability.constant", policy.probability.constant},
-          {"probability.gain", policy.probability.gain},
-          {"probability.discrepancy", policy.probability.discrepancy},
-          {"probability.clear", policy.probability.clear},
-          {"probability.smooth", policy.probability.smooth},
-          {"probability.dry", policy.probability.dry},
-          {"probability.most_discrepancy", policy.probability.most_discrepancy},
-          {"probability.most_clear", policy.probability.most_clear},
-          {"probability.least_clear", policy.probability.least_clear},
-          {"probability.present", policy.probability.present},
-          {"verdict.much_missing", policy.verdict.much_missing},
-          {"verdict.retuned", policy.verdict.retuned},
-          {"next.absent", policy.next.absent},
-          {"next.sure", policy.next.sure},
-          {"next.of_one_log", policy.next.of_one_log},
-          {"next.duration_s", policy.next.duration_s},
-          {"next.apart", policy.next.apart}};
+          {"search.until_exchanged", policy.search.until_exchanged}};
+}
+
+ordered_json JsonPolicy() {
+  constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
+  ordered_json json = JsonSearchPolicy();
+  const ordered_json others = {{"evidence.torques", policy.evidence.torques},
+                               {"evidence.free_form", policy.evidence.free_form},
+                               {"evidence.bound_deviations", policy.evidence.bound_deviations},
+                               {"evidence.ratio_share", policy.evidence.ratio_share},
+                               {"evidence.least_data_s", policy.evidence.least_data_s},
+                               {"evidence.angle_waves", policy.evidence.angle_waves},
+                               {"evidence.speed_waves", policy.evidence.speed_waves},
+                               {"evidence.torque_share", policy.evidence.torque_share},
+                               {"evidence.per_block", policy.evidence.per_block},
+                               {"evidence.free_run_s", policy.evidence.free_run_s},
+                               {"evidence.free_runs", policy.evidence.free_runs},
+                               {"evidence.draws", policy.evidence.draws},
+                               {"evidence.most_gain", policy.evidence.most_gain},
+                               {"evidence.alone", policy.evidence.alone},
+                               {"evidence.alike", policy.evidence.alike},
+                               {"probability.constant", policy.probability.constant},
+                               {"probability.gain", policy.probability.gain},
+                               {"probability.discrepancy", policy.probability.discrepancy},
+                               {"probability.clear", policy.probability.clear},
+                               {"probability.smooth", policy.probability.smooth},
+                               {"probability.dry", policy.probability.dry},
+                               {"probability.most_discrepancy", policy.probability.most_discrepancy},
+                               {"probability.most_clear", policy.probability.most_clear},
+                               {"probability.least_clear", policy.probability.least_clear},
+                               {"probability.present", policy.probability.present},
+                               {"verdict.much_missing", policy.verdict.much_missing},
+                               {"verdict.retuned", policy.verdict.retuned},
+                               {"next.absent", policy.next.absent},
+                               {"next.sure", policy.next.sure},
+                               {"next.of_one_log", policy.next.of_one_log},
+                               {"next.duration_s", policy.next.duration_s},
+                               {"next.apart", policy.next.apart}};
+  json.update(others);
+  return json;
 }
 
 ordered_json ToJson(const DiagnoseRun& run, Timing timing) {

@@ -35,7 +35,8 @@ bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& lay
 std::vector<int> UnseenJoints(const Model& model, const Recording& recording) {
   const mjModel& m = model.compiled();
   std::vector<char> known(static_cast<std::size_t>(m.njnt), 0);
-  for (int j = 0; j < m.njnt; ++j) known[j] = static_cast<char>(m.jnt_type[j] != mjJNT_HINGE && m.jnt_type[j] != mjJNT_SLIDE);
+  for (int j = 0; j < m.njnt; ++j)
+    known[j] = static_cast<char>(m.jnt_type[j] != mjJNT_HINGE && m.jnt_type[j] != mjJNT_SLIDE);
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
     const SignalTraits& traits = TraitsOf(source.kind);

@@ -72,7 +72,7 @@ struct Workbench {
   // Of base parameters, where they were widened.
   std::shared_ptr<std::map<std::string, std::pair<double, double>>> bounds =
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
-  // Of the base model's joints, once that is fitted.
+  // Of the base model: as it is given, then where it is fitted.
   std::shared_ptr<Coupling> coupling = std::make_shared<Coupling>();
   bool by_windows = false;              // train and held-out logs are the same: every third window is held out
   DiagnosisJournal* journal = nullptr;  // null: none

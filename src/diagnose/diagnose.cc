@@ -193,21 +193,30 @@ void ChooseFitted(const Model& model, std::size_t steps, bool by_windows, Workbe
       std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
 }
 
-// Where a time is asked for: fewer windows to fit, if so many replays of them as even a short search and its judging
-// take would not fit into it. True: some were left out.
-bool KeepToTime(const Model& model, const DiagnoseOptions& options, Workbench* bench) {
-  if (!(options.budget_s > 0)) return false;
-  const auto made = MakeCandidate(*bench, {});
-  if (!made.ok()) return false;
+// One replay of the training windows.
+struct OneReplay {
+  std::size_t steps = 0;
+  double seconds = 0;
+};
+OneReplay ReplayOnce(const Workbench& bench) {
+  const auto made = MakeCandidate(bench, {});
+  if (!made.ok()) return {};
   const Candidate& candidate = made.value();
   const auto begin = std::chrono::steady_clock::now();
-  (void)candidate.problem->Evaluate(candidate.problem->Start(), Keep::kCost);
-  const double replay_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  const double share = options.budget_s / (replay_s * static_cast<double>(kDiagnosePolicy.search.least_replays));
-  if (share >= 1) return false;
-  ChooseFitted(model, static_cast<std::size_t>(share * static_cast<double>(options.replay_steps)), bench->by_windows,
-               bench);
-  return true;
+  const std::size_t steps = candidate.problem->Evaluate(candidate.problem->Start(), Keep::kCost).work.steps;
+  return {steps, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count()};
+}
+
+// Steps of one replay. Where a time is asked for, fewer windows are fitted if so many replays of them as even a short
+// search and its judging take would not fit into it.
+std::size_t KeepToTime(const Model& model, const DiagnoseOptions& options, Workbench* bench, bool* fewer_windows) {
+  const OneReplay all = ReplayOnce(*bench);
+  const double needed_s = all.seconds * static_cast<double>(kDiagnosePolicy.search.least_replays);
+  if (!(options.budget_s > 0) || needed_s <= options.budget_s) return all.steps;
+  *fewer_windows = true;
+  ChooseFitted(model, static_cast<std::size_t>(options.budget_s / needed_s * static_cast<double>(options.replay_steps)),
+               bench->by_windows, bench);
+  return ReplayOnce(*bench).steps;
 }
 
 double FinestStep(const DataSplit& data) {
@@ -216,14 +225,6 @@ double FinestStep(const DataSplit& data) {
     for (const auto& recording : *logs) step_s = std::min(step_s, recording.timeline.median_step_s);
   }
   return step_s;
-}
-
-// Steps of one replay of the training windows.
-std::size_t StepsOfReplay(const Workbench& bench) {
-  auto made = MakeCandidate(bench, {});
-  if (!made.ok()) return 0;
-  Candidate candidate = std::move(made).value();
-  return candidate.problem->Evaluate(candidate.problem->Start(), Keep::kCost).work.steps;
 }
 
 void NameLogs(const DataSplit& data, Diagnosis* result) {
@@ -266,12 +267,12 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
     ChooseFitted(*model, options.replay_steps, by_windows, &bench);
-    fewer_windows = KeepToTime(*model, options, &bench) || fewer_windows;
+    const std::size_t replay_steps = KeepToTime(*model, options, &bench, &fewer_windows);
     bench.deadline = deadline;
     bench.journal = journal.get();
     bench.most_steps =
         static_cast<std::size_t>(ShareOfWork(options.effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
-                                 static_cast<double>(StepsOfReplay(bench)));
+                                 static_cast<double>(replay_steps));
     return bench;
   };
   const Workbench bench = make_bench(data, false);

@@ -88,9 +88,10 @@ class Searcher {
   // Few joints, or one drive's, all touch.
   void FindCoupling(Candidate& at) {
     constexpr std::size_t kFew = 2;
+    if (bench_.rig->Actuators().size() <= kFew) return;
     const std::vector<ProbeTorque> torques = MakeTorques(bench_);
     const auto other = [&](const ProbeTorque& torque) { return torque.joint != torques.front().joint; };
-    if (bench_.rig->Actuators().size() <= kFew || std::none_of(torques.begin(), torques.end(), other)) return;
+    if (std::none_of(torques.begin(), torques.end(), other)) return;
     *bench_.coupling = Coupling::Measure(*at.problem, at.point, torques, bench_.work.get());
   }
 

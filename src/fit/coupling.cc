@@ -54,6 +54,14 @@ std::vector<std::vector<std::size_t>> ApartGroups(const std::vector<MovedSignals
   return groups;
 }
 
+void KeepMoved(const Recording& recording, const FitWindow& window, const MovedSignals& moved,
+               Eigen::Ref<Eigen::VectorXd> column) {
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    if (!moved[recording.measured[s].index])
+      column.segment(static_cast<Eigen::Index>(s) * window.scored(), window.scored()).setZero();
+  }
+}
+
 Coupling Coupling::Measure(FitProblem& problem, const FitPoint& point, std::span<const ProbeTorque> torques,
                            Work* work) {
   Coupling coupling;
@@ -82,19 +90,17 @@ Coupling Coupling::Measure(FitProblem& problem, const FitPoint& point, std::span
   }
   for (const auto& [signal, squares] : of_state) coupling.of_state_[signal] = Moved(squares);
 
-  const Residuals& base = at.quick.empty() ? at.residuals : at.quick;
   for (const ProbeTorque& torque : torques) {
     const char* name = mj_id2name(&problem.model().compiled(), mjOBJ_JOINT, torque.joint);
     if (!name || coupling.of_joint_.contains(name)) continue;
     problem.SetProbes({torque});
-    const Evaluation there =
-        problem.Evaluate(point, Keep::kResiduals, {}, at.quick.empty() ? StepKind::kOwn : StepKind::kQuick);
+    const Evaluation there = problem.Evaluate(point, Keep::kResiduals, {}, at.steps());
     problem.SetProbes({});
     *work += there.work;
     if (!std::isfinite(there.cost)) continue;
     std::vector<double> squares(signals, 0.0);
     for (std::size_t w = 0; w < windows.size(); ++w)
-      AddSquares(problem, windows[w], Eigen::VectorXd(there.residuals[w] - base[w]), &squares);
+      AddSquares(problem, windows[w], Eigen::VectorXd(there.residuals[w] - at.base()[w]), &squares);
     coupling.of_joint_[name] = Moved(squares);
   }
   return coupling;

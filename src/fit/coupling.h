@@ -17,6 +17,10 @@ namespace gapscope {
 // that moves all signals is alone.
 std::vector<std::vector<std::size_t>> ApartGroups(const std::vector<MovedSignals>& moved);
 
+// Leaves of one window's column what lies in the signals that it moves.
+void KeepMoved(const Recording& recording, const FitWindow& window, const MovedSignals& moved,
+               Eigen::Ref<Eigen::VectorXd> column);
+
 class Coupling {
  public:
   // Nothing is known of it: everything touches.

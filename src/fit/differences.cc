@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/fit/coupling.h"
 #include "src/fit/fit_worker.h"
 #include "src/fit/policy.h"
 
@@ -24,8 +25,8 @@ class FitProblem::Differences {
         options_(options),
         shift_(problem.Shift(point)),
         residual_(result.residuals[window]),
-        base_(result.quick.empty() ? residual_ : result.quick[window]),
-        steps_(result.quick.empty() ? StepKind::kOwn : StepKind::kQuick),
+        base_(result.base()[window]),
+        steps_(result.steps()),
         jacobian_(result.jacobians[window]) {}
 
   // False: the window cannot be simulated at the point.
@@ -61,13 +62,8 @@ class FitProblem::Differences {
 
   // A column's difference in the signals that it moves.
   void OwnDifference(Eigen::Index column, double h, const MovedSignals& moved) {
-    const auto& measured = problem_.recordings_[window_.log].measured;
-    for (std::size_t s = 0; s < measured.size(); ++s) {
-      if (!moved[measured[s].index]) continue;
-      const Eigen::Index first = static_cast<Eigen::Index>(s) * window_.scored(), count = window_.scored();
-      jacobian_.col(column).segment(first, count) =
-          (worker_.other.segment(first, count) - base_.segment(first, count)) / h;
-    }
+    Difference(column, h);
+    KeepMoved(problem_.recordings_[window_.log], window_, moved, jacobian_.col(column));
   }
 
   // Column by column, or in groups but for central differences: `in_one` makes a group's columns and says whether it

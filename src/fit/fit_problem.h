@@ -56,6 +56,9 @@ struct Derivatives {
   Residuals quick;     // those that differences of quick steps are taken from; none where the model's own were needed
   bool valid = false;  // false: the point cannot be simulated
   Work work;
+  // How the differences' motions were made, and the residuals that they are taken from.
+  StepKind steps() const { return quick.empty() ? StepKind::kOwn : StepKind::kQuick; }
+  const Residuals& base() const { return quick.empty() ? residuals : quick; }
 };
 
 class FitProblem {

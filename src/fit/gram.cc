@@ -11,6 +11,7 @@
 #include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/fit/blocks.h"
+#include "src/fit/coupling.h"
 
 namespace gapscope {
 namespace {
@@ -85,21 +86,17 @@ class ExtraColumns {
     const FitPoint there = CarryOver(parent_, point_, child, values);
     child.SetProbes(probes);
     std::optional<Residuals> added;
-    if (!at_.quick.empty() && child.model().HasQuickSteps())
-      added = Added(child, there, at_.quick, StepKind::kQuick, &work_);
+    if (at_.steps() == StepKind::kQuick && child.model().HasQuickSteps())
+      added = Added(child, there, at_.base(), StepKind::kQuick, &work_);
     if (!added) added = Added(child, there, at_.residuals, StepKind::kOwn, &work_);
     child.SetProbes({});
     return added;
   }
   // Zero on the other signals.
-  Residuals Own(Residuals added, const std::vector<char>& moved) const {
+  Residuals Own(Residuals added, const MovedSignals& moved) const {
     for (std::size_t w = 0; w < added.size(); ++w) {
       const FitWindow& window = parent_.windows()[w];
-      const auto& measured = parent_.recordings()[window.log].measured;
-      for (std::size_t s = 0; s < measured.size(); ++s) {
-        if (!moved[measured[s].index])
-          added[w].segment(static_cast<Eigen::Index>(s) * window.scored(), window.scored()).setZero();
-      }
+      KeepMoved(parent_.recordings()[window.log], window, moved, added[w]);
     }
     return added;
   }

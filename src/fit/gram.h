@@ -45,7 +45,7 @@ struct ExtraColumn {
   // one replay, and each keeps its own signals alone.
   std::vector<double> values;
   std::vector<ProbeTorque> probes = {};
-  std::vector<char> moved = {};  // by the experiment's signals: those that are its own; empty: all
+  MovedSignals moved = {};  // by the experiment's signals: those that are its own; empty: all
   // Where that cannot be simulated together: its own part of it.
   std::vector<double> own_values = {};
   std::vector<ProbeTorque> own_probes = {};

@@ -103,8 +103,7 @@ FitPoint LmRun::BentStep(const Derivatives& derivatives, const Linearization& at
     probe.states[w] += share * (straight.states[w] - s_.point.states[w]);
   Residuals residuals;
   // From what the Jacobian is of: a bend is a small difference beside it.
-  if (!std::isfinite(Cost(probe, &residuals, derivatives.quick.empty() ? StepKind::kOwn : StepKind::kQuick)))
-    return straight;
+  if (!std::isfinite(Cost(probe, &residuals, derivatives.steps()))) return straight;
   const Linearization bend = Bend(problem_, at, derivatives, s_.point, straight, {share, residuals});
   const Eigen::VectorXd correction = DampedStep(bend, straight);
   const auto length = [&](const Eigen::VectorXd& v) {

@@ -198,8 +198,8 @@ Linearization Bend(const FitProblem& problem, const Linearization& at, const Der
     Eigen::VectorXd moved(jacobian.cols());
     moved << dy, to.states[w] - from.states[w];
     // r(x + s v) = r + s J v + s^2/2 r_vv; of r_vv, the half that a step takes.
-    const Eigen::VectorXd& base = (derivatives.quick.empty() ? derivatives.residuals : derivatives.quick)[w];
-    const Eigen::VectorXd half = ((probe.residuals[w] - base) / probe.share - jacobian * moved) / probe.share;
+    const Eigen::VectorXd half =
+        ((probe.residuals[w] - derivatives.base()[w]) / probe.share - jacobian * moved) / probe.share;
     const Eigen::VectorXd slope = jacobian.transpose() * half;
     gradients[w] = slope.head(n);
     if (const Eigen::Index m = jacobian.cols() - n; m > 0) {

@@ -9,6 +9,7 @@
 #include "src/core/statistics.h"
 #include "src/diagnose/discrepancy.h"
 #include "src/diagnose/policy.h"
+#include "src/diagnose/torques.h"
 
 namespace gapscope {
 namespace {

@@ -27,12 +27,6 @@ struct Trial {
   std::vector<Eigen::Index> columns;
 };
 
-// Random smooth torques on the joints of measured signals, in thirds of angle, of speed and of both. The same ones in
-// every call.
-std::vector<ProbeTorque> MakeTorques(const Workbench& bench);
-// More of them, of the drive's command as well: together nearly any smooth torque.
-std::vector<ProbeTorque> MakeFreeForm(const Workbench& bench);
-
 struct ColumnTable {
   std::vector<Trial> trials;
   std::vector<Eigen::Index> torques;  // columns of random torques

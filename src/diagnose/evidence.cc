@@ -8,6 +8,7 @@
 #include "src/diagnose/block_errors.h"
 #include "src/diagnose/discrepancy.h"
 #include "src/diagnose/policy.h"
+#include "src/diagnose/torques.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {

@@ -9,6 +9,7 @@
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
+#include "src/diagnose/torques.h"
 
 namespace gapscope {
 namespace {

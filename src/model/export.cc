@@ -62,6 +62,11 @@ Result<ExportedModel> Model::Export(std::span<const double> values, const std::m
   if (!writer.Write(values, log_values ? *log_values : std::map<std::string, double>()))
     return Error{.what = "the tuned model has a parameter that is not finite", .where = experiment().model_path};
   mj_copyBack(structure.spec.get(), exported.compiled_.get());
+  const SpecPtr asked = rig_->CopySpec();
+  for (const auto& setting : exported.settings_) {
+    mjsBody* body = BodyOfInertia(*structure.spec, setting.name);
+    if (const mjsBody* own = BodyOfInertia(*asked, setting.name); body && own) body->simple = own->simple;
+  }
   const std::vector<std::string> names = Collect(exported.parameters_, &Parameter::name);
   for (const auto& setting : exported.settings_)
     result.origins.push_back({setting.name, Read(setting.expressions, names)});

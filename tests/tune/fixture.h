@@ -31,6 +31,8 @@ Rig LoadCubicCable();
 // time. Parameters: cart.gain (1.5, within [low, high]; in units, not logarithmic), cart.damping (0, [0, 4], frozen).
 Rig LoadCart(double low = -10, double high = 10);
 inline constexpr double kCartMass_kg = 2, kCartStiffness_n_per_m = 8, kCartStep_s = 0.004;
+// A link on a hinge about its y axis, in gravity, whose inertia is under `inertia:`: link.alpha ... link.t3.
+Rig LoadLink();
 // Three such carts side by side, by Runge-Kutta: a, b, c; the second one drags the third along where `linked`.
 // Parameters: CART.gain, CART.damping, free.
 Rig LoadThreeCarts(bool linked);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "src/model/parameter_writer.h"
 #include "src/report/tune_report.h"
 #include "tests/tune/fixture.h"
 
@@ -166,6 +167,60 @@ TEST(TuneTest, NothingFreeIsAnError) {
                           model->Nominal(), {}, pool);
   ASSERT_FALSE(found.ok());
   EXPECT_NE(found.error().Text().find("--free"), std::string::npos);
+}
+
+// What a hinge about y sees of a body: m x, m z and the inertia about the axis.
+std::array<double, 3> SeenByHinge(const Rig& rig, const std::vector<double>& values) {
+  const ModelPtr written(mj_copyModel(nullptr, &rig.model->compiled()));
+  const DataPtr data(mj_makeData(written.get()));
+  EXPECT_TRUE(ParameterWriter(*rig.model, written.get(), data.get()).Write(values, {}));
+  const BodyInertia b = InertiaOf(*written, 1);
+  return {b.mass_kg * b.centre_m[0], b.mass_kg * b.centre_m[2], DrivenInertia(*written, 0)};
+}
+
+TEST(TuneTest, OfABodysTenNumbersThoseAreTunedThatTheLogsKnow) {
+  const Rig rig = LoadLink();
+  const std::vector<double> truth =
+      rig.Values({{"link.alpha", 0.12}, {"link.d3", -0.1}, {"link.t1", 0.03}, {"link.t3", -0.02}, {"link.s12", 0.2}});
+  std::vector<Recording> logs;
+  for (int k = 0; k < 3; ++k) {
+    const auto command = [k](double t) { return 1.5 * std::sin((3 + k) * t + 1.2 * t * t); };
+    logs.push_back(MakeLog(rig, truth, command, 4, 0.004, 1e-3, static_cast<unsigned long>(k + 1)));
+    logs.back().log_path = "log" + std::to_string(k);
+  }
+  TuneOptions options;
+  for (int i = 0; i < 10; ++i) options.if_known.push_back(i);
+  ThreadPool pool(2);
+  const auto tuned = Tune(*rig.model, SplitData(logs, {}), rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(tuned.ok()) << tuned.error().Text();
+  const TuneSummary& summary = tuned.value();
+  // Three of ten numbers say what the hinge sees; the rest stays and is named.
+  ASSERT_EQ(summary.tuned.size(), 3u);
+  EXPECT_EQ(summary.left_frozen.size(), 7u);
+  for (const TunedParameter& t : summary.tuned) EXPECT_TRUE(t.identifiable) << t.index;
+  for (const int index : summary.left_frozen) EXPECT_EQ(summary.values[static_cast<std::size_t>(index)], 0);
+  for (const char* unseen : {"link.d2", "link.s12", "link.s23", "link.t2"})
+    EXPECT_NE(std::ranges::find(summary.left_frozen, rig.Index(unseen)), summary.left_frozen.end()) << unseen;
+  const auto wanted = SeenByHinge(rig, truth), found = SeenByHinge(rig, summary.values),
+             before = SeenByHinge(rig, rig.model->Nominal());
+  for (std::size_t i = 0; i < 3; ++i) {
+    constexpr double kShare = 0.01;  // of the truth, at a noise of 1 mrad
+    EXPECT_NEAR(found[i], wanted[i], kShare * std::abs(wanted[i])) << i;
+    EXPECT_GT(std::abs(before[i] - wanted[i]), 5 * kShare * std::abs(wanted[i])) << i;
+  }
+  EXPECT_NE(ToTable(TuneRunOf(summary, *rig.model, 0)).find("frozen, for these logs do not know them: link: "),
+            std::string::npos);
+}
+
+TEST(TuneTest, NothingKnownIsSaid) {
+  const Rig rig = LoadLink();
+  TuneOptions options;
+  options.if_known = {rig.Index("link.t2"), rig.Index("link.s23")};
+  ThreadPool pool(1);
+  const Recording log = MakeLog(rig, rig.model->Nominal(), [](double t) { return std::sin(4 * t); }, 2, 0.004, 1e-3, 1);
+  const auto tuned = Tune(*rig.model, SplitData({log}, {}), rig.model->Nominal(), options, pool);
+  ASSERT_FALSE(tuned.ok());
+  EXPECT_NE(tuned.error().Text().find("these logs know none"), std::string::npos) << tuned.error().Text();
 }
 
 }  // namespace

@@ -25,9 +25,9 @@ namespace gapscope {
 
 struct BodyInertia {
   double mass_kg = 0;
-  Vector3 centre_m = {};            // in the body's frame
-  Vector3 moments_kg_m2 = {};       // about the centre, along `axes`
-  Quaternion axes = kNoRotation;    // from the principal axes to the body's
+  Vector3 centre_m = {};          // in the body's frame
+  Vector3 moments_kg_m2 = {};     // about the centre, along `axes`
+  Quaternion axes = kNoRotation;  // from the principal axes to the body's
 };
 BodyInertia InertiaOf(const mjModel& model, int body);
 // How far a body reaches from its frame: its centre and its radius of gyration, m. 0: it has no mass.

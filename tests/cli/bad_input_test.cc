@@ -1,4 +1,5 @@
-// What a user's experiment file says wrongly of an MJCF: status 2, one line with file, line and column, nothing written.
+// What a user's experiment file says wrongly of an MJCF: status 2, one line with file, line and column, nothing
+// written.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -49,8 +50,8 @@ class BadInputTest : public ::testing::Test {
   }
   Answer Tune(const std::string& yaml, const std::string& log = "log.csv") {
     scratch_.Write("experiment.yaml", yaml);
-    return scratch_.Shell("cd '" + scratch_.Path("") +
-                          "' && '" GAPSCOPE_PROGRAM "' tune experiment.yaml " + log + " --starts 1 --budget 5 --out out");
+    return scratch_.Shell("cd '" + scratch_.Path("") + "' && '" GAPSCOPE_PROGRAM "' tune experiment.yaml " + log +
+                          " --starts 1 --budget 5 --out out");
   }
   void ExpectRefused(const Answer& answer, const std::string& where, const std::string& says) {
     EXPECT_EQ(answer.status, 2) << answer.err;

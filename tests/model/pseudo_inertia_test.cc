@@ -1,5 +1,5 @@
-// Ten numbers change a body's inertia: against closed forms, against the 4x4 matrix written out, and beside an MJCF with
-// the changed numbers in it.
+// Ten numbers change a body's inertia: against closed forms, against the 4x4 matrix written out, and beside an MJCF
+// with the changed numbers in it.
 #include "src/model/pseudo_inertia.h"
 
 #include <gtest/gtest.h>
@@ -221,9 +221,8 @@ TEST_F(PseudoInertiaModelTest, MovesAsAnMjcfWithTheInertiaInIt) {
   const auto freed = Make(Robot(kHub, kHand), kBound + kFree);
   ASSERT_NE(freed, nullptr);
   const auto motion = Run(*freed, Both());
-  const auto written = Make(Robot(Inertial(0.6, {0.001, 0.001, 0.002}, kOne),
-                                  Inertial(0.2, {0.0002, 0.0003, 0.0004}, kOther)),
-                            kBound);
+  const auto written =
+      Make(Robot(Inertial(0.6, {0.001, 0.001, 0.002}, kOne), Inertial(0.2, {0.0002, 0.0003, 0.0004}, kOther)), kBound);
   ASSERT_NE(written, nullptr);
   ExpectSame(motion, Run(*written), kSame);
   const auto as_it_was = Run(*Make(Robot(kHub, kHand), kBound));
@@ -261,8 +260,9 @@ TEST_F(PseudoInertiaModelTest, AreTunedOnlyWhereLogsKnowThem) {
     EXPECT_EQ(p.high, -p.low) << p.name;
   }
   // What the experiment says of one holds.
-  const auto listed = Make(Robot(kHub, kHand), std::string(kBound) + "inertia: [hub]\nparameters: {hub.alpha: {unit: 1, "
-                                                                     "nominal: 0.1, bounds: [0, 0.2]}}\n");
+  const auto listed = Make(Robot(kHub, kHand), std::string(kBound) +
+                                                   "inertia: [hub]\nparameters: {hub.alpha: {unit: 1, "
+                                                   "nominal: 0.1, bounds: [0, 0.2]}}\n");
   ASSERT_NE(listed, nullptr);
   EXPECT_EQ(listed->FreeParameters().size(), 1u);
   const auto set = Make(Robot(kHub, kHand), std::string(kBound) +

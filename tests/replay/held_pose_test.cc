@@ -62,7 +62,8 @@ constexpr char kSwing[] = R"(log: {time: {column: t, unit: s}}
 measured:
   - {signal: swing, column: swing, joint: swing, unit: rad}
 )";
-const std::string kPlace = "  - {signal: place, site: marker, columns_of_elements: [x, y, z], unit: mm, score: false}\n",
+const std::string kPlace =
+                      "  - {signal: place, site: marker, columns_of_elements: [x, y, z], unit: mm, score: false}\n",
                   kTurn = "  - {signal: turn, site: marker, columns_of_elements: [qw, qx, qy, qz], score: false}\n",
                   kHold = "hold: [base]\n";
 

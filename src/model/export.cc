@@ -1,6 +1,10 @@
 // What a model becomes outside a replay: an MJCF of its own, and a model to draw.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <iterator>
+#include <limits>
+#include <numeric>
 
 #include "src/core/collect.h"
 #include "src/model/model.h"
@@ -18,6 +22,29 @@ std::vector<std::string> Read(const std::vector<std::string>& expressions, const
                        [&](const std::string& expression) { return Mentions(expression, name); });
   });
   return read;
+}
+
+// Writes an inertia into an element, if it is another one than before.
+void SetInertia(const BodyInertia& before, const BodyInertia& inertia, mjsBody* body) {
+  const auto same = [](const auto& a, const auto& b) {
+    constexpr double kRounding = 1e-12;
+    return std::ranges::equal(a, b, [](double x, double y) { return std::abs(x - y) <= kRounding * std::abs(y); });
+  };
+  if (same(std::array{inertia.mass_kg}, std::array{before.mass_kg}) && same(inertia.centre_m, before.centre_m) &&
+      same(inertia.moments_kg_m2, before.moments_kg_m2) && same(inertia.axes, before.axes))
+    return;
+  body->mass = inertia.mass_kg;
+  std::ranges::copy(inertia.centre_m, body->ipos);
+  std::ranges::copy(inertia.axes, body->iquat);
+  std::ranges::copy(inertia.moments_kg_m2, body->inertia);
+  std::ranges::fill(body->fullinertia, std::numeric_limits<double>::quiet_NaN());
+  body->ialt.type = mjORIENTATION_QUAT;
+  body->explicitinertial = 1;
+  // Of a plate the largest moment is the sum of the others. It must not be more once all are written with six digits.
+  constexpr double kPrinted = 1e-5;
+  double* most = std::ranges::max_element(body->inertia);
+  const double others = std::accumulate(body->inertia, body->inertia + 3, 0.0) - *most;
+  if (others < (1 + kPrinted) * *most) *most = (1 - kPrinted) * others;
 }
 
 }  // namespace
@@ -54,20 +81,29 @@ Result<ExportedModel> Model::Export(std::span<const double> values, const std::m
       return depends;
     });
   }
+  const std::vector<std::string> names = Collect(parameters_, &Parameter::name);
+  // Whether a body's frame is its inertia's decides what MuJoCo compiles: inertias that move go into the spec itself.
+  const ModelPtr written(mj_copyModel(nullptr, compiled_.get()));
+  const DataPtr scratch(mj_makeData(written.get()));
+  const std::map<std::string, double> none;
+  if (!ParameterWriter(*this, written.get(), scratch.get()).Write(values, log_values ? *log_values : none))
+    return Error{.what = "the tuned model has a parameter that is not finite", .where = experiment().model_path};
+  std::erase_if(structure.settings, [&](const FieldSetting& setting) {
+    mjsBody* body = BodyOfInertia(*structure.spec, setting.field);
+    if (!body) return false;
+    const int id = mj_name2id(written.get(), mjOBJ_BODY, ElementOfField(setting.field).c_str());
+    SetInertia(InertiaOf(*compiled_, id), InertiaOf(*written, id), body);
+    result.origins.push_back({setting.field, Read(setting.expressions, names)});
+    return true;
+  });
   Model exported;
   exported.rig_ = rig_;
   GS_RETURN_IF_ERROR(exported.Compile(&structure));
   const DataPtr data(mj_makeData(exported.compiled_.get()));
   ParameterWriter writer(exported, exported.compiled_.get(), data.get());
-  if (!writer.Write(values, log_values ? *log_values : std::map<std::string, double>()))
+  if (!writer.Write(values, log_values ? *log_values : none))
     return Error{.what = "the tuned model has a parameter that is not finite", .where = experiment().model_path};
   mj_copyBack(structure.spec.get(), exported.compiled_.get());
-  const SpecPtr asked = rig_->CopySpec();
-  for (const auto& setting : exported.settings_) {
-    mjsBody* body = BodyOfInertia(*structure.spec, setting.name);
-    if (const mjsBody* own = BodyOfInertia(*asked, setting.name); body && own) body->simple = own->simple;
-  }
-  const std::vector<std::string> names = Collect(exported.parameters_, &Parameter::name);
   for (const auto& setting : exported.settings_)
     result.origins.push_back({setting.name, Read(setting.expressions, names)});
   for (const auto& split : structure.splits) {

@@ -135,7 +135,7 @@ constexpr const char* kRobot = R"(<mujoco>
   <actuator><motor name="hub" joint="hub"/><motor name="shoulder" joint="shoulder"/>
     <motor name="wrist" joint="wrist"/></actuator>
 </mujoco>)";
-constexpr const char* kHub = R"(<inertial pos="0 0 0" mass="0.6" diaginertia="0.001 0.001 0.002"/>)";
+constexpr const char* kHub = R"(<inertial pos="0 0 0" mass="0.6" diaginertia="0.001 0.0012 0.0018"/>)";
 constexpr const char* kHand = R"(<inertial pos="0 0 0" mass="0.2" diaginertia="0.0002 0.0003 0.0004"/>)";
 constexpr const char* kBound = R"(commands:
   - {actuator: hub, column: a, unit: N m}
@@ -221,8 +221,8 @@ TEST_F(PseudoInertiaModelTest, MovesAsAnMjcfWithTheInertiaInIt) {
   const auto freed = Make(Robot(kHub, kHand), kBound + kFree);
   ASSERT_NE(freed, nullptr);
   const auto motion = Run(*freed, Both());
-  const auto written =
-      Make(Robot(Inertial(0.6, {0.001, 0.001, 0.002}, kOne), Inertial(0.2, {0.0002, 0.0003, 0.0004}, kOther)), kBound);
+  const auto written = Make(
+      Robot(Inertial(0.6, {0.001, 0.0012, 0.0018}, kOne), Inertial(0.2, {0.0002, 0.0003, 0.0004}, kOther)), kBound);
   ASSERT_NE(written, nullptr);
   ExpectSame(motion, Run(*written), kSame);
   const auto as_it_was = Run(*Make(Robot(kHub, kHand), kBound));
@@ -278,7 +278,7 @@ TEST_F(PseudoInertiaModelTest, TheExportedModelMovesAlike) {
   const auto xml = freed->ToXml(ValuesWith(*freed, Both()), {}, {});
   ASSERT_TRUE(xml.ok()) << xml.error().Text();
   EXPECT_EQ(xml.value().find("simple="), std::string::npos) << "what an older MuJoCo cannot read";
-  ExpectSame(Run(*freed, Both()), Run(*Make(xml.value(), kBound)), 1e-10);
+  ExpectSame(Run(*freed, Both()), Run(*Make(xml.value(), kBound)), 1e-4);  // six digits
 }
 
 TEST_F(PseudoInertiaModelTest, ApplyWritesTheInertialAlone) {
@@ -289,10 +289,11 @@ TEST_F(PseudoInertiaModelTest, ApplyWritesTheInertialAlone) {
       ApplyToMjcf(*freed, ValuesWith(*freed, Values("hub", {0.1, 0, 0, 0, 0, 0, 0, 0.02, 0, 0})),
                   {.out = scratch_.Path("out.xml"), .notes = {{"hub.alpha", "heavier"}, {"hub.t1", "off centre"}}});
   ASSERT_TRUE(applied.ok()) << applied.error().Text();
-  EXPECT_EQ(applied.value().text,
-            Replaced(mjcf, kHub,
-                     "<!-- gapscope: heavier --> <!-- gapscope: off centre --> "
-                     "<inertial pos=\"0.02 0 0\" mass=\"0.732842\" diaginertia=\"0.0012214 0.0012214 0.00244281\"/>"));
+  EXPECT_EQ(
+      applied.value().text,
+      Replaced(mjcf, kHub,
+               "<!-- gapscope: heavier -->\n      <!-- gapscope: off centre -->\n      <inertial pos=\"0.02 0 0\" "
+               "mass=\"0.732842\" diaginertia=\"0.001221403 0.001465683 0.002198525\"/>"));
 }
 
 TEST_F(PseudoInertiaModelTest, ApplyTakesAThinPlate) {

@@ -51,6 +51,32 @@ void MakeRoomForDigits(mjsBody* body) {
   *least += std::max(0.0, kPrinted * *most - room);
 }
 
+// Whether a body's frame is its inertia's decides what MuJoCo compiles: inertias that move go into the spec itself.
+// False as ParameterWriter::Write.
+bool BakeInertias(const Model& model, std::span<const double> values, const std::map<std::string, double>& log_values,
+                  Structure* structure, ExportedModel* result) {
+  const ModelPtr written(mj_copyModel(nullptr, &model.compiled()));
+  const DataPtr scratch(mj_makeData(written.get()));
+  const bool good = ParameterWriter(model, written.get(), scratch.get()).Write(values, log_values);
+  std::erase_if(structure->settings, [&](const FieldSetting& setting) {
+    mjsBody* body = BodyOfInertia(*structure->spec, setting.field);
+    if (!body) return false;
+    const int id = mj_name2id(written.get(), mjOBJ_BODY, ElementOfField(setting.field).c_str());
+    const BodyInertia before = InertiaOf(model.compiled(), id), after = InertiaOf(*written, id);
+    if (setting.field.ends_with("/ipos")) {  // mass and moments may be settings too, of a log that is not here
+      BodyInertia moved = before;
+      moved.centre_m = after.centre_m;
+      SetInertia(before, moved, body);
+    } else if (SetInertia(before, after, body)) {
+      MakeRoomForDigits(body);
+    }
+    result->origins.push_back(
+        {setting.field, Read(setting.expressions, Collect(model.parameters(), &Parameter::name))});
+    return true;
+  });
+  return good;
+}
+
 }  // namespace
 
 Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
@@ -67,30 +93,6 @@ Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
   if (status != 0) return Error{.what = "cannot write the tuned model: " + OneLine(message), .where = where};
   xml.resize(std::char_traits<char>::length(xml.c_str()));
   return xml;
-}
-
-// Whether a body's frame is its inertia's decides what MuJoCo compiles: inertias that move go into the spec itself.
-bool Model::BakeInertias(std::span<const double> values, const std::map<std::string, double>& log_values,
-                         Structure* structure, ExportedModel* result) const {
-  const ModelPtr written(mj_copyModel(nullptr, compiled_.get()));
-  const DataPtr scratch(mj_makeData(written.get()));
-  const bool good = ParameterWriter(*this, written.get(), scratch.get()).Write(values, log_values);
-  std::erase_if(structure->settings, [&](const FieldSetting& setting) {
-    mjsBody* body = BodyOfInertia(*structure->spec, setting.field);
-    if (!body) return false;
-    const int id = mj_name2id(written.get(), mjOBJ_BODY, ElementOfField(setting.field).c_str());
-    const BodyInertia before = InertiaOf(*compiled_, id), after = InertiaOf(*written, id);
-    if (setting.field.ends_with("/ipos")) {  // mass and moments may be settings too, of a log that is not here
-      BodyInertia moved = before;
-      moved.centre_m = after.centre_m;
-      SetInertia(before, moved, body);
-    } else if (SetInertia(before, after, body)) {
-      MakeRoomForDigits(body);
-    }
-    result->origins.push_back({setting.field, Read(setting.expressions, Collect(parameters_, &Parameter::name))});
-    return true;
-  });
-  return good;
 }
 
 Result<ExportedModel> Model::Export(std::span<const double> values, const std::map<std::string, double>* log_values,
@@ -110,7 +112,7 @@ Result<ExportedModel> Model::Export(std::span<const double> values, const std::m
     });
   }
   const std::map<std::string, double> none;
-  const bool good = BakeInertias(values, log_values ? *log_values : none, &structure, &result);
+  const bool good = BakeInertias(*this, values, log_values ? *log_values : none, &structure, &result);
   Model exported;
   exported.rig_ = rig_;
   GS_RETURN_IF_ERROR(exported.Compile(&structure));

@@ -115,9 +115,6 @@ class Model {
   Model() = default;
   // Compiles a finished structure and resolves its settings in the result; they leave the structure.
   Status Compile(Structure* structure);
-  // Takes settings of inertias out of the structure; false as ParameterWriter::Write.
-  bool BakeInertias(std::span<const double> values, const std::map<std::string, double>& log_values,
-                    Structure* structure, ExportedModel* result) const;
   Status ResolveSettings(std::vector<FieldSetting> settings);
   Status CheckInertias() const;
   Status ResolveNames();

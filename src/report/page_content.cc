@@ -37,7 +37,7 @@ PageContent PageOf(const ReplayRun& run) {
   PageContent page{.headline = HeadlineOf(run), .mapped = "model", .values = run.model.values};
   const auto& logs = run.comparison.logs;
   if (!logs.empty())
-    page.where = {{.title = {}, .shares = MostTelling(logs.front().where, {.limit = kMostConditions})}};
+    page.where = {{.title = {}, .shares = TellOfWorst(logs.front(), {.limit = kMostConditions})}};
   return page;
 }
 

@@ -109,7 +109,7 @@ std::unique_ptr<Page> ReplayPage() {
   ReplayResult nominal = Replayed(*page, page->source.values);
   page->source.predictions = {{"nominal", nominal.logs}};
   ThreadPool pool(1);
-  Comparison comparison = Compare(nominal, page->recordings, pool);
+  Comparison comparison = Compare(*page->model->rig(), nominal, page->recordings, pool);
   const ReplayRun run = ReplayRunOf(*page->model, page->source.values, std::move(nominal), std::move(comparison));
   page->result = ToJson(run);
   page->source.content = PageOf(run);

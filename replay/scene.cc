@@ -24,9 +24,8 @@ constexpr double kMargin = 1.22;       // free around the motion
 constexpr double kTrackingZoom = 0.8;  // a camera that follows may come closer
 constexpr double kMujocoAzimuth_deg = 90, kMujocoElevation_deg = -45;  // of an MJCF without <visual><global>
 constexpr int kShadowMap = 1024;       // pixels across the table
-// Of all meshes in a picture. A mechanism of a million is drawn with so many: at 1280 x 720 they are smaller than five
-// pixels.
-constexpr std::size_t kMostTriangles = 60000;
+// Of all meshes of a mechanism: about four pixels across in a picture 720 high.
+constexpr std::size_t kMostTriangles = 40000;
 
 using Vector = std::array<double, 3>;
 double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }

@@ -19,11 +19,11 @@ constexpr float kClearAt = 0.008f;
 // of in stripes.
 constexpr float kGhostGrowth = 1.012f;
 
-constexpr int kSampledPoses = 200;     // of a track, to frame it
-constexpr double kMargin = 1.22;       // free around the motion
-constexpr double kTrackingZoom = 0.8;  // a camera that follows may come closer
+constexpr int kSampledPoses = 200;                                     // of a track, to frame it
+constexpr double kMargin = 1.22;                                       // free around the motion
+constexpr double kTrackingZoom = 0.8;                                  // a camera that follows may come closer
 constexpr double kMujocoAzimuth_deg = 90, kMujocoElevation_deg = -45;  // of an MJCF without <visual><global>
-constexpr int kShadowMap = 1024;       // pixels across the table
+constexpr int kShadowMap = 1024;                                       // pixels across the table
 // Of all meshes of a mechanism: about four pixels across in a picture 720 high.
 constexpr std::size_t kMostTriangles = 40000;
 

@@ -41,8 +41,7 @@ std::vector<int> JoinVertices(float* vertices, int count, double cell_m) {
   }
   for (const auto& [cube, head] : first) {
     const auto& sum = sums[static_cast<std::size_t>(head)];
-    for (int i = 0; i < 3; ++i)
-      vertices[3 * head + i] = static_cast<float>(sum[static_cast<std::size_t>(i)] / sum[3]);
+    for (int i = 0; i < 3; ++i) vertices[3 * head + i] = static_cast<float>(sum[static_cast<std::size_t>(i)] / sum[3]);
   }
   return stands_for;
 }

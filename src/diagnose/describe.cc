@@ -61,8 +61,7 @@ std::vector<ConditionShare> Locate(const Rig& rig, const std::vector<LogReplay>&
     }
     if (const int c = rig.CommandOfSignal(trace.signal); c >= 0)
       input.command = recording.commands[static_cast<std::size_t>(c)].values;
-    located.signals.push_back(
-        ScoreSignal(trace.signal, log.time_s, trace.measured, trace.predicted, trace.resolution));
+    located.signals.push_back(ScoreSignal(trace.signal, log.time_s, trace.measured, trace.predicted, trace.resolution));
     for (auto& share : LocateError(input, {.seed = seed})) located.where.push_back(std::move(share));
   }
   return TellOfWorst(located, {.limit = 12});

@@ -89,8 +89,8 @@ class Writer {
     if (gains.armature > 0)
       Propose({slot.name + ".armature_kg_m2", slide ? "kg" : "kg m^2", gains.armature, 0, gains.armature * room});
     if (gains.kd > 0 || gains.kp > 0)
-      Propose({slot.name + ".kd", slide ? "N s/m" : "N m s/rad", gains.kd, 0,
-               std::max(gains.kd * room, 0.1 * gains.kp)});
+      Propose(
+          {slot.name + ".kd", slide ? "N s/m" : "N m s/rad", gains.kd, 0, std::max(gains.kd * room, 0.1 * gains.kp)});
   }
 
   const mjModel& m_;

@@ -84,8 +84,7 @@ void KeepNeighboursApart(mjsBody* held, mjSpec* spec) {
   for (mjsBody* neighbour : neighbours) {
     for (const mjsBody* other : FixedTogether(neighbour, &further)) {
       for (const mjsBody* body : fixed) {
-        const std::string a = mjs_getString(mjs_getName(body->element)),
-                          b = mjs_getString(mjs_getName(other->element));
+        const std::string a = mjs_getString(mjs_getName(body->element)), b = mjs_getString(mjs_getName(other->element));
         if (a.empty() || b.empty()) continue;
         mjsExclude* exclude = mjs_addExclude(spec);
         mjs_setString(exclude->bodyname1, a.c_str());

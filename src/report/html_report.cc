@@ -70,9 +70,9 @@ ordered_json Quality(const Recording& recording) {
 
 // A signal of a page, and what was predicted of it.
 struct Shown {
-  std::size_t number;          // in the recording
-  int command = -1;            // that drives it; -1: not known
-  double error = kNaN;         // of the last prediction, normalised
+  std::size_t number;   // in the recording
+  int command = -1;     // that drives it; -1: not known
+  double error = kNaN;  // of the last prediction, normalised
   std::vector<std::span<const double>> predicted;
 };
 
@@ -95,8 +95,9 @@ ShownLog ShowLog(const ReportSource& source, std::size_t index) {
   for (std::size_t s = 0; s < log.recording.measured.size(); ++s) {
     const auto& measured = log.recording.measured[s];
     Shown shown{.number = s, .predicted = {}};
-    shown.command = source.model ? source.model->rig()->CommandOfSignal(measured.spec.signal)
-                                 : log.recording.commands.size() == 1 ? 0 : -1;
+    shown.command = source.model                         ? source.model->rig()->CommandOfSignal(measured.spec.signal)
+                    : log.recording.commands.size() == 1 ? 0
+                                                         : -1;
     for (const LogReplay* replay : replays) shown.predicted.emplace_back(replay->signals[s].predicted);
     if (!replays.empty())
       shown.error = ScoreSignal(measured.spec.signal, log.recording.time_s, measured.values, shown.predicted.back(),
@@ -108,8 +109,7 @@ ShownLog ShowLog(const ReportSource& source, std::size_t index) {
   if (log.signals.size() <= kFewSignals || replays.empty()) return log;
   std::vector<Shown> ordered;
   for (const std::size_t s : WorstFirst(scores)) ordered.push_back(std::move(log.signals[s]));
-  std::ranges::stable_partition(ordered,
-                                [&](const Shown& s) { return log.recording.measured[s.number].spec.scored; });
+  std::ranges::stable_partition(ordered, [&](const Shown& s) { return log.recording.measured[s.number].spec.scored; });
   log.signals = std::move(ordered);
   return log;
 }
@@ -205,8 +205,7 @@ ordered_json Trace(const ShownLog& log, const Shown& shown, std::size_t most_row
 
 // Traces of one log, of about `most_numbers` numbers.
 ordered_json Traces(const ReportSource& source, const ShownLog& log, std::size_t most_numbers) {
-  const std::size_t columns =
-      log.signals.size() * (2 + log.labels.size()) + 2 * log.recording.commands.size();
+  const std::size_t columns = log.signals.size() * (2 + log.labels.size()) + 2 * log.recording.commands.size();
   const std::size_t most_rows = most_numbers / columns;
   ordered_json json = {{"signals", ordered_json::array()}, {"commands", ordered_json::array()}};
   for (const Shown& shown : log.signals) json["signals"].push_back(Trace(log, shown, most_rows));

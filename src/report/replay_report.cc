@@ -55,8 +55,9 @@ std::string ConditionLines(const std::vector<ConditionShare>& telling) {
   std::string text = fmt::format("\nwhere the error lies in the first log {:<{}} {:>9} {:>9}   90 % interval\n", "",
                                  width + 8, "of error", "of time");
   for (const auto& share : telling) {
-    text += fmt::format("  {:<{}} {:<42} {:>8.0f}% {:>8.0f}%   {:.0f}..{:.0f} %\n", share.signal, width, share.condition,
-                        100 * share.share_of_error, 100 * share.share_of_time, 100 * share.low, 100 * share.high);
+    text +=
+        fmt::format("  {:<{}} {:<42} {:>8.0f}% {:>8.0f}%   {:.0f}..{:.0f} %\n", share.signal, width, share.condition,
+                    100 * share.share_of_error, 100 * share.share_of_time, 100 * share.low, 100 * share.high);
   }
   return text;
 }
@@ -120,8 +121,8 @@ std::string ToTable(const ReplayRun& run, const Console& console) {
   const Comparison& comparison = run.comparison;
   std::size_t name_width = 18;
   for (const auto& log : comparison.logs) name_width = std::max(name_width, WidestSignal(log.signals));
-  std::string text = console.Bold(fmt::format("{:<24} {:<{}} {:>9} {:>9} {:>7} {:>8} {:>6} {}", "log", "signal", name_width,
-                                              "RMSE", "MAE", "nRMSE", "lag ms", "corr", "over time")) +
+  std::string text = console.Bold(fmt::format("{:<24} {:<{}} {:>9} {:>9} {:>7} {:>8} {:>6} {}", "log", "signal",
+                                              name_width, "RMSE", "MAE", "nRMSE", "lag ms", "corr", "over time")) +
                      "\n";
   std::vector<std::string> paths;
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {

@@ -90,8 +90,8 @@ std::string ParameterLines(const TuneRun& run, const Console& console) {
 std::string HeldOutLines(const TuneRun& run, const Console& console) {
   std::size_t name_width = 18;
   for (const auto& log : run.held_out) name_width = std::max(name_width, WidestSignal(log.signals));
-  std::string text = console.Bold(fmt::format("{:<44} {:<{}} {:>10} {:>10} {:>8}", "held-out log", "signal",
-                                              name_width, "RMSE", "MAE", "nRMSE")) +
+  std::string text = console.Bold(fmt::format("{:<44} {:<{}} {:>10} {:>10} {:>8}", "held-out log", "signal", name_width,
+                                              "RMSE", "MAE", "nRMSE")) +
                      "\n";
   for (const auto& log : run.held_out) {
     const std::string name = log.log.size() > 44 ? "..." + log.log.substr(log.log.size() - 41) : log.log;

@@ -328,8 +328,8 @@ void Page::DrawTimeAxis(Canvas& c, double left) const {
 
 int Page::StripBegin(double time_s) const {
   const double cursor = (time_s - options_.from_s) * pixels_per_s_;
-  return static_cast<int>(std::clamp(cursor - plot_width_ / 2.0, 0.0,
-                                     std::max(0.0, future_.width - 2.0 * margin_ - plot_width_)));
+  return static_cast<int>(
+      std::clamp(cursor - plot_width_ / 2.0, 0.0, std::max(0.0, future_.width - 2.0 * margin_ - plot_width_)));
 }
 
 void Page::CopyStrip(double time_s, Picture& frame) const {
@@ -339,8 +339,8 @@ void Page::CopyStrip(double time_s, Picture& frame) const {
   const auto copy = [&](double from_y, double to_y) {
     for (int y = static_cast<int>(from_y); y < std::min(static_cast<int>(std::ceil(to_y)), past_.height); ++y) {
       const std::ptrdiff_t from = static_cast<std::ptrdiff_t>(y) * past_.width + begin;
-      std::uint32_t* to = frame.pixels.data() + static_cast<std::ptrdiff_t>(top_ + y) * frame.width + left_ +
-                          plot_left_ - margin_;
+      std::uint32_t* to =
+          frame.pixels.data() + static_cast<std::ptrdiff_t>(top_ + y) * frame.width + left_ + plot_left_ - margin_;
       std::copy_n(past_.pixels.data() + from, cursor, to);
       std::copy_n(future_.pixels.data() + from + cursor, width - cursor, to + cursor);
     }
@@ -381,16 +381,26 @@ void Page::DrawCursor(Canvas& c, double time_s) const {
 // Each model's error over its plot, where the traces stand beside the scenes.
 void Page::DrawErrors(Canvas& c, double time_s) const {
   c.Font(12 * unit_, true);
-  for (std::size_t s = 0; s < traces_.signals.size(); ++s) {
-    double right = left_ + plot_left_ + plot_width_;
-    for (std::size_t m = models_.size(); m-- > 0;) {
-      const std::string error = Signed(Interpolate(traces_.time_s, traces_.signals[s].measured, time_s) -
-                                       Interpolate(traces_.time_s, traces_.signals[s].predicted[m], time_s));
-      c.Ink(OfModel(m));
-      c.Text(error, right, top_ + rows_[s].top - 4 * unit_, 1);
-      right -= c.Width(error) + 10 * unit_;
+  std::vector<double> right(traces_.signals.size(), left_ + plot_left_ + plot_width_);
+  for (std::size_t m = models_.size(); m-- > 0;) {
+    const auto errors = ErrorsNow(m, time_s);
+    c.Ink(OfModel(m));
+    for (std::size_t s = 0; s < errors.size(); ++s) {
+      c.Text(errors[s][1], right[s], top_ + rows_[s].top - 4 * unit_, 1);
+      right[s] -= c.Width(errors[s][1]) + 10 * unit_;
     }
   }
+}
+
+// Of each signal that is shown: name, error of the model, unit.
+std::vector<std::array<std::string, 3>> Page::ErrorsNow(std::size_t model, double time_s) const {
+  std::vector<std::array<std::string, 3>> lines;
+  for (const auto& signal : traces_.signals) {
+    const double error = Interpolate(traces_.time_s, signal.measured, time_s) -
+                         Interpolate(traces_.time_s, signal.predicted[model], time_s);
+    lines.push_back({signal.name, Signed(error), signal.unit});
+  }
+  return lines;
 }
 
 void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
@@ -402,20 +412,14 @@ void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
   c.Font(15 * unit_, true);
   const std::string label = c.Fit(measured_panel ? "measured" : models_[m].label, std::max(name_room, 90 * unit_));
   double width = c.Width(label) + 46 * unit_;
-  std::vector<std::array<std::string, 3>> lines;
+  const std::vector<std::array<std::string, 3>> lines =
+      measured_panel || beside_ ? std::vector<std::array<std::string, 3>>() : ErrorsNow(m, time_s);
   const std::string whole =
       measured_panel ? "" : fmt::format("{}{:.3g}", beside_ ? "error " : "whole log ", models_[m].error);
   if (!measured_panel) {
     c.Font(12.5 * unit_);
     width = std::max(width, c.Width("error now" + whole) + 40 * unit_);
-  }
-  if (!measured_panel && !beside_) {
-    for (const auto& signal : traces_.signals) {
-      const double error = Interpolate(traces_.time_s, signal.measured, time_s) -
-                           Interpolate(traces_.time_s, signal.predicted[m], time_s);
-      lines.push_back({signal.name, Signed(error), signal.unit});
-      width = std::max(width, c.Width(signal.name) + c.Width(signal.unit) + 118 * unit_);
-    }
+    for (const auto& [name, value, unit] : lines) width = std::max(width, c.Width(name) + c.Width(unit) + 118 * unit_);
   }
   const bool diverged = !measured_panel && models_[m].diverged_at_s >= 0 && time_s > models_[m].diverged_at_s;
   const bool ghost = !measured_panel && !options_.side_by_side;

@@ -79,6 +79,7 @@ class Page {
   void DrawTimeAxis(Canvas& canvas, double left) const;
   void CopyStrip(double time_s, Picture& frame) const;
   void DrawCursor(Canvas& canvas, double time_s) const;
+  std::vector<std::array<std::string, 3>> ErrorsNow(std::size_t model, double time_s) const;
   void DrawErrors(Canvas& canvas, double time_s) const;
   void DrawPanel(Canvas& canvas, std::size_t panel, double time_s) const;
   void DrawClock(Canvas& canvas, double time_s) const;
@@ -91,15 +92,15 @@ class Page {
   double unit_ = 1;  // one pixel of a picture 720 high
   int scene_width_ = 0, scene_height_ = 0;
   std::size_t panels_ = 1, signals_in_all_ = 0;
-  bool beside_ = false;                                        // the traces stand beside the scenes
-  int left_ = 0, top_ = 0;                                     // of the traces' part
-  int plot_left_ = 0, plot_width_ = 0, margin_ = 0;            // in it; a plot reaches `margin_` further
-  double pixels_per_s_ = 1;                                    // of the strip
-  bool rolls_ = false;                                         // the strip is longer than the plot
+  bool beside_ = false;                              // the traces stand beside the scenes
+  int left_ = 0, top_ = 0;                           // of the traces' part
+  int plot_left_ = 0, plot_width_ = 0, margin_ = 0;  // in it; a plot reaches `margin_` further
+  double pixels_per_s_ = 1;                          // of the strip
+  bool rolls_ = false;                               // the strip is longer than the plot
   double axis_top_ = 0;
-  std::vector<Row> rows_;         // signals, then the first command where it is shown
-  Picture paper_;                 // names, units and limits
-  Picture future_, past_;         // the plots over the whole time, pale and full
+  std::vector<Row> rows_;  // signals, then the first command where it is shown
+  Picture paper_;          // names, units and limits
+  Picture future_, past_;  // the plots over the whole time, pale and full
 };
 
 // Writes a picture as PNG, to a temporary name first. Error: cannot write.

@@ -34,7 +34,12 @@ Result<Actor> Rehearse(const Recording& recording, const VideoModel& model, cons
                        ThreadPool& pool) {
   ReplayOptions replay{.mode = options.mode, .window_s = options.window_s, .values = model.values, .keep_poses = true};
   ReplayResult result = Replay(*model.model, {recording}, replay, pool);
-  Actor actor{.drawn = nullptr, .predicted = {}, .measured = {}, .replay = std::move(result.logs.front()), .error = 0, .errors = {}};
+  Actor actor{.drawn = nullptr,
+              .predicted = {},
+              .measured = {},
+              .replay = std::move(result.logs.front()),
+              .error = 0,
+              .errors = {}};
   GS_ASSIGN(actor.drawn, model.model->CompileForDrawing(model.values, recording.values));
   actor.predicted = PredictedPoses(*model.model, model.values, recording, actor.replay);
   actor.measured = MeasuredPoses(*model.model, model.values, recording, actor.predicted);

@@ -184,7 +184,8 @@ def many_signals(driver, path):
         look(driver, path, width, "off")
         script = lambda text: driver.execute_script("return " + text)
         title = "document.querySelector('#charts h3').textContent"
-        check(script("timeCharts.length") == 3, f"{width}: one signal in full, got {script('timeCharts.length')} charts")
+        charts = script("timeCharts.length")
+        check(charts == 3, f"{width}: one signal in full, got {charts} charts")
         check(script(title) == "joint_28", f"{width}: the worst first, got {script(title)}")
         check(script("document.querySelectorAll('.tile').length") == 12, f"{width}: twelve small pictures")
         driver.find_element(By.ID, "more-tiles").click()

@@ -169,7 +169,8 @@ std::unique_ptr<Page> ManyPage(int joints, int rows) {
       MakeExperiment(scratch, "<mujoco><worldbody>" + bodies + "</worldbody></mujoco>",
                      "actuators:\n" + actuators + "commands:\n" + commands + "measured:\n" + measured);
   page->model = MakeModel(experiment);
-  page->recordings = {MakeRecording(experiment, rows, 0.005, [](int c, double t) { return std::sin((1 + 0.1 * c) * t); })};
+  page->recordings = {
+      MakeRecording(experiment, rows, 0.005, [](int c, double t) { return std::sin((1 + 0.1 * c) * t); })};
   Recording& recording = page->recordings.front();
   LogReplay replay = EmptyTraces(recording);
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {

@@ -1,8 +1,11 @@
 "use strict";
-// Small pictures of many signals, the worst first. A picture is drawn when it comes into view; a press picks its signal.
+// Small pictures of many signals, the worst first. One is drawn when it comes into view; a press picks its signal.
 
 const FIRST_TILES = 12, EXCERPT_S = 8;
 let tileWatch = null;
+
+// A name that may be broken after its underlines.
+const breakable = (name) => name.split(/(?<=_)/).flatMap((part) => [part, element("wbr")]);
 
 // The rows around the largest error: of a minute nothing could be seen in so small a picture.
 function excerpt(signal) {
@@ -66,7 +69,7 @@ function drawTiles(log, picked, pick) {
       const tile = element(
         "button",
         {type: "button", class: "tile", "aria-pressed": String(from + k === picked)},
-        element("span", {class: "name"}, signal.name),
+        element("span", {class: "name"}, ...breakable(signal.name)),
         element("span", {class: "error"}, number(signal.error, 2)),
         canvas,
       );

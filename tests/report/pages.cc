@@ -63,7 +63,7 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   }
   for (const FoundEffect& found : d.effects) {
     d.statements.push_back({.use = found.use,
-                            .answer = Answer::kPresent,
+                            .answer = gapscope::Answer::kPresent,
                             .probability = found.probability,
                             .parameters = found.parameters,
                             .share_of_gap = {.value = found.share_of_gap},
@@ -73,10 +73,10 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   if (verdict == Verdict::kAmbiguous) {
     d.ambiguous = {{kSpring, kGravity}};
     d.statements.front().group = 0;
-    d.statements.push_back({.use = kGravity, .answer = Answer::kPresent, .probability = 0.97, .group = 0});
+    d.statements.push_back({.use = kGravity, .answer = gapscope::Answer::kPresent, .probability = 0.97, .group = 0});
   }
   d.statements.push_back({.use = {"torque_bias", "arm"},
-                          .answer = Answer::kAbsent,
+                          .answer = gapscope::Answer::kAbsent,
                           .probability = 0.03,
                           .bounds = {{"torque_n_m", "N m", 0.0002, 0.0002, 0.0002}},
                           .rule = "gains too little"});

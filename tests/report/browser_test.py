@@ -188,7 +188,9 @@ def many_signals(driver, path):
         check(charts == 3, f"{width}: one signal in full, got {charts} charts")
         check(script(title) == "joint_28", f"{width}: the worst first, got {script(title)}")
         check(script("document.querySelectorAll('.tile').length") == 12, f"{width}: twelve small pictures")
-        driver.find_element(By.ID, "more-tiles").click()
+        more = driver.find_element(By.ID, "more-tiles")
+        driver.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'});", more)
+        more.click()
         check(script("document.querySelectorAll('.tile').length") == 29, f"{width}: all small pictures")
         tile = driver.find_elements(By.CSS_SELECTOR, ".tile")[20]
         driver.execute_script("arguments[0].scrollIntoView({block: 'center', behavior: 'instant'});", tile)

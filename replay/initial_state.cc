@@ -146,6 +146,32 @@ BodyState Placed(const LogAt& at, const FreeStart& start, BodyState body) {
   return body;
 }
 
+// A joint that nobody measured, tied by an equality to one that was, stands where that puts it: y = c0 + c1 x + ...,
+// each from its reference.
+void PlaceTied(const mjModel& m, const std::vector<bool>& known, InitialState* state) {
+  for (int e = 0; e < m.neq; ++e) {
+    const int y = m.eq_obj1id[e], x = m.eq_obj2id[e];
+    if (m.eq_type[e] != mjEQ_JOINT || !m.eq_active0[e] || x < 0 || known[m.jnt_dofadr[y]] == known[m.jnt_dofadr[x]])
+      continue;
+    const mjtNum* c = m.eq_data + static_cast<std::ptrdiff_t>(mjNEQDATA) * e;
+    const auto at = [&](int joint) -> double& { return state->qpos[m.jnt_qposadr[joint]]; };
+    const double x0 = m.qpos0[m.jnt_qposadr[x]], y0 = m.qpos0[m.jnt_qposadr[y]];
+    const auto value = [&](double d) { return c[0] + d * (c[1] + d * (c[2] + d * (c[3] + d * c[4]))); };
+    const auto slope = [&](double d) { return c[1] + d * (2 * c[2] + d * (3 * c[3] + d * 4 * c[4])); };
+    if (known[m.jnt_dofadr[x]]) {
+      at(y) = y0 + value(at(x) - x0);
+      state->qvel[m.jnt_dofadr[y]] = slope(at(x) - x0) * state->qvel[m.jnt_dofadr[x]];
+      continue;
+    }
+    double d = at(x) - x0;
+    constexpr int kNewtonSteps = 20;
+    for (int i = 0; i < kNewtonSteps && slope(d) != 0; ++i) d -= (value(d) - (at(y) - y0)) / slope(d);
+    if (!std::isfinite(d) || slope(d) == 0) continue;
+    at(x) = x0 + d;
+    state->qvel[m.jnt_dofadr[x]] = state->qvel[m.jnt_dofadr[y]] / slope(d);
+  }
+}
+
 }  // namespace
 
 int FindMeasured(const Recording& recording, int index) {
@@ -216,6 +242,7 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
     if (!TraitsOf(source.kind).gives_speed || known[source.dof]) continue;
     state.qvel[source.dof] = FitLater(SampledOf(recording, measured), row, DelayOf(source, values)).value;
   }
+  PlaceTied(m, known, &state);
   PlaceFreeBodies(model, recording, row, values, state.qpos, state.qvel);
   for (const auto& [joint, from] : model.mirrored_joints()) {
     state.qpos[m.jnt_qposadr[joint]] = state.qpos[m.jnt_qposadr[from]];

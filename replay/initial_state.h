@@ -23,7 +23,8 @@ inline constexpr double kInitialFitHalfWidth_s = 0.02;
 
 // The initial state at a row: measured joints from a local quadratic fit of their position (less their offset
 // parameter) and its slope, or the measured velocity where only that exists; free bodies from their measured pose;
-// joints that an effect added start with the joint they belong to.
+// joints that an effect added start with the joint they belong to, those that an equality ties to a measured one where
+// that puts them.
 InitialState InitialStateAt(const Model& model, const Recording& recording, std::size_t row,
                             std::span<const double> values);
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "replay/thin_meshes.h"
+
 namespace gapscope {
 namespace {
 
@@ -17,23 +19,29 @@ constexpr float kClearAt = 0.008f;
 // of in stripes.
 constexpr float kGhostGrowth = 1.012f;
 
-constexpr int kSampledPoses = 200;     // of a track, to frame it
-constexpr double kMargin = 1.22;       // free around the motion
-constexpr double kTrackingZoom = 0.8;  // a camera that follows may come closer
-constexpr int kShadowMap = 1024;       // pixels across the table
+constexpr int kSampledPoses = 200;                                     // of a track, to frame it
+constexpr double kMargin = 1.22;                                       // free around the motion
+constexpr double kTrackingZoom = 0.8;                                  // a camera that follows may come closer
+constexpr double kMujocoAzimuth_deg = 90, kMujocoElevation_deg = -45;  // of an MJCF without <visual><global>
+constexpr int kShadowMap = 1024;                                       // pixels across the table
+// Of all meshes of a mechanism: about four pixels across in a picture 720 high.
+constexpr std::size_t kMostTriangles = 40000;
 
 using Vector = std::array<double, 3>;
 double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-bool Moves(const mjModel& m, int geom) { return m.body_weldid[m.geom_bodyid[geom]] != 0; }
+bool IsSeen(const mjModel& m, int geom) { return m.geom_group[geom] < kDrawnGroups; }
+bool Moves(const mjModel& m, int geom) { return IsSeen(m, geom) && m.body_weldid[m.geom_bodyid[geom]] != 0; }
 
 // Direction of sight of the view, as the free camera's angles.
 void PointCamera(const mjModel& m, const mjData& d, Framing& framing) {
   const char* name = framing.view == View::kFixed ? "fixed" : framing.view == View::kTop ? "top" : "track";
   mjvCamera camera;
   mjv_defaultFreeCamera(&m, &camera);
-  framing.azimuth_deg = camera.azimuth;
-  framing.elevation_deg = framing.view == View::kTop ? -89.5 : camera.elevation;
+  // Where the MJCF says nothing, from before and aside: of a robot seen straight from its side half is hidden.
+  const bool told = camera.azimuth != kMujocoAzimuth_deg || camera.elevation != kMujocoElevation_deg;
+  framing.azimuth_deg = told ? camera.azimuth : 125;
+  framing.elevation_deg = framing.view == View::kTop ? -89.5 : told ? camera.elevation : -20;
   const int id = mj_name2id(&m, mjOBJ_CAMERA, name);
   if (id < 0) return;
   const mjtNum* x = d.cam_xmat + 9 * id;
@@ -131,7 +139,7 @@ std::vector<Vector> CornersSeen(const mjModel& model, mjData& d, std::span<const
 double ReachAbout(const mjModel& model, const mjData& d, double x, double y) {
   double reach = 0;
   for (int g = 0; g < model.ngeom; ++g) {
-    if (model.geom_type[g] == mjGEOM_PLANE || model.geom_type[g] == mjGEOM_HFIELD) continue;
+    if (!IsSeen(model, g) || model.geom_type[g] == mjGEOM_PLANE || model.geom_type[g] == mjGEOM_HFIELD) continue;
     ForEachCorner(model, d, g, [&](const Vector& p) { reach = std::max(reach, std::hypot(p[0] - x, p[1] - y)); });
   }
   return reach;
@@ -375,6 +383,8 @@ Result<std::unique_ptr<Scene>> Scene::Make(const mjModel& model, const Framing& 
   }
   drawn.vis.quality.shadowsize = std::min(drawn.vis.quality.shadowsize, kShadowMap);
   drawn.vis.map.shadowclip = static_cast<float>(1.3 * framing.ground_m / drawn.stat.extent);
+  double cell = 2 * framing.distance_m * std::tan(drawn.vis.global.fovy * mjPI / 360) / height;  // a pixel there
+  for (; DrawnTriangles(drawn) > kMostTriangles; cell *= 1.25) ThinMeshes(&drawn, cell);
   impl.width = width;
   impl.height = height;
   mjv_makeScene(&drawn, &impl.scene, kMaxGeoms);

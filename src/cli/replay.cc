@@ -93,7 +93,7 @@ Result<int> RunReplay(const ReplayFlags& flags) {
   }
   std::optional<LoopStatistics> loop;
   if (controller) loop = LoopStatisticsOf(replayed, session.recordings, *controller);
-  Comparison comparison = Compare(result, session.recordings, *session.pool);
+  Comparison comparison = Compare(*session.model->rig(), result, session.recordings, *session.pool);
   ReplayRun run = ReplayRunOf(*session.model, session.values, std::move(result), std::move(comparison));
   run.info.seed = flags.common.seed;
   run.other_error = OtherError(session, options, run.result.time_step_s);

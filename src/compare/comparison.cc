@@ -1,6 +1,8 @@
 #include "src/compare/comparison.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "src/core/statistics.h"
 #include "src/experiment/local_fit.h"
@@ -19,7 +21,7 @@ std::vector<double> SmoothedSpeed(const Recording& recording, const Recording::M
   return speed;
 }
 
-LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
+LogComparison CompareLog(const Rig& rig, const LogReplay& log, const Recording& recording) {
   LogComparison comparison{.log_path = log.log_path};
   std::vector<SignalScore> scored;
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
@@ -37,7 +39,8 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
       input.speed = speed;
     }
     if (traits.gives_angle) input.angle = trace.measured;
-    if (!recording.commands.empty()) input.command = recording.commands.front().values;
+    if (const int c = rig.CommandOfSignal(trace.signal); c >= 0)
+      input.command = recording.commands[static_cast<std::size_t>(c)].values;
     for (auto& share : LocateError(input)) comparison.where.push_back(std::move(share));
   }
   comparison.error = log.outcome == Outcome::kDiverged ? kInfinity : CombinedError(scored);
@@ -46,15 +49,39 @@ LogComparison CompareLog(const LogReplay& log, const Recording& recording) {
 
 }  // namespace
 
-Comparison Compare(const ReplayResult& result, const std::vector<Recording>& recordings, ThreadPool& pool) {
+Comparison Compare(const Rig& rig, const ReplayResult& result, const std::vector<Recording>& recordings,
+                   ThreadPool& pool) {
   Comparison comparison;
   comparison.logs.resize(result.logs.size());
   pool.ForEach(result.logs.size(),
-               [&](std::size_t l, int) { comparison.logs[l] = CompareLog(result.logs[l], recordings[l]); });
+               [&](std::size_t l, int) { comparison.logs[l] = CompareLog(rig, result.logs[l], recordings[l]); });
   double sum = 0;
   for (const auto& log : comparison.logs) sum += log.error * log.error;
   comparison.error = std::sqrt(sum / static_cast<double>(comparison.logs.size()));
   return comparison;
+}
+
+std::vector<std::size_t> WorstFirst(std::span<const SignalScore> scores) {
+  std::vector<std::size_t> order(scores.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto badness = [&](std::size_t s) { return std::isnan(scores[s].nrmse) ? kInfinity : scores[s].nrmse; };
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return badness(a) > badness(b); });
+  return order;
+}
+
+std::vector<ConditionShare> TellOfWorst(const LogComparison& log, const TellingOptions& options) {
+  std::vector<SignalScore> located;
+  for (const SignalScore& score : log.signals) {
+    if (std::ranges::find(log.where, score.signal, &ConditionShare::signal) != log.where.end())
+      located.push_back(score);
+  }
+  std::vector<std::size_t> worst = WorstFirst(located);
+  worst.resize(std::min(worst.size(), kSignalsTold));
+  std::vector<ConditionShare> shares;
+  std::ranges::copy_if(log.where, std::back_inserter(shares), [&](const ConditionShare& share) {
+    return std::ranges::any_of(worst, [&](std::size_t s) { return located[s].signal == share.signal; });
+  });
+  return MostTelling(shares, options);
 }
 
 }  // namespace gapscope

@@ -8,6 +8,7 @@
 #include "replay/replay.h"
 #include "src/compare/conditions.h"
 #include "src/compare/score.h"
+#include "src/model/rig.h"
 
 namespace gapscope {
 
@@ -23,7 +24,16 @@ struct Comparison {
   std::vector<LogComparison> logs;
 };
 
-Comparison Compare(const ReplayResult& result, const std::vector<Recording>& recordings, ThreadPool& pool);
+// `rig`: tells which command drives which signal.
+Comparison Compare(const Rig& rig, const ReplayResult& result, const std::vector<Recording>& recordings,
+                   ThreadPool& pool);
+
+// Signals by number, those with the greatest nrmse first, one without a number before all.
+std::vector<std::size_t> WorstFirst(std::span<const SignalScore> scores);
+
+// What is telling where a log has many signals is said of the worst ones alone.
+inline constexpr std::size_t kSignalsTold = 6;
+std::vector<ConditionShare> TellOfWorst(const LogComparison& log, const TellingOptions& options);
 
 }  // namespace gapscope
 

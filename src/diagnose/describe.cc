@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "src/compare/comparison.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
 #include "src/diagnose/explain.h"
@@ -40,10 +41,10 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
 }
 
 // Where a model's error lies, on the first held-out log, which stands for all (shares of several logs do not add up).
-std::vector<ConditionShare> Locate(const std::vector<LogReplay>& predicted, const std::vector<Recording>& held_out,
-                                   std::uint64_t seed) {
-  std::vector<ConditionShare> where;
-  if (predicted.empty()) return where;
+std::vector<ConditionShare> Locate(const Rig& rig, const std::vector<LogReplay>& predicted,
+                                   const std::vector<Recording>& held_out, std::uint64_t seed) {
+  LogComparison located;
+  if (predicted.empty()) return {};
   const LogReplay& log = predicted.front();
   const Recording& recording = held_out.front();
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
@@ -58,10 +59,12 @@ std::vector<ConditionShare> Locate(const std::vector<LogReplay>& predicted, cons
       input.speed = speed;
       input.angle = trace.measured;
     }
-    if (!recording.commands.empty()) input.command = recording.commands.front().values;
-    for (auto& share : LocateError(input, {.seed = seed})) where.push_back(std::move(share));
+    if (const int c = rig.CommandOfSignal(trace.signal); c >= 0)
+      input.command = recording.commands[static_cast<std::size_t>(c)].values;
+    located.signals.push_back(ScoreSignal(trace.signal, log.time_s, trace.measured, trace.predicted, trace.resolution));
+    for (auto& share : LocateError(input, {.seed = seed})) located.where.push_back(std::move(share));
   }
-  return MostTelling(where, {.limit = 12});
+  return TellOfWorst(located, {.limit = 12});
 }
 
 // Base parameters that ended on a bound.
@@ -222,8 +225,8 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
     say("designing the next experiment");
     result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
   }
-  result.where = Locate(PredictHeldOut(bench, base), bench.data.held_out, seed);
-  result.remains = &chosen == &base ? result.where : Locate(predicted, bench.data.held_out, seed);
+  result.where = Locate(*bench.rig, PredictHeldOut(bench, base), bench.data.held_out, seed);
+  result.remains = &chosen == &base ? result.where : Locate(*bench.rig, predicted, bench.data.held_out, seed);
   result.cut = found.cut;
   result.work = *bench.work;
   for (const auto* part : {&bench.data.train, bench.by_windows ? nullptr : &bench.data.held_out}) {

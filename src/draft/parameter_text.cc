@@ -83,11 +83,14 @@ class Writer {
 
   void OfAdded(const ActuatorSlot& slot, const ServoGains& gains) {
     const double room = gains.certain ? 2 : 10;
-    if (gains.kp > 0) Propose({slot.name + ".kp", "N m/rad", gains.kp, gains.kp / room, gains.kp * room});
+    const bool slide = slot.joint >= 0 && p_.joints[slot.joint].slide;
+    if (gains.kp > 0)
+      Propose({slot.name + ".kp", slide ? "N/m" : "N m/rad", gains.kp, gains.kp / room, gains.kp * room});
     if (gains.armature > 0)
-      Propose({slot.name + ".armature_kg_m2", "kg m^2", gains.armature, 0, gains.armature * room});
+      Propose({slot.name + ".armature_kg_m2", slide ? "kg" : "kg m^2", gains.armature, 0, gains.armature * room});
     if (gains.kd > 0 || gains.kp > 0)
-      Propose({slot.name + ".kd", "N m s/rad", gains.kd, 0, std::max(gains.kd * room, 0.1 * gains.kp)});
+      Propose(
+          {slot.name + ".kd", slide ? "N s/m" : "N m s/rad", gains.kd, 0, std::max(gains.kd * room, 0.1 * gains.kp)});
   }
 
   const mjModel& m_;

@@ -64,13 +64,44 @@ mjsElement* FreeJointOf(mjSpec* spec, const std::string& name) {
   return nullptr;
 }
 
+// `body` and the bodies that are fixed to it; `beyond` gets those that move against them.
+std::vector<mjsBody*> FixedTogether(mjsBody* body, std::vector<mjsBody*>* beyond) {
+  std::vector<mjsBody*> fixed = {body};
+  for (std::size_t i = 0; i < fixed.size(); ++i) {
+    for (mjsElement* e = mjs_firstChild(fixed[i], mjOBJ_BODY, 0); e; e = mjs_nextChild(fixed[i], e, 0)) {
+      mjsBody* child = mjs_asBody(e);
+      (mjs_firstChild(child, mjOBJ_JOINT, 0) ? *beyond : fixed).push_back(child);
+    }
+  }
+  return fixed;
+}
+
+// MuJoCo lets a body pass through its parent, unless the parent stands still: a body that is held would suddenly touch
+// its neighbours, which often overlap it.
+void KeepNeighboursApart(mjsBody* held, mjSpec* spec) {
+  std::vector<mjsBody*> neighbours, further;
+  const std::vector<mjsBody*> fixed = FixedTogether(held, &neighbours);
+  for (mjsBody* neighbour : neighbours) {
+    for (const mjsBody* other : FixedTogether(neighbour, &further)) {
+      for (const mjsBody* body : fixed) {
+        const std::string a = mjs_getString(mjs_getName(body->element)), b = mjs_getString(mjs_getName(other->element));
+        if (a.empty() || b.empty()) continue;
+        mjsExclude* exclude = mjs_addExclude(spec);
+        mjs_setString(exclude->bodyname1, a.c_str());
+        mjs_setString(exclude->bodyname2, b.c_str());
+      }
+    }
+  }
+}
+
 Status Hold(mjSpec* spec, NamedBody& held) {
   mjsElement* joint = FreeJointOf(spec, held.name);
   if (joint) {
-    mjsElement* body = mjs_getParent(joint)->element;
-    if (*mjs_getString(mjs_getName(body)) == 0) mjs_setName(body, held.name.c_str());
-    held.name = mjs_getString(mjs_getName(body));
+    mjsBody* body = mjs_getParent(joint);
+    if (*mjs_getString(mjs_getName(body->element)) == 0) mjs_setName(body->element, held.name.c_str());
+    held.name = mjs_getString(mjs_getName(body->element));
     mjs_delete(spec, joint);
+    KeepNeighboursApart(body, spec);
     return Ok();
   }
   if (mjs_findElement(spec, mjOBJ_BODY, held.name.c_str())) {

@@ -77,6 +77,21 @@ bool BakeInertias(const Model& model, std::span<const double> values, const std:
   return good;
 }
 
+// An MJCF that holds a robot alone has no sky: what is dark would be drawn on black.
+void AddSky(mjSpec* spec) {
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_TEXTURE); e; e = mjs_nextElement(spec, e)) {
+    if (mjs_asTexture(e)->type == mjTEXTURE_SKYBOX) return;
+  }
+  mjsTexture* sky = mjs_addTexture(spec, nullptr);
+  sky->type = mjTEXTURE_SKYBOX;
+  sky->builtin = mjBUILTIN_GRADIENT;
+  sky->width = sky->height = 64;
+  for (int i = 0; i < 3; ++i) {
+    sky->rgb1[i] = 0.97 + 0.01 * i;
+    sky->rgb2[i] = 0.80 + 0.05 * i;
+  }
+}
+
 }  // namespace
 
 Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
@@ -148,6 +163,7 @@ Result<ModelPtr> Model::CompileForDrawing(std::span<const double> values,
   Structure structure(*rig_);
   for (const auto& use : effects_) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, {}));
   GS_RETURN_IF_ERROR(structure.Finish());
+  AddSky(structure.spec.get());
   ModelPtr drawn;
   try {
     drawn.reset(mj_compile(structure.spec.get(), nullptr));

@@ -155,6 +155,16 @@ std::string Rig::JointOfSignal(const std::string& signal) const {
   return "";
 }
 
+int Rig::CommandOfSignal(const std::string& signal) const {
+  const auto& commands = experiment_.commands;
+  if (commands.size() == 1) return 0;
+  const std::string joint = JointOfSignal(signal);
+  for (std::size_t c = 0; !joint.empty() && c < commands.size(); ++c) {
+    if (JointOf(commands[c].actuator) == joint) return static_cast<int>(c);
+  }
+  return -1;
+}
+
 CommandKind Rig::KindOfCommand(const std::string& actuator) const {
   for (const auto& command : experiment_.commands) {
     if (command.actuator == actuator) return command.kind;

@@ -47,6 +47,9 @@ class Rig {
   std::array<double, 3> CentreOf(const std::string& body) const;  // of mass, in the body's frame; m
   std::vector<std::string> Signals() const;                       // measured signals of the experiment
   std::string JointOfSignal(const std::string& signal) const;     // empty: no such signal
+  // The command that drives the signal's joint, by number in the experiment; of a rig with one command that one. -1:
+  // none, or nobody knows which.
+  int CommandOfSignal(const std::string& signal) const;
   CommandKind KindOfCommand(const std::string& actuator) const;
 
  private:

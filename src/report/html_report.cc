@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/compare/comparison.h"
 #include "src/compare/decimate.h"
 #include "src/compare/frequency_response.h"
 #include "src/compare/residual_torque.h"
@@ -21,7 +22,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kMostLogs = 12, kMapAngles = 22, kMapSpeeds = 14;
+constexpr std::size_t kMostLogs = 12, kMapAngles = 22, kMapSpeeds = 14, kMostMaps = 6, kMostResponses = 4;
+constexpr std::size_t kLeastBuckets = 60;
 constexpr const char* kVideoSlot = "data-video=\"\"";
 
 // Six digits are more than a screen shows; what is not a number is null.
@@ -42,6 +44,12 @@ ordered_json Column(std::span<const double> values, const std::vector<std::size_
   return list;
 }
 
+// All rows where they are at most `most`; else about so many, all extremes among them.
+std::vector<std::size_t> RowsToDraw(std::span<const std::span<const double>> columns, std::size_t most) {
+  const std::size_t rows = columns.front().size(), per_bucket = 2 * columns.size();
+  return ExtremeRows(columns, rows <= most ? rows : std::max(kLeastBuckets, most / per_bucket));
+}
+
 ordered_json FileStamp(const std::string& path) {
   const auto digest = Sha256OfFile(path);
   return {{"path", path}, {"sha256", digest.ok() ? digest.value() : ""}};
@@ -60,11 +68,66 @@ ordered_json Quality(const Recording& recording) {
           {"findings", std::move(findings)}};
 }
 
-ordered_json Maps(const ReportSource& source, const Recording& recording) {
+// A signal of a page, and what was predicted of it.
+struct Shown {
+  std::size_t number;   // in the recording
+  int command = -1;     // that drives it; -1: not known
+  double error = kNaN;  // of the last prediction, normalised
+  std::vector<std::span<const double>> predicted;
+};
+
+// What a page shows of a log: its signals, of many the worst first.
+struct ShownLog {
+  const Recording& recording;
+  std::vector<std::string> labels;  // of the predictions
+  std::vector<Shown> signals;
+};
+
+ShownLog ShowLog(const ReportSource& source, std::size_t index) {
+  ShownLog log{.recording = *source.recordings[index], .labels = {}, .signals = {}};
+  std::vector<const LogReplay*> replays;
+  for (const auto& prediction : source.predictions) {
+    if (index >= prediction.logs.size() || prediction.logs[index].signals.empty()) continue;
+    replays.push_back(&prediction.logs[index]);
+    log.labels.push_back(prediction.label);
+  }
+  std::vector<SignalScore> scores;
+  for (std::size_t s = 0; s < log.recording.measured.size(); ++s) {
+    const auto& measured = log.recording.measured[s];
+    Shown shown{.number = s, .predicted = {}};
+    shown.command = source.model                         ? source.model->rig()->CommandOfSignal(measured.spec.signal)
+                    : log.recording.commands.size() == 1 ? 0
+                                                         : -1;
+    for (const LogReplay* replay : replays) shown.predicted.emplace_back(replay->signals[s].predicted);
+    if (!replays.empty())
+      shown.error = ScoreSignal(measured.spec.signal, log.recording.time_s, measured.values, shown.predicted.back(),
+                                replays.back()->signals[s].resolution)
+                        .nrmse;
+    scores.push_back({.signal = measured.spec.signal, .nrmse = shown.error});
+    log.signals.push_back(std::move(shown));
+  }
+  if (log.signals.size() <= kFewSignals || replays.empty()) return log;
+  std::vector<Shown> ordered;
+  for (const std::size_t s : WorstFirst(scores)) ordered.push_back(std::move(log.signals[s]));
+  std::ranges::stable_partition(ordered, [&](const Shown& s) { return log.recording.measured[s.number].spec.scored; });
+  log.signals = std::move(ordered);
+  return log;
+}
+
+// Of the joints of the signals that are shown first.
+ordered_json Maps(const ReportSource& source, const ShownLog& log) {
   ordered_json maps = ordered_json::array();
   if (!source.model) return maps;
-  for (const auto& residual : EstimateResidualTorque(*source.model, source.values, recording)) {
-    const TorqueMap map = MapTorque(residual, kMapAngles, kMapSpeeds);
+  const auto residuals = EstimateResidualTorque(*source.model, source.values, log.recording);
+  std::vector<std::string> joints;
+  for (const Shown& signal : log.signals) {
+    const std::string joint = source.model->rig()->JointOfSignal(log.recording.measured[signal.number].spec.signal);
+    if (std::ranges::find(joints, joint) == joints.end()) joints.push_back(joint);
+  }
+  for (const std::string& joint : joints) {
+    const auto residual = std::ranges::find(residuals, joint, &ResidualTorque::joint);
+    if (residual == residuals.end() || maps.size() >= kMostMaps) continue;
+    const TorqueMap map = MapTorque(*residual, kMapAngles, kMapSpeeds);
     if (map.mean_n_m.empty()) continue;
     maps.push_back({{"joint", map.joint},
                     {"angle", Numbers(map.angle_edges_rad)},
@@ -91,75 +154,71 @@ ordered_json Curves(const std::vector<EffectCurve>& curves) {
   return json;
 }
 
-ordered_json Responses(const Recording& recording, const LogReplay& replay) {
+// Of the signals that are shown first, each over the command that drives it.
+ordered_json Responses(const ShownLog& log) {
   ordered_json responses = ordered_json::array();
-  for (std::size_t c = 0; c < recording.commands.size() && responses.size() < 4; ++c) {
-    if (!recording.commands[c].column) continue;
-    for (const auto& signal : replay.signals) {
-      if (!signal.scored || responses.size() >= 4) continue;
-      const auto points =
-          EstimateResponse(recording.time_s, recording.commands[c].values, signal.measured, signal.predicted);
-      if (points.size() < 4) continue;
-      ordered_json entry = {
-          {"command", recording.commands[c].actuator}, {"signal", signal.signal}, {"points", ordered_json::array()}};
-      for (const auto& p : points) {
-        entry["points"].push_back({Rounded(p.hz), Rounded(p.measured_gain), Rounded(p.predicted_gain),
-                                   Rounded(p.measured_phase_deg), Rounded(p.predicted_phase_deg),
-                                   Rounded(p.coherence, 3)});
-      }
-      responses.push_back(std::move(entry));
+  if (log.labels.empty()) return responses;
+  for (const Shown& signal : log.signals) {
+    const auto& measured = log.recording.measured[signal.number];
+    if (!measured.spec.scored || signal.command < 0 || responses.size() >= kMostResponses) continue;
+    const auto& command = log.recording.commands[static_cast<std::size_t>(signal.command)];
+    if (!command.column) continue;
+    const auto points =
+        EstimateResponse(log.recording.time_s, command.values, measured.values, signal.predicted.back());
+    if (points.size() < 4) continue;
+    ordered_json entry = {
+        {"command", command.actuator}, {"signal", measured.spec.signal}, {"points", ordered_json::array()}};
+    for (const auto& p : points) {
+      entry["points"].push_back({Rounded(p.hz), Rounded(p.measured_gain), Rounded(p.predicted_gain),
+                                 Rounded(p.measured_phase_deg), Rounded(p.predicted_phase_deg),
+                                 Rounded(p.coherence, 3)});
     }
+    responses.push_back(std::move(entry));
   }
   return responses;
 }
 
-// Traces of one log, thinned; every series has its extremes, and so have the residuals.
-ordered_json Traces(const ReportSource& source, std::size_t index, std::size_t most_rows) {
-  const Recording& recording = *source.recordings[index];
-  std::vector<const ReportPrediction*> predicted;
-  for (const auto& prediction : source.predictions) {
-    if (index < prediction.logs.size() && !prediction.logs[index].signals.empty()) predicted.push_back(&prediction);
-  }
+// A signal's rows, thinned so that each series and each residual keeps its extremes.
+ordered_json Trace(const ShownLog& log, const Shown& shown, std::size_t most_rows) {
+  const auto& measured = log.recording.measured[shown.number];
   std::vector<std::vector<double>> residuals;
-  std::vector<std::span<const double>> columns;
-  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
-    columns.emplace_back(recording.measured[s].values);
-    for (const auto* prediction : predicted) {
-      const auto& values = prediction->logs[index].signals[s].predicted;
-      columns.emplace_back(values);
-      std::vector<double> residual(values.size());
-      for (std::size_t r = 0; r < values.size(); ++r) residual[r] = recording.measured[s].values[r] - values[r];
-      residuals.push_back(std::move(residual));
-    }
+  for (const auto& predicted : shown.predicted) {
+    residuals.emplace_back(predicted.size());
+    for (std::size_t r = 0; r < predicted.size(); ++r) residuals.back()[r] = measured.values[r] - predicted[r];
   }
-  for (const auto& residual : residuals) columns.emplace_back(residual);
-  for (const auto& command : recording.commands) columns.emplace_back(command.values);
-  const std::size_t buckets = std::max<std::size_t>(50, most_rows / (2 * columns.size()));
-  const std::vector<std::size_t> rows =
-      recording.rows() <= most_rows ? ExtremeRows(columns, recording.rows()) : ExtremeRows(columns, buckets);
+  std::vector<std::span<const double>> columns = {measured.values};
+  columns.insert(columns.end(), shown.predicted.begin(), shown.predicted.end());
+  columns.insert(columns.end(), residuals.begin(), residuals.end());
+  const std::vector<std::size_t> rows = RowsToDraw(columns, most_rows);
+  ordered_json signal = {{"name", measured.spec.signal},
+                         {"unit", measured.spec.unit},
+                         {"scored", measured.spec.scored},
+                         {"error", Rounded(shown.error, 3)},
+                         {"command", shown.command < 0 ? ordered_json() : ordered_json(shown.command)},
+                         {"time", Column(log.recording.time_s, rows, 8)},
+                         {"measured", Column(measured.values, rows)},
+                         {"predicted", ordered_json::array()}};
+  for (std::size_t p = 0; p < shown.predicted.size(); ++p)
+    signal["predicted"].push_back({{"label", log.labels[p]}, {"values", Column(shown.predicted[p], rows)}});
+  return signal;
+}
 
-  ordered_json json = {{"time", Column(recording.time_s, rows, 8)},
-                       {"signals", ordered_json::array()},
-                       {"commands", ordered_json::array()}};
-  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
-    const MeasuredSpec& spec = recording.measured[s].spec;
-    ordered_json signal = {{"name", spec.signal},
-                           {"unit", spec.unit},
-                           {"scored", spec.scored},
-                           {"measured", Column(recording.measured[s].values, rows)},
-                           {"predicted", ordered_json::array()}};
-    for (const auto* prediction : predicted) {
-      signal["predicted"].push_back(
-          {{"label", prediction->label}, {"values", Column(prediction->logs[index].signals[s].predicted, rows)}});
-    }
-    json["signals"].push_back(std::move(signal));
-  }
-  for (std::size_t c = 0; c < recording.commands.size(); ++c) {
-    const auto& command = recording.commands[c];
-    if (command.column)
-      json["commands"].push_back({{"name", command.actuator},
-                                  {"unit", source.experiment->commands[c].unit},
-                                  {"values", Column(command.values, rows)}});
+// Traces of one log, of about `most_numbers` numbers.
+ordered_json Traces(const ReportSource& source, const ShownLog& log, std::size_t most_numbers) {
+  const std::size_t columns = log.signals.size() * (2 + log.labels.size()) + 2 * log.recording.commands.size();
+  const std::size_t most_rows = most_numbers / columns;
+  ordered_json json = {{"signals", ordered_json::array()}, {"commands", ordered_json::array()}};
+  for (const Shown& shown : log.signals) json["signals"].push_back(Trace(log, shown, most_rows));
+  for (std::size_t c = 0; c < log.recording.commands.size(); ++c) {
+    const auto& command = log.recording.commands[c];
+    if (!command.column) continue;
+    const std::span<const double> values[] = {command.values};
+    const std::vector<std::size_t> rows = RowsToDraw(values, most_rows);
+    json["commands"].push_back({{"name", command.actuator},
+                                {"number", c},
+                                {"unit", source.experiment->commands[c].unit},
+                                {"time", Column(log.recording.time_s, rows, 8)},
+                                {"values", Column(command.values, rows)}});
   }
   return json;
 }
@@ -275,7 +334,7 @@ void AddContent(const ReportSource& source, ordered_json* data) {
   json["map_of"] = content.mapped;
 }
 
-ordered_json Data(const ordered_json& result, const ReportSource& source, std::size_t most_rows) {
+ordered_json Data(const ordered_json& result, const ReportSource& source, std::size_t most_numbers) {
   ordered_json data = {{"result", result}, {"command", source.command_line}};
   data["experiment"] = FileStamp(source.experiment->path);
   data["model"] = FileStamp(source.experiment->model_path);
@@ -283,6 +342,7 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   data["curves"] = Curves(source.curves);
   data["glossary"] = ordered_json::array();
   for (const Term& term : Glossary()) data["glossary"].push_back({{"word", term.word}, {"means", term.means}});
+  data["few_signals"] = kFewSignals;
   data["logs"] = ordered_json::array();
   const std::size_t shown = std::min(kMostLogs, source.recordings.size());
   // Held-out logs first: they are what counts.
@@ -299,14 +359,11 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
     log["held_out"] = held_out(i);
     log["quality"] = Quality(recording);
     if (k < shown) {
-      log["traces"] = Traces(source, i, most_rows / shown);
-      log["maps"] = Maps(source, recording);
-      log["responses"] = ordered_json::array();
-      if (!source.predictions.empty() && i < source.predictions.back().logs.size() &&
-          !source.predictions.back().logs[i].signals.empty()) {
-        log["responses"] = Responses(recording, source.predictions.back().logs[i]);
-        log["response_of"] = source.predictions.back().label;
-      }
+      const ShownLog shown_log = ShowLog(source, i);
+      log["traces"] = Traces(source, shown_log, most_numbers / shown);
+      log["maps"] = Maps(source, shown_log);
+      log["responses"] = Responses(shown_log);
+      log["response_of"] = shown_log.labels.empty() ? "" : shown_log.labels.back();
     }
     data["logs"].push_back(std::move(log));
     paths.push_back(recording.log_path);
@@ -337,13 +394,13 @@ bool IsPlainName(const std::string& name) {
 
 }  // namespace
 
-std::string ReportHtml(const ordered_json& result, const ReportSource& source, std::size_t most_rows) {
+std::string ReportHtml(const ordered_json& result, const ReportSource& source, std::size_t most_numbers) {
   GS_CHECK(source.experiment != nullptr);
   std::string page = assets::kPage;
   page = Filled(page, "/*style*/", std::string(assets::kDygraphsStyle) + assets::kStyle);
   page = Filled(page, "/*dygraphs*/", assets::kDygraphs);
   page = Filled(page, "/*script*/", assets::kScript);
-  return Filled(page, "/*data*/", ForScript(Data(result, source, most_rows)));
+  return Filled(page, "/*data*/", ForScript(Data(result, source, most_numbers)));
 }
 
 Status WriteReportHtml(const std::string& folder, const ordered_json& result, const ReportSource& source) {

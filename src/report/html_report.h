@@ -34,16 +34,21 @@ struct ReportSource {
   std::vector<bool> held_out;  // by recording; empty: none
   std::vector<ReportPrediction> predictions;
   std::vector<EffectCurve> curves;
-  // Its missing torque is mapped. Null: no map.
+  // Its missing torque is mapped, and it tells which command drives what. Null: no map.
   const Model* model = nullptr;
   std::vector<double> values;
   // Of the result's model: nominal values, bounds and units that stand beside the fitted values.
   std::vector<Parameter> parameters;
 };
 
-// `result`: of replay, tune or diagnose, the value that --json prints. Long logs are thinned by ExtremeRows, so that a
-// page holds about `most_rows` rows in all.
-std::string ReportHtml(const nlohmann::ordered_json& result, const ReportSource& source, std::size_t most_rows = 60000);
+// Up to so many signals are drawn in full below each other. Of more a page has small pictures, the worst first, and
+// draws in full what is picked.
+inline constexpr std::size_t kFewSignals = 4;
+
+// `result`: of replay, tune or diagnose, the value that --json prints. Each trace is thinned by ExtremeRows, so that a
+// page's traces are about `most_numbers` numbers in all, 9 bytes each.
+std::string ReportHtml(const nlohmann::ordered_json& result, const ReportSource& source,
+                       std::size_t most_numbers = 400000);
 
 // Writes `folder`/report.html. A video.mp4 that is already there is shown in it.
 Status WriteReportHtml(const std::string& folder, const nlohmann::ordered_json& result, const ReportSource& source);

@@ -36,8 +36,7 @@ void AddStatements(const Diagnosis& d, PageContent* page) {
 PageContent PageOf(const ReplayRun& run) {
   PageContent page{.headline = HeadlineOf(run), .mapped = "model", .values = run.model.values};
   const auto& logs = run.comparison.logs;
-  if (!logs.empty())
-    page.where = {{.title = {}, .shares = MostTelling(logs.front().where, {.limit = kMostConditions})}};
+  if (!logs.empty()) page.where = {{.title = {}, .shares = TellOfWorst(logs.front(), {.limit = kMostConditions})}};
   return page;
 }
 

@@ -2,9 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/report/signal_table.h"
 #include "src/report/words.h"
 
 namespace gapscope {
@@ -19,21 +21,24 @@ std::string Shorten(const std::string& path, std::size_t width) {
   return path.size() <= width ? path : "..." + path.substr(path.size() - width + 3);
 }
 
-// A log's lines: one a signal, and where it diverged.
-std::string LogLines(const LogComparison& log, const LogReplay& replay, const Console& console) {
+// A log's lines: one a signal, of many the worst, and where it diverged.
+std::string LogLines(const LogComparison& log, const LogReplay& replay, std::size_t name_width,
+                     const Console& console) {
   std::string text;
-  for (std::size_t k = 0; k < log.signals.size(); ++k) {
+  for (const std::size_t k : SignalsInTable(log.signals)) {
     const SignalScore& s = log.signals[k];
     const SignalTrace& trace = replay.signals[k];
     const std::string nrmse = fmt::format("{:>7.4g}", s.nrmse);
-    text += fmt::format("{:<24} {:<18} {:>9.4g} {:>9.4g} {} {:>8.2f} {:>6.3f} {}\n",
-                        k == 0 ? Shorten(log.log_path, 24) : "", s.signal, s.rmse, s.mae,
+    text += fmt::format("{:<24} {:<{}} {:>9.4g} {:>9.4g} {} {:>8.2f} {:>6.3f} {}\n",
+                        text.empty() ? Shorten(log.log_path, 24) : "", s.signal, name_width, s.rmse, s.mae,
                         s.nrmse < kFollowsClosely ? console.Good(nrmse)
                         : s.nrmse > kClearlyOff   ? console.Bad(nrmse)
                                                   : nrmse,
                         1e3 * s.lag_s, s.correlation,
                         Sparkline(ErrorOverTime(replay.time_s, trace.measured, trace.predicted, kSparks)));
   }
+  if (const std::string rest = SignalsNotInTable(log.signals); !rest.empty())
+    text += fmt::format("{:<24} {}\n", "", rest);
   if (replay.outcome == Outcome::kDiverged) {
     text += console.Bad(replay.windows > 1 ? fmt::format("{:<24} {} of {} windows diverged, the first at {:.3f} s", "",
                                                          replay.diverged_windows, replay.windows, replay.diverged_at_s)
@@ -45,11 +50,14 @@ std::string LogLines(const LogComparison& log, const LogReplay& replay, const Co
 
 std::string ConditionLines(const std::vector<ConditionShare>& telling) {
   if (telling.empty()) return "";
-  std::string text = fmt::format("\nwhere the error lies in the first log {:<24} {:>9} {:>9}   90 % interval\n", "",
-                                 "of error", "of time");
+  std::size_t width = 16;
+  for (const auto& share : telling) width = std::max(width, share.signal.size());
+  std::string text = fmt::format("\nwhere the error lies in the first log {:<{}} {:>9} {:>9}   90 % interval\n", "",
+                                 width + 8, "of error", "of time");
   for (const auto& share : telling) {
-    text += fmt::format("  {:<16} {:<42} {:>8.0f}% {:>8.0f}%   {:.0f}..{:.0f} %\n", share.signal, share.condition,
-                        100 * share.share_of_error, 100 * share.share_of_time, 100 * share.low, 100 * share.high);
+    text +=
+        fmt::format("  {:<{}} {:<42} {:>8.0f}% {:>8.0f}%   {:.0f}..{:.0f} %\n", share.signal, width, share.condition,
+                    100 * share.share_of_error, 100 * share.share_of_time, 100 * share.low, 100 * share.high);
   }
   return text;
 }
@@ -111,12 +119,14 @@ ordered_json ToJson(const ReplayRun& run, Timing timing) {
 std::string ToTable(const ReplayRun& run, const Console& console) {
   const ReplayResult& result = run.result;
   const Comparison& comparison = run.comparison;
-  std::string text = console.Bold(fmt::format("{:<24} {:<18} {:>9} {:>9} {:>7} {:>8} {:>6} {}", "log", "signal", "RMSE",
-                                              "MAE", "nRMSE", "lag ms", "corr", "over time")) +
+  std::size_t name_width = 18;
+  for (const auto& log : comparison.logs) name_width = std::max(name_width, WidestSignal(log.signals));
+  std::string text = console.Bold(fmt::format("{:<24} {:<{}} {:>9} {:>9} {:>7} {:>8} {:>6} {}", "log", "signal",
+                                              name_width, "RMSE", "MAE", "nRMSE", "lag ms", "corr", "over time")) +
                      "\n";
   std::vector<std::string> paths;
   for (std::size_t l = 0; l < comparison.logs.size(); ++l) {
-    text += LogLines(comparison.logs[l], result.logs[l], console);
+    text += LogLines(comparison.logs[l], result.logs[l], name_width, console);
     paths.push_back(comparison.logs[l].log_path);
   }
   text += fmt::format("\nerror {:.4g} (RMSE over standard deviation, {}, {} log{})\n", comparison.error,
@@ -129,7 +139,7 @@ std::string ToTable(const ReplayRun& run, const Console& console) {
               ? fmt::format("time step {:.4g} ms; halving it changes the error by {:.2g}\n", 1e3 * result.time_step_s,
                             result.time_step_error)
               : fmt::format("time step {:.4g} ms, as asked\n", 1e3 * result.time_step_s);
-  if (!comparison.logs.empty()) text += ConditionLines(MostTelling(comparison.logs.front().where, {.limit = 5}));
+  if (!comparison.logs.empty()) text += ConditionLines(TellOfWorst(comparison.logs.front(), {.limit = 5}));
   if (run.loop) text += ToTable(*run.loop, paths);
   return text;
 }

@@ -6,11 +6,16 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "src/report/signal_table.h"
 
 namespace gapscope {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr std::size_t kMostParameters = 24, kMostNotes = 12;
 
 std::vector<TuneRun::Log> Scored(const std::vector<LogReplay>& replays) {
   std::vector<TuneRun::Log> logs;
@@ -59,31 +64,61 @@ std::string CorrelatedText(const TuneRun::Correlated& pair) {
   return fmt::format("{} and {} go together (correlation {:.3f})", pair.a, pair.b, pair.correlation);
 }
 
+// By number: all of a few; of many those that moved furthest, in halves of their intervals, in the order given.
+std::vector<std::size_t> ParametersInTable(const TuneRun& run) {
+  std::vector<std::size_t> order(run.parameters.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (order.size() <= kMostParameters) return order;
+  const auto moved = [&](std::size_t i) {
+    const auto& p = run.parameters[i];
+    return p.identifiable && p.high > p.low ? std::abs(p.value - p.nominal) / (p.high - p.low) : 0;
+  };
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) { return moved(a) > moved(b); });
+  order.resize(kMostParameters);
+  std::ranges::sort(order);
+  return order;
+}
+
 std::string ParameterLines(const TuneRun& run, const Console& console) {
   std::string text = console.Bold(fmt::format("{:<44} {:>11} {:>11}   {:<24} {}", "parameter", "nominal", "value",
                                               "95 % interval", "unit")) +
                      "\n";
-  for (const auto& p : run.parameters) {
+  for (const std::size_t i : ParametersInTable(run)) {
+    const auto& p = run.parameters[i];
     text += fmt::format("{:<44} {:>11.4g} {:>11.4g}   {:<24} {}{}\n", p.name, p.nominal, p.value,
                         p.identifiable ? fmt::format("{:.4g} .. {:.4g}", p.low, p.high) : "not known", p.unit,
                         p.at_bound ? console.Warn("  at its bound") : "");
   }
   if (!run.left_frozen.empty()) text += LeftFrozenText(run) + "\n";
-  for (const auto& flat : FlatTexts(run)) text += "flat: " + flat + "\n";
-  for (const auto& pair : run.correlated) text += CorrelatedText(pair) + "\n";
+  if (run.parameters.size() > kMostParameters)
+    text += fmt::format("{} more parameters, nearer to their nominal values (--json: all)\n",
+                        run.parameters.size() - kMostParameters);
+  std::vector<std::string> notes;
+  for (const auto& flat : FlatTexts(run)) notes.push_back("flat: " + flat);
+  for (const auto& pair : run.correlated) notes.push_back(CorrelatedText(pair));
+  for (std::size_t i = 0; i < std::min(notes.size(), kMostNotes); ++i) text += notes[i] + "\n";
+  if (notes.size() > kMostNotes)
+    text += fmt::format("{} more directions and pairs (--json: all)\n", notes.size() - kMostNotes);
   return text;
 }
 
 std::string HeldOutLines(const TuneRun& run, const Console& console) {
-  std::string text =
-      console.Bold(fmt::format("{:<44} {:<18} {:>10} {:>10} {:>8}", "held-out log", "signal", "RMSE", "MAE", "nRMSE")) +
-      "\n";
+  std::size_t name_width = 18;
+  for (const auto& log : run.held_out) name_width = std::max(name_width, WidestSignal(log.signals));
+  std::string text = console.Bold(fmt::format("{:<44} {:<{}} {:>10} {:>10} {:>8}", "held-out log", "signal", name_width,
+                                              "RMSE", "MAE", "nRMSE")) +
+                     "\n";
   for (const auto& log : run.held_out) {
     const std::string name = log.log.size() > 44 ? "..." + log.log.substr(log.log.size() - 41) : log.log;
-    for (const auto& score : log.signals) {
-      text += fmt::format("{:<44} {:<18} {:>10.4g} {:>10.4g} {:>8.4g}\n", &score == &log.signals.front() ? name : "",
-                          score.signal, score.rmse, score.mae, score.nrmse);
+    bool first = true;
+    for (const std::size_t k : SignalsInTable(log.signals)) {
+      const SignalScore& score = log.signals[k];
+      text += fmt::format("{:<44} {:<{}} {:>10.4g} {:>10.4g} {:>8.4g}\n", first ? name : "", score.signal, name_width,
+                          score.rmse, score.mae, score.nrmse);
+      first = false;
     }
+    if (const std::string rest = SignalsNotInTable(log.signals); !rest.empty())
+      text += fmt::format("{:<44} {}\n", "", rest);
   }
   return text;
 }

@@ -1,5 +1,6 @@
-// A frame of a comparison video: scenes above, each with its label and errors, and the traces below with a cursor at
-// the frame's time. Drawn with cairo.
+// A frame of a comparison video: scenes, each with its label and errors, and traces with a cursor at the frame's time.
+// Up to three signals stand below the scenes; of more the first ones stand beside them, a small picture each. Drawn
+// with cairo.
 #ifndef GAPSCOPE_VIDEO_PAGE_H_
 #define GAPSCOPE_VIDEO_PAGE_H_
 
@@ -25,9 +26,11 @@ struct PageTraces {
     std::vector<double> values;  // held from stamp to stamp
   };
   std::vector<double> time_s;
-  std::vector<Signal> signals;
+  std::vector<Signal> signals;  // the most important first: as many as fit are drawn
   std::vector<Command> commands;
 };
+// So many signals are drawn in full below the scenes.
+inline constexpr std::size_t kSignalsBelow = 3;
 
 struct PageModel {
   std::string label;
@@ -64,27 +67,40 @@ class Page {
  private:
   struct Canvas;
   struct Row {
-    double top, height, low, high;  // in pixels; in the signal's unit
+    double top, height, low, high;  // in pixels of the traces' part; in the signal's unit
   };
-  void DrawTraces(Canvas& canvas, bool past) const;
-  // Paper, name, unit and range of a row.
+  void LayOut();
+  void AddRow(const std::vector<const std::vector<double>*>& shown, double height, double pad);
+  void DrawPaper(Canvas& canvas) const;
   void DrawScale(Canvas& canvas, const Row& row, const std::string& name, const std::string& unit) const;
+  void DrawStrip(Canvas& canvas, bool past) const;
   // `steps`: held from stamp to stamp.
   void DrawLine(Canvas& canvas, const Row& row, const std::vector<double>& values, bool steps) const;
-  void DrawTimeAxis(Canvas& canvas, double bottom) const;
+  void DrawTimeAxis(Canvas& canvas, double left) const;
+  void CopyStrip(double time_s, Picture& frame) const;
   void DrawCursor(Canvas& canvas, double time_s) const;
+  std::vector<std::array<std::string, 3>> ErrorsNow(std::size_t model, double time_s) const;
+  void DrawErrors(Canvas& canvas, double time_s) const;
   void DrawPanel(Canvas& canvas, std::size_t panel, double time_s) const;
   void DrawClock(Canvas& canvas, double time_s) const;
-  double XOf(double time_s) const;
+  bool shows_command() const { return !beside_ && !traces_.commands.empty(); }
+  int StripBegin(double time_s) const;  // what of the strip is seen, pixels
 
   PageOptions options_;
   PageTraces traces_;
   std::vector<PageModel> models_;
   double unit_ = 1;  // one pixel of a picture 720 high
   int scene_width_ = 0, scene_height_ = 0;
-  std::size_t panels_ = 1;
-  std::vector<Row> rows_;  // signals, then the first command
-  Picture future_, past_;  // the traces' part, pale and full
+  std::size_t panels_ = 1, signals_in_all_ = 0;
+  bool beside_ = false;                              // the traces stand beside the scenes
+  int left_ = 0, top_ = 0;                           // of the traces' part
+  int plot_left_ = 0, plot_width_ = 0, margin_ = 0;  // in it; a plot reaches `margin_` further
+  double pixels_per_s_ = 1;                          // of the strip
+  bool rolls_ = false;                               // the strip is longer than the plot
+  double axis_top_ = 0;
+  std::vector<Row> rows_;  // signals, then the first command where it is shown
+  Picture paper_;          // names, units and limits
+  Picture future_, past_;  // the plots over the whole time, pale and full
 };
 
 // Writes a picture as PNG, to a temporary name first. Error: cannot write.

@@ -8,7 +8,9 @@
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <numeric>
 #include <optional>
+#include <tuple>
 
 #include "replay/initial_state.h"
 #include "src/compare/score.h"
@@ -26,43 +28,57 @@ struct Actor {
   PoseTrack predicted, measured;
   LogReplay replay;
   double error = 0;
+  std::vector<double> errors;  // by signal
 };
 
 Result<Actor> Rehearse(const Recording& recording, const VideoModel& model, const VideoOptions& options,
                        ThreadPool& pool) {
   ReplayOptions replay{.mode = options.mode, .window_s = options.window_s, .values = model.values, .keep_poses = true};
   ReplayResult result = Replay(*model.model, {recording}, replay, pool);
-  Actor actor{.drawn = nullptr, .predicted = {}, .measured = {}, .replay = std::move(result.logs.front()), .error = 0};
+  Actor actor{.drawn = nullptr,
+              .predicted = {},
+              .measured = {},
+              .replay = std::move(result.logs.front()),
+              .error = 0,
+              .errors = {}};
   GS_ASSIGN(actor.drawn, model.model->CompileForDrawing(model.values, recording.values));
   StandHeldBodies(*model.model, recording, model.values, actor.drawn.get());
   actor.predicted = PredictedPoses(*model.model, model.values, recording, actor.replay);
   actor.measured = MeasuredPoses(*model.model, model.values, recording, actor.predicted);
   std::vector<SignalScore> scores;
   for (const auto& signal : actor.replay.signals) {
-    if (signal.scored)
-      scores.push_back(
-          ScoreSignal(signal.signal, actor.replay.time_s, signal.measured, signal.predicted, signal.resolution));
+    const SignalScore score =
+        ScoreSignal(signal.signal, actor.replay.time_s, signal.measured, signal.predicted, signal.resolution);
+    if (signal.scored) scores.push_back(score);
+    actor.errors.push_back(std::isnan(score.nrmse) ? kInfinity : score.nrmse);
   }
   actor.error = actor.replay.outcome == Outcome::kDiverged ? INFINITY : CombinedError(scores);
   return actor;
 }
 
+// What is scored first, angles before the rest; where they are too many to show, the first model's worst first.
+std::vector<std::size_t> OrderOf(const Recording& recording, const Actor& first) {
+  std::vector<std::size_t> order(recording.measured.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto rank = [&](std::size_t s) {
+    const MeasuredSpec& spec = recording.measured[s].spec;
+    const double error = order.size() > kSignalsBelow ? first.errors[s] : 0;
+    return std::tuple(!spec.scored, !TraitsOf(spec.kind).gives_angle, -error);
+  };
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
+  return order;
+}
+
 PageTraces TracesOf(const Recording& recording, const Experiment& experiment, const std::vector<Actor>& actors) {
   PageTraces traces{.time_s = recording.time_s, .signals = {}, .commands = {}};
-  // What is scored first, angles before the rest.
-  for (const bool scored : {true, false}) {
-    for (const bool position : {true, false}) {
-      for (std::size_t s = 0; s < recording.measured.size(); ++s) {
-        const MeasuredSpec& spec = recording.measured[s].spec;
-        if (spec.scored != scored || TraitsOf(spec.kind).gives_angle != position) continue;
-        traces.signals.push_back({.name = spec.signal,
-                                  .unit = spec.unit,
-                                  .moves = position,
-                                  .measured = recording.measured[s].values,
-                                  .predicted = {}});
-        for (const Actor& actor : actors) traces.signals.back().predicted.push_back(actor.replay.signals[s].predicted);
-      }
-    }
+  for (const std::size_t s : OrderOf(recording, actors.front())) {
+    const MeasuredSpec& spec = recording.measured[s].spec;
+    traces.signals.push_back({.name = spec.signal,
+                              .unit = spec.unit,
+                              .moves = TraitsOf(spec.kind).gives_angle,
+                              .measured = recording.measured[s].values,
+                              .predicted = {}});
+    for (const Actor& actor : actors) traces.signals.back().predicted.push_back(actor.replay.signals[s].predicted);
   }
   for (std::size_t c = 0; c < recording.commands.size(); ++c) {
     const auto& command = recording.commands[c];

@@ -163,6 +163,20 @@ TEST_F(AddedActuatorsTest, AHeldBodyStandsWhereTheMjcfPutsIt) {
   EXPECT_GT(LargestDifference(falling[0], standing[0]), 1e-3) << "without a stand it falls";
 }
 
+TEST_F(AddedActuatorsTest, AHeldBodyTouchesItsNeighboursNoMoreThanAFreeOne) {
+  // Trunk and upper arm overlap, which MuJoCo allows a parent that moves, and its fixed parts.
+  const auto robot = [](const std::string& contype) {
+    std::string text = Replaced(Robot("<freejoint/>", "", ""), "<flag contact=\"disable\"/>", "");
+    text = Replaced(text, "<inertial pos=\"0 0 0\"",
+                    "<body name=\"shell\"><geom type=\"box\" size=\"0.2 0.2 0.2\" mass=\"0\" contype=\"" + contype +
+                        "\"/></body><inertial pos=\"0 0 0\"");
+    return Replaced(text, "<inertial pos=\"0 0 -0.1\" mass=\"1\"",
+                    "<geom size=\"0.05\" pos=\"0 0 -0.05\" mass=\"0\" conaffinity=\"1\" contype=\"0\"/>"
+                    "<inertial pos=\"0 0 -0.1\" mass=\"1\"");
+  };
+  ExpectSame(Run(robot("1"), kHold + kAdded + kBound), Run(robot("0"), kHold + kAdded + kBound));
+}
+
 TEST_F(AddedActuatorsTest, ApplyWritesThemIntoTheMjcf) {
   const Experiment e = Load(Robot("", "", ""), std::string(kAdded) + kBound);
   const auto model = MakeModel(e);

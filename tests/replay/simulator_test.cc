@@ -202,6 +202,32 @@ TEST_F(SimulatorTest, TheInitialStateComesFromTheLog) {
   EXPECT_NEAR(speed.qvel[0], -2, 1e-12);
 }
 
+TEST(InitialStateTest, AJointThatIsTiedToAMeasuredOneStartsWithIt) {
+  // A gripper of two fingers of which one is logged, either the first or the second of the equality.
+  for (const char* measured : {"a", "b"}) {
+    const Scratch scratch;
+    const auto finger = [](const std::string& name) {
+      return "<body><joint name='" + name + "' type='slide' ref='0.01'/><geom size='0.01'/></body>";
+    };
+    const Experiment e = MakeExperiment(
+        scratch,
+        "<mujoco><worldbody>" + finger("a") + finger("b") +
+            "</worldbody><equality><joint joint1='a' joint2='b' polycoef='0.002 -1 0.5 0 0'/></equality></mujoco>",
+        std::string("measured:\n  - {signal: q, column: q, joint: ") + measured + ", unit: m}\n");
+    const auto model = MakeModel(e);
+    ASSERT_NE(model, nullptr);
+    Recording recording = MakeRecording(e, 100, 0.002, [](int, double) { return 0.0; });
+    for (std::size_t k = 0; k < recording.rows(); ++k)
+      recording.measured[0].values[k] = 0.02 + 0.1 * recording.time_s[k];
+    const InitialState state = InitialStateAt(*model, recording, 50, {});
+    const double b = state.qpos[1] - 0.01, a = 0.002 - b + 0.5 * b * b;
+    EXPECT_NEAR(state.qpos[measured[0] - 'a'], 0.03, 1e-9);
+    EXPECT_NEAR(state.qpos[0], 0.01 + a, 1e-12);
+    EXPECT_NEAR(state.qvel[0], (b - 1) * state.qvel[1], 1e-9);
+    EXPECT_NEAR(state.qvel[measured[0] - 'a'], 0.1, 1e-6);
+  }
+}
+
 TEST_F(SimulatorTest, AnOffsetIsAddedToThePrediction) {
   const Recording recording = Irregular(experiment_, 50);
   const auto plain = Predict(*model_, recording), moved = Predict(*model_, recording, {{"q.offset", 0.25}});

@@ -52,7 +52,7 @@ TEST(HtmlReportTest, HoldsTheTracesAndWhatTheyWereMadeFrom) {
   const auto data = DataOf(ReportHtml(page->result, page->source));
   const auto& log = data["logs"][0];
   EXPECT_EQ(log["sha256"], Sha256OfFile(page->recordings[0].log_path).value());
-  EXPECT_EQ(log["traces"]["time"].size(), page->recordings[0].rows());
+  EXPECT_EQ(log["traces"]["signals"][0]["time"].size(), page->recordings[0].rows());
   EXPECT_EQ(log["traces"]["signals"][0]["predicted"].size(), 2u);
   EXPECT_NEAR(log["traces"]["signals"][0]["measured"][4000].get<double>(), page->recordings[0].measured[0].values[4000],
               1e-5);
@@ -100,11 +100,41 @@ TEST(HtmlReportTest, ALongLogKeepsItsSpikeInFewRows) {
   const std::string text = ReportHtml(page->result, page->source);
   const auto data = DataOf(text);
   const auto& traces = data["logs"][0]["traces"];
-  EXPECT_LT(traces["time"].size(), 80000u);
+  EXPECT_LT(traces["signals"][0]["time"].size(), 80000u);
   EXPECT_LT(text.size(), 8000000u);
   double greatest = 0;
   for (const auto& v : traces["signals"][0]["measured"]) greatest = std::max(greatest, v.get<double>());
   EXPECT_EQ(greatest, 9.75);
+}
+
+TEST(HtmlReportTest, ManySignalsComeWorstFirstEachWithItsCommandInASmallPage) {
+  const auto page = ManyPage(29, 12000);
+  const std::string text = ReportHtml(page->result, page->source);
+  EXPECT_LT(text.size(), 5000000u) << "ten times that is in the log";
+  const auto data = DataOf(text);
+  const auto& traces = data["logs"][0]["traces"];
+  ASSERT_EQ(traces["signals"].size(), 29u);
+  for (int k = 0; k < 29; ++k) {
+    const auto& signal = traces["signals"][k];
+    EXPECT_EQ(signal["name"], page->recordings[0].measured[28 - k].spec.signal);
+    EXPECT_NEAR(signal["error"].get<double>(), 0.02 * (28 - k), 0.01);
+    const auto& command = traces["commands"][signal["command"].get<int>()];
+    EXPECT_EQ(command["name"], signal["name"]);
+    EXPECT_GT(signal["time"].size(), 400u);
+  }
+  ASSERT_GE(data["logs"][0]["maps"].size(), 1u);
+  EXPECT_EQ(data["logs"][0]["maps"][0]["joint"], "joint_28");
+  EXPECT_LE(data["logs"][0]["maps"].size(), 6u);
+  for (const auto& response : data["logs"][0]["responses"]) EXPECT_EQ(response["command"], response["signal"]);
+  for (const auto& share : data["where"][0]["shares"]) EXPECT_GE(share["signal"], "joint_23") << "of the worst alone";
+}
+
+TEST(HtmlReportTest, TheConsoleShowsTheWorstSignalsAndSumsUpTheRest) {
+  const std::string table = ManyPage(29, 3000)->table;
+  EXPECT_LT(table.find("joint_28"), table.find("joint_21"));
+  EXPECT_EQ(table.find("joint_20 "), std::string::npos);
+  EXPECT_NE(table.find("21 more signals, nRMSE "), std::string::npos) << table;
+  EXPECT_EQ(ManyPage(8, 3000)->table.find("more signals"), std::string::npos);
 }
 
 TEST(HtmlReportTest, ShowsTheVideoBesideIt) {

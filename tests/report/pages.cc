@@ -1,11 +1,14 @@
 #include "tests/report/pages.h"
 
+#include <fmt/core.h>
+
 #include <cmath>
 
 #include "src/compare/comparison.h"
 #include "src/core/statistics.h"
 #include "src/report/explain_report.h"
 #include "src/report/replay_report.h"
+#include "tests/model/synthetic.h"
 
 namespace gapscope::testing {
 namespace {
@@ -60,7 +63,7 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   }
   for (const FoundEffect& found : d.effects) {
     d.statements.push_back({.use = found.use,
-                            .answer = Answer::kPresent,
+                            .answer = gapscope::Answer::kPresent,
                             .probability = found.probability,
                             .parameters = found.parameters,
                             .share_of_gap = {.value = found.share_of_gap},
@@ -70,10 +73,10 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   if (verdict == Verdict::kAmbiguous) {
     d.ambiguous = {{kSpring, kGravity}};
     d.statements.front().group = 0;
-    d.statements.push_back({.use = kGravity, .answer = Answer::kPresent, .probability = 0.97, .group = 0});
+    d.statements.push_back({.use = kGravity, .answer = gapscope::Answer::kPresent, .probability = 0.97, .group = 0});
   }
   d.statements.push_back({.use = {"torque_bias", "arm"},
-                          .answer = Answer::kAbsent,
+                          .answer = gapscope::Answer::kAbsent,
                           .probability = 0.03,
                           .bounds = {{"torque_n_m", "N m", 0.0002, 0.0002, 0.0002}},
                           .rule = "gains too little"});
@@ -109,7 +112,7 @@ std::unique_ptr<Page> ReplayPage() {
   ReplayResult nominal = Replayed(*page, page->source.values);
   page->source.predictions = {{"nominal", nominal.logs}};
   ThreadPool pool(1);
-  Comparison comparison = Compare(nominal, page->recordings, pool);
+  Comparison comparison = Compare(*page->model->rig(), nominal, page->recordings, pool);
   const ReplayRun run = ReplayRunOf(*page->model, page->source.values, std::move(nominal), std::move(comparison));
   page->result = ToJson(run);
   page->source.content = PageOf(run);
@@ -146,6 +149,52 @@ std::unique_ptr<Page> ExplanationPage() {
   run.statement.rivals = {{kGravity, 0.6}};
   page->source.predictions = {{"without it", Replayed(*page, page->source.values).logs}};
   page->result = ToJson(run);
+  page->source.content = PageOf(run);
+  return page;
+}
+
+std::unique_ptr<Page> ManyPage(int joints, int rows) {
+  auto page = std::make_unique<Page>();
+  std::string bodies, actuators, commands, measured;
+  for (int k = 0; k < joints; ++k) {
+    const std::string name = fmt::format("joint_{:02}", k);
+    bodies += fmt::format("<body pos='0 {} 1'><joint name='{}' axis='0 1 0'/><geom size='0.02' pos='0 0 -0.2'/></body>",
+                          0.1 * k, name);
+    actuators += fmt::format("  - {{name: {0}, joint: {0}, kind: position, kp: 5, kd: 0.2}}\n", name);
+    commands += fmt::format("  - {{actuator: {0}, column: {0}_target, unit: rad}}\n", name);
+    measured += fmt::format("  - {{signal: {0}, column: {0}_pos, joint: {0}, unit: rad}}\n", name);
+  }
+  const Scratch scratch;
+  const Experiment experiment =
+      MakeExperiment(scratch, "<mujoco><worldbody>" + bodies + "</worldbody></mujoco>",
+                     "actuators:\n" + actuators + "commands:\n" + commands + "measured:\n" + measured);
+  page->model = MakeModel(experiment);
+  page->recordings = {
+      MakeRecording(experiment, rows, 0.005, [](int c, double t) { return std::sin((1 + 0.1 * c) * t); })};
+  Recording& recording = page->recordings.front();
+  LogReplay replay = EmptyTraces(recording);
+  for (std::size_t s = 0; s < recording.measured.size(); ++s) {
+    std::vector<double>& values = recording.measured[s].values;
+    for (std::size_t r = 0; r < values.size(); ++r) {
+      values[r] = recording.commands[s].values[r] + 1e-3 * std::sin(37.0 * static_cast<double>(r * (s + 1)));
+      replay.signals[s].predicted.resize(values.size());
+      replay.signals[s].predicted[r] = (1 - 0.02 * static_cast<double>(s)) * values[r];
+    }
+    replay.signals[s].measured = values;
+  }
+  ReplayResult result{.time_step_s = 0.005, .logs = {replay}};
+  page->source = {.command_line = "gapscope replay",
+                  .experiment = &page->model->experiment(),
+                  .recordings = {&page->recordings.front()},
+                  .predictions = {{"nominal", {replay}}},
+                  .model = page->model.get(),
+                  .values = page->model->Nominal(),
+                  .parameters = page->model->parameters()};
+  ThreadPool pool(2);
+  Comparison comparison = Compare(*page->model->rig(), result, page->recordings, pool);
+  const ReplayRun run = ReplayRunOf(*page->model, page->source.values, std::move(result), std::move(comparison));
+  page->result = ToJson(run);
+  page->table = ToTable(run);
   page->source.content = PageOf(run);
   return page;
 }

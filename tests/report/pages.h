@@ -20,6 +20,7 @@ struct Page {
   std::shared_ptr<const Model> model;
   std::vector<Recording> recordings;
   ReportSource source;
+  std::string table;  // of a replay with many joints: what the console shows
 };
 
 // Two effects and a group, of which the verdict says what it would. A reason would break a page that takes text for
@@ -32,6 +33,9 @@ std::unique_ptr<Page> ReplayPage();
 std::unique_ptr<Page> DiagnosisPage(Verdict verdict);
 // Why the first of those effects is believed.
 std::unique_ptr<Page> ExplanationPage();
+// `joints` joints, each with its command and its signal, "joint_07", of `rows` rows made up: the error of joint k over
+// its spread grows with k.
+std::unique_ptr<Page> ManyPage(int joints, int rows);
 // One signal of `rows` rows with a spike of one row at `spike`.
 std::unique_ptr<Page> LongPage(std::size_t rows, std::size_t spike);
 

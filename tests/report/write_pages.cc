@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
        {Verdict::kNone, Verdict::kParameters, Verdict::kEffects, Verdict::kAmbiguous, Verdict::kUnknown})
     write(VerdictName(verdict), *testing::DiagnosisPage(verdict));
   write("explained", *testing::ExplanationPage());
+  write("many", *testing::ManyPage(29, 12000));
   write("long", *testing::LongPage(1000000, 654321));
   return good ? 0 : 1;
 }

@@ -1,6 +1,7 @@
 // Frames off-screen: what is drawn where, in pixels.
 #include "replay/scene.h"
 
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 
 #include "replay/gl_context.h"
 #include "replay/poses.h"
+#include "replay/thin_meshes.h"
 #include "src/experiment/recording.h"
 #include "tests/model/synthetic.h"
 
@@ -124,6 +126,57 @@ TEST_F(SceneTest, TheMotionFillsThePicture) {
   }
   EXPECT_GT(std::min({left, kWidth - 1 - right, top, kHeight - 1 - bottom}), 3);
   EXPECT_GT(std::max((right - left) / static_cast<double>(kWidth), (bottom - top) / static_cast<double>(kHeight)), 0.5);
+}
+
+// A ball of 2 * `rings`^2 triangles and more as a mesh, in an MJCF without sky or camera.
+ModelPtr MeshedBall(int rings) {
+  std::string points, faces;
+  for (int i = 0; i <= rings; ++i) {
+    for (int j = 0; j <= 2 * rings; ++j) {
+      const double polar = M_PI * i / rings, around = M_PI * j / rings;
+      points += fmt::format("{:.5f} {:.5f} {:.5f} ", 0.1 * std::sin(polar) * std::cos(around),
+                            0.1 * std::sin(polar) * std::sin(around), 0.1 * std::cos(polar));
+      const int a = i * (2 * rings + 1) + j, b = a + 2 * rings + 1;
+      if (i < rings && j < 2 * rings) faces += fmt::format("{} {} {} {} {} {} ", a, b, b + 1, a, b + 1, a + 1);
+    }
+  }
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(
+      scratch,
+      "<mujoco><asset><mesh name='ball' vertex='" + points + "' face='" + faces +
+          "'/></asset><worldbody><body><joint name='hinge' axis='0 1 0'/><inertial pos='0 0 -0.1' mass='1' "
+          "diaginertia='0.01 0.01 0.01'/><geom type='mesh' mesh='ball' mass='0' rgba='0.2 0.2 0.2 1'/></body>"
+          "</worldbody></mujoco>",
+      "measured:\n  - {signal: hinge, column: a, joint: hinge, unit: rad}\n");
+  const auto model = MakeModel(experiment);
+  return model ? std::move(model->CompileForDrawing(model->Nominal(), {})).value() : nullptr;
+}
+
+TEST_F(SceneTest, AFineMeshIsDrawnWithFewerTrianglesAndLooksTheSame) {
+  const ModelPtr coarse = MeshedBall(40);
+  ASSERT_NE(coarse, nullptr);
+  const std::size_t before = DrawnTriangles(*coarse);
+  drawn_.reset(mj_copyModel(nullptr, coarse.get()));
+  track_ = {.time_s = {0, 1}, .qpos = {0, 0.3}};
+  const Picture as_it_is = Draw(*Make(View::kFixed), {0.1});
+  ThinMeshes(drawn_.get(), 0.01);
+  EXPECT_LT(DrawnTriangles(*drawn_), before / 2);
+  EXPECT_GT(DrawnTriangles(*drawn_), 400u);
+  const Picture thinned = Draw(*Make(View::kFixed), {0.1});
+  // The silhouette stays; a hole or a triangle turned over would show sky within it.
+  EXPECT_LT(PixelsThatDiffer(as_it_is, thinned, 100), as_it_is.pixels.size() / 100);
+  std::size_t dark = 0;
+  for (const std::uint32_t pixel : as_it_is.pixels) dark += (pixel & 255) < 150 ? 1 : 0;
+  EXPECT_GT(dark, as_it_is.pixels.size() / 10) << "the ball fills a good part of the picture";
+}
+
+TEST_F(SceneTest, ARobotWithoutSkyStandsBeforeALightOne) {
+  drawn_ = MeshedBall(10);
+  ASSERT_NE(drawn_, nullptr);
+  track_ = {.time_s = {0, 1}, .qpos = {0, 0.3}};
+  const Picture picture = Draw(*Make(View::kFixed), {0});
+  for (const std::size_t corner : {std::size_t{0}, picture.pixels.size() - 1})
+    EXPECT_GT(picture.pixels[corner] & 255, 200u);
 }
 
 TEST_F(SceneTest, PosesAreTheLogsOwnAtItsStampsAndBetween) {

@@ -25,7 +25,7 @@ function chartBox(parent, title, unit, keys, height) {
 }
 
 function drawChart(box, rows, keys, options) {
-  return new Dygraph(
+  const chart = new Dygraph(
     box.plot,
     rows,
     Object.assign(
@@ -45,6 +45,7 @@ function drawChart(box, rows, keys, options) {
           x: {axisLabelFormatter: (x) => number(x, 5)},
         },
         highlightCallback: (event, x, points) => {
+          if (options.onX) options.onX(x, chart);
           box.value.textContent =
             `${options.xName ?? "time"} ${number(x, 6)}${options.xUnit ?? " s"}   ` +
             points
@@ -53,65 +54,96 @@ function drawChart(box, rows, keys, options) {
               .join("   ");
         },
         unhighlightCallback: () => {
+          if (options.onX) options.onX(null, chart);
           box.value.textContent = "";
         },
       },
       options.dygraph ?? {},
     ),
   );
+  return chart;
 }
 
-function drawTraces(log) {
+const predictions = (signal) =>
+  signal.predicted.map((p, i) => ({label: p.label, color: seriesColor(p.label, i), values: p.values}));
+
+function addTimeChart({title, unit, keys, time, columns, height, dygraph = {}}) {
+  const box = chartBox(document.getElementById("charts"), title, unit, keys, height);
+  const chart = drawChart(box, time.map((t, r) => [t, ...columns.map((c) => c[r])]), keys, {dygraph, onX: pointAt});
+  chart.time = time;
+  timeCharts.push(chart);
+}
+
+// The other charts show their row next to that time: each has rows of its own.
+let pointing = false;
+function pointAt(x, from) {
+  if (pointing) return;
+  pointing = true;
+  for (const chart of timeCharts) {
+    if (chart === from) continue;
+    if (x === null) chart.clearSelection();
+    else chart.setSelection(rowAt(chart.time, x), undefined, undefined, true);
+  }
+  pointing = false;
+}
+
+function rowAt(time, x) {
+  let low = 0, high = time.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (time[middle] <= x) low = middle;
+    else high = middle - 1;
+  }
+  return low + 1 < time.length && time[low + 1] - x < x - time[low] ? low + 1 : low;
+}
+
+function drawSignal(signal) {
+  const predicted = predictions(signal);
+  addTimeChart({
+    title: signal.name + (signal.scored ? "" : " (not scored)"),
+    unit: signal.unit,
+    keys: [{label: "measured", color: color("--measured"), width: 2.6}, ...predicted],
+    time: signal.time,
+    columns: [signal.measured, ...predicted.map((p) => p.values)],
+    height: 190,
+  });
+  if (!predicted.length) return;
+  addTimeChart({
+    title: "measured less predicted",
+    unit: signal.unit,
+    keys: predicted.map(({label, color: c}) => ({label, color: c})),
+    time: signal.time,
+    columns: predicted.map((p) =>
+      p.values.map((v, r) => (known(v) && known(signal.measured[r]) ? signal.measured[r] - v : null))),
+    height: 90,
+  });
+}
+
+// All signals of a log with few; else the one that is picked, with its command.
+function drawTraces(log, picked) {
   if (linked) linked.detach();
   timeCharts.forEach((chart) => chart.destroy());
   timeCharts = [];
-  const parent = document.getElementById("charts");
-  parent.replaceChildren();
-  const traces = log.traces, time = traces.time;
-  const add = (title, unit, keys, columns, height, extra = {}) => {
-    const box = chartBox(parent, title, unit, keys, height);
-    timeCharts.push(drawChart(box, time.map((t, r) => [t, ...columns.map((c) => c[r])]), keys, {dygraph: extra}));
-  };
-  for (const signal of traces.signals) {
-    const predicted = signal.predicted.map((p, i) => ({
-      label: p.label,
-      color: seriesColor(p.label, i),
-      values: p.values,
-    }));
-    add(
-      signal.name + (signal.scored ? "" : " (not scored)"),
-      signal.unit,
-      [{label: "measured", color: color("--measured"), width: 2.6}, ...predicted],
-      [signal.measured, ...predicted.map((p) => p.values)],
-      190,
-    );
-    if (predicted.length) {
-      const residuals = predicted.map((p) =>
-        p.values.map((v, r) => (known(v) && known(signal.measured[r]) ? signal.measured[r] - v : null)),
-      );
-      add(
-        "measured less predicted",
-        signal.unit,
-        predicted.map(({label, color: c}) => ({label, color: c})),
-        residuals,
-        90,
-      );
-    }
+  document.getElementById("charts").replaceChildren();
+  const {signals, commands} = log.traces, many = signals.length > data.few_signals;
+  const shown = many ? [signals[picked]] : signals;
+  shown.forEach(drawSignal);
+  for (const command of commands) {
+    if (many && command.number !== shown[0].command) continue;
+    addTimeChart({
+      title: `command ${command.name}`,
+      unit: command.unit,
+      keys: [{label: command.name, color: color("--command")}],
+      time: command.time,
+      columns: [command.values],
+      height: 90,
+      dygraph: {stepPlot: true},
+    });
   }
-  for (const command of traces.commands) {
-    add(
-      `command ${command.name}`,
-      command.unit,
-      [{label: command.name, color: color("--command")}],
-      [command.values],
-      90,
-      {stepPlot: true},
-    );
-  }
-  if (timeCharts.length > 1) linked = Dygraph.synchronize(timeCharts, {zoom: true, selection: true, range: false});
-  const rows = log.quality.rows;
+  if (timeCharts.length > 1) linked = Dygraph.synchronize(timeCharts, {zoom: true, selection: false, range: false});
+  const rows = log.quality.rows, drawn = Math.max(...shown.map((s) => s.time.length));
   document.getElementById("thinned").textContent =
-    time.length < rows ? `${time.length} of ${rows} rows are drawn: of every stretch the extremes of each trace.` : "";
+    drawn < rows ? `${drawn} of ${rows} rows are drawn: of every stretch the extremes of each trace.` : "";
 }
 
 function zoom(how) {

@@ -2,7 +2,7 @@
 // Puts the page together.
 
 const data = JSON.parse(document.getElementById("report-data").textContent);
-let current = 0;
+let current = 0, picked = 0;
 
 function setTheme(theme) {
   document.documentElement.dataset.theme = theme;
@@ -15,7 +15,8 @@ function setTheme(theme) {
 function drawLog() {
   const log = data.logs[current];
   if (!log?.traces) return;
-  drawTraces(log);
+  drawTraces(log, picked);
+  drawTiles(log, picked, pick);
   drawResponses(log);
   drawCurves(data.curves);
   const maps = document.getElementById("maps");
@@ -29,10 +30,29 @@ function drawLog() {
         "p",
         {class: "note"},
         "A jump where the speed changes sign is dry friction, a slope across the angle a spring, a slope "
-          + "across the speed damping. Speed and acceleration come from the log by local fits over 20 ms to each side.",
+          + "across the speed damping. Speed and acceleration come from the log by local fits over 20 ms to each side."
+          + (log.traces.signals.length > figures.length ? " Of the joints with the largest errors." : ""),
       ),
     );
   }
+}
+
+// Signals of the log to pick from, where there are many.
+function listSignals() {
+  const log = data.logs[current], signals = log?.traces?.signals ?? [];
+  document.getElementById("picker").hidden = signals.length <= data.few_signals;
+  document.getElementById("signal").replaceChildren(
+    ...signals.map((s, i) => element("option", {value: i}, `${s.name} (${number(s.error, 2)})`)));
+  picked = 0;
+}
+
+function pick(signal) {
+  picked = signal;
+  document.getElementById("signal").value = signal;
+  drawTraces(data.logs[current], picked);
+  document.querySelectorAll(".tile").forEach((tile, i) => tile.setAttribute("aria-pressed", String(i === picked)));
+  const traces = document.getElementById("traces");
+  if (traces.getBoundingClientRect().top < 0) traces.scrollIntoView();
 }
 
 function choosers() {
@@ -41,7 +61,12 @@ function choosers() {
     const name = fileName(log.path) + (log.held_out ? " (held out)" : "");
     if (log.traces) select.append(element("option", {value: i}, name));
   });
-  select.addEventListener("change", () => { current = Number(select.value); drawLog(); });
+  select.addEventListener("change", () => {
+    current = Number(select.value);
+    listSignals();
+    drawLog();
+  });
+  document.getElementById("signal").addEventListener("change", (event) => pick(Number(event.target.value)));
   document
     .querySelectorAll("[data-zoom]")
     .forEach((button) => button.addEventListener("click", () => zoom(button.dataset.zoom)));
@@ -92,6 +117,7 @@ if (video.dataset.video) {
 if (data.logs.some((log) => log.traces)) show("traces");
 writeConditions(data.where);
 choosers();
+listSignals();
 drawLog();
 writeStatements(data.statements, data.more_statements);
 writeParameters(data.parameters, data.headline.notes);

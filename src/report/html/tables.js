@@ -133,6 +133,7 @@ function rangePicture(p) {
   return svg;
 }
 
+const FIRST_PARAMETERS = 24;
 function writeParameters(parameters, notes) {
   if (!parameters.length) return;
   const rows = parameters.map((p) => {
@@ -152,23 +153,22 @@ function writeParameters(parameters, notes) {
       element("span", {}, ...tags),
     ];
   });
-  document
-    .getElementById("parameter-table")
-    .append(
-      table(
-        "Parameters",
-        [
-          "parameter",
-          {number: "nominal"},
-          {number: "value"},
-          "95 % interval",
-          "unit",
-          "dot: value; mark: nominal; line: bounds",
-          "",
-        ],
-        rows,
-      ),
-    );
+  const heads = [
+    "parameter",
+    {number: "nominal"},
+    {number: "value"},
+    "95 % interval",
+    "unit",
+    "dot: value; mark: nominal; line: bounds",
+    "",
+  ];
+  const place = document.getElementById("parameter-table");
+  place.append(table("Parameters", heads, rows.slice(0, FIRST_PARAMETERS)));
+  if (rows.length > FIRST_PARAMETERS) {
+    const more = table("More parameters", heads, rows.slice(FIRST_PARAMETERS));
+    place.append(
+      element("details", {}, element("summary", {}, `${rows.length - FIRST_PARAMETERS} more parameters`), more));
+  }
   document.getElementById("parameter-notes").append(...notes.map((note) => element("li", {}, note)));
   show("parameters");
 }

@@ -70,7 +70,13 @@ Result<std::vector<double>> ExtractColumn(const Log& log, const Timeline& timeli
                  .allowed = "numbers",
                  .cure = "choose another column, or leave this one out of the experiment file"};
   }
-  if (missing > 0) {
+  if (missing > 0 && options.missing == MissingRepair::kKeep) {
+    if (findings) {
+      findings->push_back(
+          {"kept", column.name, missing, first_missing,
+           fmt::format("no value in {} of {} rows; those rows of it are not used", missing, values.size())});
+    }
+  } else if (missing > 0) {
     if (options.missing != MissingRepair::kHold) {
       return Error{.what = "a missing value",
                    .where = log.Where(first_missing) + ", column " + column.name,

@@ -12,6 +12,7 @@
 
 #include "src/compare/score.h"
 #include "src/core/statistics.h"
+#include "src/video/cairo_library.h"
 #include "src/video/encoder.h"
 
 namespace gapscope {
@@ -331,6 +332,7 @@ Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<V
   GS_CHECK(!models.empty());
   VideoOptions options = asked;
   GS_RETURN_IF_ERROR(Validate(recording, *models.front().model, &options));
+  GS_RETURN_IF_ERROR(OpenCairo());
   VideoSummary summary;
   GS_ASSIGN(summary.gl, OpenGl(options.gl, pool.workers(), &summary.note));
   GS_ASSIGN(const std::vector<Actor> actors, RehearseAll(recording, models, options, pool));

@@ -218,7 +218,7 @@ TEST_F(CliTest, JsonAloneOnStdoutMessagesOnStderr) {
 
 TEST_F(CliTest, ProgressAndErrorsAsJson) {
   const std::string log = JointLog();
-  const Answer good = Run("tune " + Joint() + " '" + log + "' --starts 1 --freeze kp --json --progress json");
+  const Answer good = Run("tune " + Joint() + " '" + log + "' --starts 1 --freeze motor.kp --json --progress json");
   ASSERT_EQ(good.status, 0) << good.err;
   std::istringstream lines(good.err);
   int seen = 0;
@@ -247,9 +247,13 @@ TEST_F(CliTest, AnInterruptedTuneWritesTheBestSoFar) {
   const std::string log = JointLog();
   for (const char* signal : {"INT", "TERM"}) {
     SCOPED_TRACE(signal);
-    const Answer answer =
-        Run("tune " + Joint() + " '" + log + "' --starts 1000 --json --progress json --out stopped_" + signal +
-            " 2> told & pid=$!; until grep -q stage told; do sleep 0.05; done; kill -" + signal + " $pid; wait $pid");
+    const std::string cwd = scratch_.Path("cwd");
+    std::filesystem::create_directories(cwd);
+    // As soon as it has said what it does; waited for a minute at most.
+    const Answer answer = scratch_.Shell("cd '" + cwd + "'; '" GAPSCOPE_PROGRAM "' tune " + Joint() + " '" + log +
+                                         "' --starts 1000 --json --progress json --out stopped_" + signal +
+                                         " 2> told & pid=$!; for i in $(seq 600); do grep -q stage '" + cwd +
+                                         "/told' && break; sleep 0.1; done; kill -" + signal + " $pid; wait $pid");
     EXPECT_EQ(answer.status, 0) << answer.err;
     const auto json = nlohmann::json::parse(answer.out);
     EXPECT_EQ(json.at("termination"), "interrupted");

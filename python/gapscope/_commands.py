@@ -78,7 +78,7 @@ def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
             name = log.name or f"log_{len(job.names)}"
             path = job.out / "logs" / f"{name}.npz"
             if Path(name).name != name or str(path) in job.names:
-                raise InputError("a name that does not fit for a log", "Log.name", repr(name), "names that differ, without /")
+                raise InputError("not a log's name", "Log.name", repr(name), "names that differ, without /")
             path.parent.mkdir(exist_ok=True)
             log.save(path)
             job.names[str(path)] = name
@@ -128,9 +128,7 @@ def _run(job: _Job, progress: ProgressCallback | None) -> Finished:
         return run(job.arguments, progress)
     except InputError as error:
         for path, name in job.names.items():
-            error = InputError(
-                *(part.replace(path, name) for part in (error.what, error.where, error.actual, error.allowed, error.cure))
-            )
+            error = InputError(*(str(part).replace(path, name) for part in error.args))
         raise error from None
 
 

@@ -27,7 +27,7 @@ class Experiment:
             self._keys = dict(source)
             model = self._keys.get("model")
             if model is None:
-                raise InputError("an experiment without a model", "Experiment", cure="model: the path of an MJCF, or an MjSpec")
+                raise InputError("an experiment without a model", "Experiment", cure="model: a path or an MjSpec")
             if isinstance(model, (str, os.PathLike)):
                 self._keys["model"] = str((Path(base or ".") / model).resolve())
             return

@@ -31,7 +31,8 @@ def _table(head: list[str], rows: list[list[str]]) -> str:
     if not rows:
         return ""
     line = "".join(f'<th style="text-align:left">{_text(name)}</th>' for name in head)
-    body = "".join("<tr>" + "".join(f'<td style="text-align:left">{cell}</td>' for cell in row) + "</tr>" for row in rows)
+    cells = ["".join(f'<td style="text-align:left">{cell}</td>' for cell in row) for row in rows]
+    body = "".join(f"<tr>{row}</tr>" for row in cells)
     return f"<table><thead><tr>{line}</tr></thead><tbody>{body}</tbody></table>"
 
 

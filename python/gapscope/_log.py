@@ -29,9 +29,9 @@ class Log:
     ``NAME[n - 1]``. Values are in the units that the experiment file states; NaN is a missing value.
 
     ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
-    time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so. Dates
-    become seconds from the first. ``header`` holds numbers and texts of the whole log (``values: {header: kp}`` of an
-    experiment). ``name`` is what results call the log.
+    time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so.
+    Dates become seconds from the first. ``header`` holds numbers and texts of the whole log (``values: {header: kp}``
+    of an experiment). ``name`` is what results call the log.
 
     Stamps that are missing, repeat or go back are refused here: in memory they are a mistake. In files they are
     repaired as the experiment says.
@@ -190,14 +190,18 @@ class Log:
             )
         if name in self._table:
             raise InputError(
-                "two columns of one name", "Log", repr(name), "each name once", "df = df.loc[:, ~df.columns.duplicated()]"
+                "two columns of one name",
+                "Log",
+                repr(name),
+                "each name once",
+                "df = df.loc[:, ~df.columns.duplicated()]",
             )
         numbers = self._numbers(name, values)
         if numbers.ndim == 1:
             self._table[name] = numbers
             return
         if numbers.ndim != 2 or name == self.time:
-            raise InputError("an array of this shape is no column", repr(name), str(numbers.shape), "(rows,), (rows, n)")
+            raise InputError("an array of no column's shape", repr(name), str(numbers.shape), "(rows,), (rows, n)")
         for k in range(numbers.shape[1]):
             self._table[f"{name}[{k}]"] = np.ascontiguousarray(numbers[:, k])
 

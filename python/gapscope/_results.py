@@ -39,7 +39,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class SignalScore:
-    """Measured against predicted, SI. ``nrmse``: over the signal's standard deviation; ``lag_s`` > 0: predicted late."""
+    """Measured against predicted, SI.
+
+    ``nrmse``: over the signal's standard deviation; ``lag_s`` > 0: measured is later than predicted.
+    """
 
     rmse: float = math.nan
     mae: float = math.nan

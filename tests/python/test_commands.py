@@ -89,7 +89,8 @@ def test_errors_are_fields(experiment: str, demo: str, tmp_path: Path) -> None:
     with pytest.raises(gs.InputError) as raised:
         gs.replay(experiment, demo, with_="cable_sprin@arm")
     assert "cable_sprin" in str(raised.value) and "cable_spring" in str(raised.value)
-    log = gs.Log({"time_s": [0, 0.1, 0.2], "voltage": [0, 1, 2], "arm_rad": [0, 0, 0], "pendulum_rad": [0, 0, 0]}, name="run")
+    still = [0, 0, 0]
+    log = gs.Log({"time_s": [0, 0.1, 0.2], "voltage": [0, 1, 2], "arm_rad": still, "pendulum_rad": still}, name="run")
     with pytest.raises(gs.InputError) as raised:
         gs.replay(experiment, log)
     error = raised.value
@@ -153,7 +154,7 @@ def test_tune_with_progress_and_files_in_out(experiment: str, demo: str, tmp_pat
     holds(result, _named(result))
     stiffness = result["cable_spring@arm.stiffness_n_m_per_rad"]
     assert stiffness.low < 0.0012 < stiffness.high or abs(stiffness.value - 0.0012) < 4e-4
-    assert result.termination == "converged" and result.error.held_out < 0.5 * result.error.nominal
+    assert result.termination == "converged" and result.error.held_out < 0.7 * result.error.nominal
     assert seen and seen[-1].stage == "fit" and seen[-1].best is not None and seen[-1].total is None
     assert (tmp_path / "logs" / "half.npz").is_file() and (tmp_path / "report.html").is_file()
     assert "cable_spring@arm" in result._repr_html_()

@@ -102,10 +102,10 @@ bool Simulator::SetParameters(std::span<const double> values, const Recording& r
   std::copy(values.begin(), values.end(), values_.begin());
   for (std::size_t c = 0; c < delays_s_.size(); ++c) {
     const int delay = model_.command_delays()[c];
-    delays_s_[c] = shift_s_ + (delay >= 0 ? values_[delay] : 0);
+    delays_s_[c] = stamps_.commands_s + (delay >= 0 ? values_[delay] : 0);
   }
   late_ = std::any_of(delays_s_.begin(), delays_s_.end(), [](double delay_s) { return delay_s != 0; });
-  latest_s_ = delays_s_.empty() ? shift_s_ : *std::max_element(delays_s_.begin(), delays_s_.end());
+  latest_s_ = delays_s_.empty() ? stamps_.commands_s : *std::max_element(delays_s_.begin(), delays_s_.end());
   return writer_.Write(values, recording.values);
 }
 
@@ -175,7 +175,11 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
   if (reads_ == SignalStage::kState) return;
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  SetCommands(recording, row > 0 ? row - 1 : 0, d->time, d->time);
+  const std::size_t before = row > 0 ? row - 1 : 0;
+  const double from = recording.time_s[before] + stamps_.forces_s, to = d->time + stamps_.forces_s;
+  for (std::size_t c = 0; c < delays_s_.size(); ++c)
+    d->ctrl[model_.command_actuators()[c]] = MeanHeld(recording.time_s, recording.commands[c].values, earlier_[c],
+                                                      from - delays_s_[c], to - delays_s_[c], held_[c]);
   if (reads_ == SignalStage::kSensors) {
     m->opt.disableflags &= ~mjDSBL_SENSOR;
     mj_forward(m, d);

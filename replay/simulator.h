@@ -42,6 +42,12 @@ struct ProbeTorque {
   bool operator==(const ProbeTorque&) const = default;
 };
 
+// How far a log's stamps lie from what happened, common to all logs of a rig.
+struct StampShift {
+  double commands_s = 0;  // commands act this much later, beside the model's own delay; of either sign
+  double forces_s = 0;    // forces and accelerations were read this much later
+};
+
 class Simulator {
  public:
   // `model` must outlive the simulator. Steps are at most `max_step_s` long (0: the model's own time step).
@@ -57,9 +63,8 @@ class Simulator {
   RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted,
                 std::span<double> qpos = {});
 
-  // Shifts all commands by this much, beside the model's own command delay; of either sign. Takes effect with the next
-  // SetParameters.
-  void set_shift_s(double shift) { shift_s_ = shift; }
+  // Takes effect with the next SetParameters.
+  void set_stamps(StampShift stamps) { stamps_ = stamps; }
   void set_probes(std::span<const ProbeTorque> probes) { probes_.assign(probes.begin(), probes.end()); }
   void set_steps(StepKind steps);
   const mjModel& mujoco_model() const { return *mujoco_; }
@@ -81,7 +86,8 @@ class Simulator {
   void FindEarlierCommands(const Recording& recording);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   double Read(const SignalSource& source) const;
-  // What signals beside the state are at a stamp: still under the command that went before.
+  // What signals beside the state are at a stamp: forces jump where commands do, and no stamp says on which side of a
+  // jump they were read. They are those of the mean command over the sample that ends there.
   void ComputeSignals(const Recording& recording, std::size_t row);
   // The sensor's orientation at a row, as turn from the log's reference, nearest to the one before.
   void ReadTurn(const Recording& recording, std::size_t row, std::size_t signal, double* out, const double* before);
@@ -96,7 +102,7 @@ class Simulator {
   ParameterWriter writer_;
   double max_step_s_;
   bool quick_ = false;
-  double shift_s_ = 0;
+  StampShift stamps_;
   std::vector<double> delays_s_;  // per command: how late it acts
   bool late_ = false;             // one of them does not act at its stamp
   double latest_s_ = 0;

@@ -116,7 +116,7 @@ Status WriteTune(const std::string& out, const Session& session, const DataSplit
   ReportSource source = SourceOf(session.experiment, {data.train, data.held_out});
   source.content = PageOf(run);
   const auto nominal = [&](const std::vector<Recording>& recordings) {
-    return Evaluate(*session.model, recordings, {session.values, 0}, session.experiment.replay.mode, options,
+    return Evaluate(*session.model, recordings, {session.values, StampShift{}}, session.experiment.replay.mode, options,
                     *session.pool);
   };
   source.predictions = {{"nominal", nominal(data.train)}, {"tuned", summary.train}};

@@ -130,7 +130,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
   candidate->train_cost = solved.cost;
   candidate->converged = solved.termination == Termination::kConverged;
   candidate->values = candidate->problem->Values(solved.point);
-  candidate->shift_s = candidate->problem->Shift(solved.point);
+  candidate->stamps = candidate->problem->Stamps(solved.point);
 }
 
 void PolishCandidate(const Workbench& bench, Candidate* candidate) {
@@ -160,7 +160,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   candidate->point = solved.point;
   candidate->train_cost = candidate->problem->CostOfAnyVariance(solved.cost, solved.point.y);
   candidate->values = candidate->problem->Values(solved.point);
-  candidate->shift_s = candidate->problem->Shift(solved.point);
+  candidate->stamps = candidate->problem->Stamps(solved.point);
 }
 
 namespace {
@@ -168,7 +168,7 @@ namespace {
 // The held-out logs with the candidate's parameters held: left are initial states and zero offsets.
 std::unique_ptr<FitProblem> HeldOutProblem(const Workbench& bench, const Candidate& candidate, FitOptions options) {
   options.fit_shift = false;
-  options.shift_s = candidate.shift_s;
+  options.stamps = candidate.stamps;
   return std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
 }
 

@@ -28,7 +28,7 @@ struct Candidate {
   bool converged = false;
   bool scored = false;
   std::vector<double> values;
-  double shift_s = 0;
+  StampShift stamps;
   double held_out_cost = 0;
   double held_out_floors = 0;  // root mean square of residual over noise
   double held_out_error = 0;   // normalised: see ReplayError; in windows

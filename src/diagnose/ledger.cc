@@ -76,7 +76,7 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   const FitPoint before = candidate->point;
   const std::vector<double> values = candidate->values;
   const bool converged = candidate->converged, scored = candidate->scored;
-  const double shift_s = candidate->shift_s;
+  const StampShift stamps = candidate->stamps;
   const auto derivatives = candidate->derivatives;
   FitLimits limits = LimitsOf(effort);
   // An effect that is not there costs nothing more, so that a part's cost is within reach.
@@ -98,7 +98,7 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   candidate->train_cost = known;
   candidate->converged = converged;
   candidate->scored = scored;
-  candidate->shift_s = shift_s;
+  candidate->stamps = stamps;
   candidate->derivatives = derivatives;
 }
 

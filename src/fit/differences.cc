@@ -23,7 +23,7 @@ class FitProblem::Differences {
         values_(values),
         state_(point.states[window]),
         options_(options),
-        shift_(problem.Shift(point)),
+        stamps_(problem.Stamps(point)),
         residual_(result.residuals[window]),
         base_(result.base()[window]),
         steps_(result.steps()),
@@ -32,17 +32,15 @@ class FitProblem::Differences {
   // False: the window cannot be simulated at the point.
   bool Make() {
     if (residual_.size() == 0) {
-      if (!problem_.Simulate(worker_, {window_, point_, values_, state_, shift_}, worker_.base)) return false;
+      if (!problem_.Simulate(worker_, {window_, point_, values_, state_, stamps_}, worker_.base)) return false;
       problem_.ResidualsOf(window_, point_, worker_.base, residual_);
     }
     const Eigen::Index n = layout_.low.size();
     jacobian_.setZero(residual_.size(), n + state_.size());
     const bool all = options_.columns != Columns::kStates;
     if (all) Parameters();
-    if (all && layout_.shift() >= 0 && !Known(layout_.shift())) {
-      const double h = kFitPolicy.shift_step;
-      if (Replay(point_, values_, state_, shift_ + h * layout_.shift_scale_s)) Difference(layout_.shift(), h);
-    }
+    if (all) Shift(layout_.command_shift, &StampShift::commands_s);
+    if (all) Shift(layout_.force_shift, &StampShift::forces_s);
     States(n);
     if (all) Offsets(n);
     return true;
@@ -50,8 +48,9 @@ class FitProblem::Differences {
 
  private:
   // The residuals elsewhere, in worker_.other; false: they cannot be had.
-  bool Replay(const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state, double shift) {
-    if (!problem_.Simulate(worker_, {window_, point, values, state, shift, steps_}, worker_.perturbed)) return false;
+  bool Replay(const FitPoint& point, const std::vector<double>& values, const Eigen::VectorXd& state,
+              StampShift stamps) {
+    if (!problem_.Simulate(worker_, {window_, point, values, state, stamps, steps_}, worker_.perturbed)) return false;
     problem_.ResidualsOf(window_, point_, worker_.perturbed, worker_.other);
     return true;
   }
@@ -90,7 +89,7 @@ class FitProblem::Differences {
     const Together& columns = problem_.parameters_together_;
     const auto in_one = [&](const std::vector<Eigen::Index>& group) {
       for (const Eigen::Index i : group) Set(i, StepOf(i));
-      const bool good = Replay(point_, worker_.values, state_, shift_);
+      const bool good = Replay(point_, worker_.values, state_, stamps_);
       for (const Eigen::Index i : group) {
         if (good) OwnDifference(i, StepOf(i), columns.moved[static_cast<std::size_t>(i)]);
         Set(i, 0);
@@ -103,7 +102,7 @@ class FitProblem::Differences {
   void Parameter(Eigen::Index i) {
     const auto move = [&](double h) {
       Set(i, h);
-      return Replay(point_, worker_.values, state_, shift_);
+      return Replay(point_, worker_.values, state_, stamps_);
     };
     const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
     // The other way when that cannot be simulated.
@@ -119,13 +118,20 @@ class FitProblem::Differences {
     Set(i, 0);
   }
 
+  void Shift(Eigen::Index column, double StampShift::* part) {
+    if (column < 0 || Known(column)) return;
+    StampShift moved = stamps_;
+    moved.*part += kFitPolicy.shift_step * layout_.shift_scale_s;
+    if (Replay(point_, values_, state_, moved)) Difference(column, kFitPolicy.shift_step);
+  }
+
   void States(Eigen::Index first) {
     Eigen::VectorXd moved = state_;
     const Together& columns = problem_.states_together_[window_.log];
     const auto step = [&](Eigen::Index j) { return kFitPolicy.state_step / window_.prior[j]; };
     const auto in_one = [&](const std::vector<Eigen::Index>& group) {
       for (const Eigen::Index j : group) moved[j] += step(j);
-      const bool good = Replay(point_, values_, moved, shift_);
+      const bool good = Replay(point_, values_, moved, stamps_);
       for (const Eigen::Index j : group) {
         if (good) OwnDifference(first + j, step(j), columns.moved[static_cast<std::size_t>(j)]);
         moved[j] = state_[j];
@@ -134,7 +140,7 @@ class FitProblem::Differences {
     };
     const auto one = [&](Eigen::Index j) {
       moved[j] += step(j);
-      if (Replay(point_, values_, moved, shift_)) Difference(first + j, step(j));
+      if (Replay(point_, values_, moved, stamps_)) Difference(first + j, step(j));
       moved[j] = state_[j];
     };
     InGroups(columns, [&](Eigen::Index j) { return j >= options_.known_states; }, one, in_one);
@@ -155,7 +161,7 @@ class FitProblem::Differences {
       } else {
         FitPoint other = point_;
         other.y[signal.offset] += kFitPolicy.offset_step;
-        if (!Replay(other, values_, state_, shift_)) continue;
+        if (!Replay(other, values_, state_, stamps_)) continue;
         column = (worker_.other - base_) / kFitPolicy.offset_step;
       }
       const double* measured =
@@ -175,7 +181,7 @@ class FitProblem::Differences {
   const std::vector<double>& values_;
   const Eigen::VectorXd& state_;
   const DifferenceOptions& options_;
-  const double shift_;
+  const StampShift stamps_;
   Eigen::VectorXd& residual_;
   const Eigen::VectorXd& base_;  // what differences are taken from
   const StepKind steps_;
@@ -197,7 +203,8 @@ Work FitProblem::WorkOf(const DifferenceOptions& options, bool base_known) const
   };
   if (options.columns != Columns::kStates) {
     count(parameters_together_, wanted, options.columns == Columns::kCentral ? 2 : 1);
-    if (layout_.shift() >= 0) work.replays += wanted(layout_.shift());
+    for (const Eigen::Index shift : {layout_.command_shift, layout_.force_shift})
+      if (shift >= 0) work.replays += wanted(shift);
   }
   if (!windows_.empty())
     count(states_together_[windows_.front().log], [&](Eigen::Index j) { return j >= options.known_states; }, 1);

@@ -99,8 +99,12 @@ FitPoint FitProblem::At(const std::vector<double>& values, FitPoint point) const
   return point;
 }
 
-double FitProblem::Shift(const FitPoint& point) const {
-  return layout_.shift_scale_s == 0 ? options_.shift_s : point.y[layout_.shift()] * layout_.shift_scale_s;
+StampShift FitProblem::Stamps(const FitPoint& point) const {
+  const auto shift = [&](Eigen::Index at, double fixed) {
+    return at < 0 ? fixed : point.y[at] * layout_.shift_scale_s;
+  };
+  return {.commands_s = shift(layout_.command_shift, options_.stamps.commands_s),
+          .forces_s = shift(layout_.force_shift, options_.stamps.forces_s)};
 }
 
 double FitProblem::CostOfAnyVariance(double cost, const Eigen::VectorXd& y) const {
@@ -124,7 +128,7 @@ std::size_t FitProblem::TakeSteps() {
 }
 
 void FitProblem::PlaceStart(Worker& worker, const Place& place) const {
-  const auto& [window, point, values, state, shift_s, steps] = place;
+  const auto& [window, point, values, state, stamps, steps] = place;
   const Recording& recording = recordings_[window.log];
   const std::vector<double>& first = space_.start();
   // The fixed start was made with the starting values' offsets; a sensor's delay moves it along the log, a pose's
@@ -195,7 +199,7 @@ bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double
   const FitWindow& window = place.window;
   const Recording& recording = recordings_[window.log];
   predicted.resize(window.rows.rows() * recording.measured.size());
-  worker.simulator.set_shift_s(place.shift_s);
+  worker.simulator.set_stamps(place.stamps);
   worker.simulator.set_probes(probes_);
   worker.simulator.set_steps(options_.steps == StepKind::kQuick ? StepKind::kQuick : place.steps);
   if (!worker.simulator.SetParameters(place.values, recording)) return false;
@@ -227,7 +231,7 @@ double FitProblem::WindowCost(std::size_t window, const Eigen::VectorXd& residua
 
 Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMask& mask, StepKind steps) {
   const std::vector<double> values = Values(point);
-  const double shift = Shift(point);
+  const StampShift stamps = Stamps(point);
   std::vector<double> costs(windows_.size());
   Evaluation result{.log_costs = std::vector<double>(recordings_.size(), 0.0)};
   if (keep == Keep::kResiduals) result.residuals.resize(windows_.size());
@@ -235,7 +239,7 @@ Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMa
     if (!mask.empty() && !mask[w]) return;
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
-    if (!Simulate(worker, {window, point, values, point.states[w], shift, steps}, worker.base)) {
+    if (!Simulate(worker, {window, point, values, point.states[w], stamps, steps}, worker.base)) {
       costs[w] = kInfinity;
       return;
     }
@@ -257,12 +261,12 @@ Evaluation FitProblem::Evaluate(const FitPoint& point, Keep keep, const WindowMa
 std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
   std::vector<LogReplay> logs = Collect(recordings_, EmptyTraces);
   const std::vector<double> values = Values(point);
-  const double shift = Shift(point);
+  const StampShift stamps = Stamps(point);
   std::vector<char> failed(windows_.size(), 0);
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
     Worker& worker = GetWorker(index);
     const FitWindow& window = windows_[w];
-    if (!Simulate(worker, {window, point, values, point.states[w], shift}, worker.base)) {
+    if (!Simulate(worker, {window, point, values, point.states[w], stamps}, worker.base)) {
       failed[w] = 1;
       return;
     }
@@ -313,7 +317,9 @@ FitPoint CarryOver(const FitProblem& from, const FitPoint& at, const FitProblem&
         point.y[b.signals[l][s].offset] = at.y[a.signals[l][s].offset];
     }
   }
-  if (a.shift() >= 0 && b.shift() >= 0) point.y[b.shift()] = at.y[a.shift()];
+  for (const auto shift : {&FitLayout::command_shift, &FitLayout::force_shift}) {
+    if (a.*shift >= 0 && b.*shift >= 0) point.y[b.*shift] = at.y[a.*shift];
+  }
   GS_CHECK(point.states.size() == at.states.size());
   // A motor side that only one of the two has is where the pre-roll leaves it.
   for (std::size_t w = 0; w < point.states.size(); ++w) {

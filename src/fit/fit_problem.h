@@ -21,7 +21,7 @@ namespace gapscope {
 
 // One candidate solution.
 struct FitPoint {
-  Eigen::VectorXd y;                    // parameters, then offsets, then the shift
+  Eigen::VectorXd y;                    // parameters, then offsets, then shifts
   std::vector<Eigen::VectorXd> states;  // per window
 };
 
@@ -80,10 +80,10 @@ class FitProblem {
   std::size_t residuals() const;  // scored rows x signals
 
   FitPoint Start() const;
-  // The point with these parameters' values, its offsets, shift and states as they are.
+  // The point with these parameters' values, its offsets, shifts and states as they are.
   FitPoint At(const std::vector<double>& values, FitPoint point) const;
   std::vector<double> Values(const FitPoint& point) const { return space_.Values(point.y); }
-  double Shift(const FitPoint& point) const;  // s
+  StampShift Stamps(const FitPoint& point) const;
 
   // What is known beforehand counts as against residuals of this variance, in units of the noise's: 2 cost / residuals
   // of a model that is left with much more than noise.
@@ -115,13 +115,13 @@ class FitProblem {
 
  private:
   struct Worker;
-  // Where a window is simulated: at a point, or beside it in its values, the window's state or the shift.
+  // Where a window is simulated: at a point, or beside it in its values, the window's state or the stamps.
   struct Place {
     const FitWindow& window;
     const FitPoint& point;
     const std::vector<double>& values;
     const Eigen::VectorXd& state;
-    double shift_s;
+    StampShift stamps;
     StepKind steps = StepKind::kOwn;
   };
 

@@ -154,7 +154,9 @@ std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const 
           "offset " + problem.recordings()[l].measured[s].spec.signal + " log " + std::to_string(l);
     }
   }
-  if (problem.layout().shift() >= 0) names.back() = "shift";
+  const FitLayout& layout = problem.layout();
+  if (layout.command_shift >= 0) names[static_cast<std::size_t>(layout.command_shift)] = "command shift";
+  if (layout.force_shift >= 0) names[static_cast<std::size_t>(layout.force_shift)] = "force shift";
   for (const auto& column : extra) names.push_back(column.name);
   names.emplace_back("residual");
   return names;

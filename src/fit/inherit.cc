@@ -24,8 +24,10 @@ std::vector<Eigen::Index> SharedColumns(const FitProblem& from, const FitProblem
         shared[static_cast<std::size_t>(b.signals[l][s].offset)] = a.signals[l][s].offset;
     }
   }
-  if (a.shift() >= 0 && b.shift() >= 0 && a.shift_scale_s == b.shift_scale_s)
-    shared[static_cast<std::size_t>(b.shift())] = a.shift();
+  for (const auto shift : {&FitLayout::command_shift, &FitLayout::force_shift}) {
+    if (a.*shift >= 0 && b.*shift >= 0 && a.shift_scale_s == b.shift_scale_s)
+      shared[static_cast<std::size_t>(b.*shift)] = a.*shift;
+  }
   return shared;
 }
 

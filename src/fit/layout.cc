@@ -19,7 +19,6 @@ double Weight(const FitOptions& options, const Recording::Measured& measured, co
   return 1 / (options.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean));
 }
 
-// Forces jump to the next command as soon as commands come early.
 bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& layout) {
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
@@ -150,13 +149,14 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
     step = std::min(step, recording.timeline.median_step_s);
     AddLog(model, recording, options, &layout, &low, &high);
   }
-  if (options.fit_shift && !model.DelaysEveryCommand()) {
-    // In samples. No descent gets past the jump of a torque at an early command: where one is scored commands are late
-    // or on time.
-    low.push_back(ScoresForces(recordings, layout) ? 0 : -1);
+  layout.shift_scale_s = options.shift_range_s > 0 ? options.shift_range_s : step;
+  const auto add_shift = [&](Eigen::Index* index) {
+    *index = static_cast<Eigen::Index>(low.size());
+    low.push_back(-1);
     high.push_back(1);
-    layout.shift_scale_s = options.shift_range_s > 0 ? options.shift_range_s : step;
-  }
+  };
+  if (options.fit_shift && !model.DelaysEveryCommand()) add_shift(&layout.command_shift);
+  if (options.fit_shift && ScoresForces(recordings, layout)) add_shift(&layout.force_shift);
   layout.low = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
   layout.high = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));
   return layout;

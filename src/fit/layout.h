@@ -1,7 +1,7 @@
 // What a fit's unknowns consist of. y: the search coordinates of parameters, one zero offset per measured position and
-// log, one command shift below a sample. x of a window: what its initial state differs by from what the log says (angle
-// and speed of each measured joint), from the model's initial pose at rest (of each joint that no signal is of), and
-// from the pre-roll (of each hidden motor side).
+// log, how far commands' and forces' stamps are off, below a sample. x of a window: what its initial state differs by
+// from what the log says (angle and speed of each measured joint), from the model's initial pose at rest (of each joint
+// that no signal is of), and from the pre-roll (of each hidden motor side).
 #ifndef GAPSCOPE_FIT_LAYOUT_H_
 #define GAPSCOPE_FIT_LAYOUT_H_
 
@@ -41,10 +41,10 @@ struct FitLayout {
   std::vector<Eigen::VectorXd> state_priors;       // per log: weight of each number of a window's state
   Eigen::VectorXd low, high;                       // of y
   Eigen::Index parameters = 0;                     // the first numbers of y
-  double shift_scale_s = 0;                        // unit of the shift, the last number of y; 0: no shift is fitted
+  double shift_scale_s = 0;                        // unit of both shifts: a sample, or as asked
+  // Indices in y of StampShift's two; -1: not fitted.
+  Eigen::Index command_shift = -1, force_shift = -1;
 
-  // Index of the shift in y; -1: none.
-  Eigen::Index shift() const { return shift_scale_s > 0 ? low.size() - 1 : -1; }
   // Zero offset of a signal at y, in its unit.
   double Offset(const Eigen::VectorXd& y, std::size_t log, std::size_t signal) const;
   // Largest weight that a deviation of any signal has, squared: what one residual counts for.

@@ -53,10 +53,10 @@ struct FitOptions {
   double time_step_s = 0;           // 0: the model's
   StepKind steps = StepKind::kOwn;  // of all replays
   bool fit_offsets = true;          // zero offsets of measured positions, per log
-  bool fit_shift = true;            // command shift within +-1 sample, common to all logs
+  bool fit_shift = true;            // StampShift within +-1 sample, common to all logs
   bool fit_states = true;           // initial state of each window
-  double shift_range_s = 0;         // the shift lies within +- this; 0: one sample
-  double shift_s = 0;               // where no shift is fitted: this one
+  double shift_range_s = 0;         // shifts lie within +- this; 0: one sample
+  StampShift stamps;                // where no shift is fitted: these
   // Per experiment signal: residual = weight * (predicted - measured); empty: 1 / standard deviation.
   std::vector<double> weights;
   Normalization normalization = Normalization::kDeviation;

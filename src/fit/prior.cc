@@ -27,8 +27,10 @@ Eigen::VectorXd Knowledge(const SearchSpace& space, const FitLayout& layout, con
         weight[signal.offset] = std::pow(signal.deviation / options.prior_offset_rad, 2);
     }
   }
-  if (layout.shift() >= 0 && options.prior_shift_s > 0)
-    weight[layout.shift()] = std::pow(layout.shift_scale_s / options.prior_shift_s, 2);
+  for (const Eigen::Index shift : {layout.command_shift, layout.force_shift}) {
+    if (shift >= 0 && options.prior_shift_s > 0)
+      weight[shift] = std::pow(layout.shift_scale_s / options.prior_shift_s, 2);
+  }
   return weight;
 }
 

@@ -82,6 +82,7 @@ TuneRun TuneRunFrom(const ordered_json& json) {
       .model = ResultModelFrom(json),
       .time_step_s = NumberAt(json, "time_step_s"),
       .command_shift_s = NumberAt(json, "command_shift_s"),
+      .force_shift_s = json.value("force_shift_s", 0.0),
   };
   ReadKnowledge(json, &run);
   return run;

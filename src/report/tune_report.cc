@@ -124,7 +124,8 @@ TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t 
               .held_out = Scored(summary.held_out),
               .model = RunModelOf(model, summary.values),
               .time_step_s = summary.time_step_s,
-              .command_shift_s = summary.shift_s};
+              .command_shift_s = summary.stamps.commands_s,
+              .force_shift_s = summary.stamps.forces_s};
   const auto name = [&](int index) { return model.parameters()[index].name; };
   for (const auto& t : summary.tuned) {
     const gapscope::Parameter& p = model.parameters()[t.index];
@@ -188,6 +189,7 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
   json["model"] = JsonModel(run.model);
   json["time_step_s"] = run.time_step_s;
   json["command_shift_s"] = run.command_shift_s;
+  json["force_shift_s"] = run.force_shift_s;
   json["seed"] = run.info.seed;
   json["versions"] = JsonVersions(run.info);
   return json;
@@ -197,10 +199,11 @@ std::string ToTable(const TuneRun& run, const Console& console) {
   std::string text = ParameterLines(run, console) + "\n" + HeldOutLines(run, console);
   text += fmt::format("\nerror: nominal {:.4g}, train {:.4g}, held out {:.4g} ({})\n", run.error_nominal,
                       run.error_train, run.error_held_out, run.held_out_by);
+  const std::string forces = run.force_shift_s == 0 ? "" : fmt::format(", forces {:+.3f} ms", 1e3 * run.force_shift_s);
   text += fmt::format(
-      "{}: {}; {} evaluations, {} replays of all logs, {:.2f} s; time step {:.3g} ms; commands {:+.3f} ms late\n",
+      "{}: {}; {} evaluations, {} replays of all logs, {:.2f} s; time step {:.3g} ms; commands {:+.3f} ms late{}\n",
       run.optimizer, run.termination, run.evaluations, run.replays, run.wall_s, 1e3 * run.time_step_s,
-      1e3 * run.command_shift_s);
+      1e3 * run.command_shift_s, forces);
   if (run.starts > 1) {
     text += fmt::format("{} starts {}\n", run.starts,
                         run.starts_agree ? "agree"

@@ -50,7 +50,7 @@ struct TuneRun {
   std::string held_out_by;  // how logs were held out, for the user
   std::vector<Log> train, held_out;
   RunModel model;
-  double time_step_s = 0, command_shift_s = 0;
+  double time_step_s = 0, command_shift_s = 0, force_shift_s = 0;
 };
 TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed);
 

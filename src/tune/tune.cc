@@ -175,8 +175,9 @@ Found FitFrom(const Fit& fit, const std::optional<std::vector<double>>& random) 
 void Score(const Model& model, const DataSplit& data, const TuneOptions& options, ThreadPool& pool,
            TuneSummary* summary) {
   const ReplayMode mode = model.experiment().replay.mode;
-  const FixedParameters tuned{summary->values, summary->shift_s};
-  summary->error_nominal = ReplayError(Evaluate(model, data.held_out, {model.Nominal(), 0}, mode, options, pool));
+  const FixedParameters tuned{summary->values, summary->stamps};
+  summary->error_nominal =
+      ReplayError(Evaluate(model, data.held_out, {model.Nominal(), StampShift{}}, mode, options, pool));
   summary->train = Evaluate(model, data.train, tuned, mode, options, pool);
   summary->held_out = Evaluate(model, data.held_out, tuned, mode, options, pool);
   summary->error_train = ReplayError(summary->train);
@@ -202,7 +203,7 @@ Found FitFromAll(const Fit& fit, TuneSummary* summary) {
   summary->termination = fit.options.solve.deadline.stopped() ? Termination::kInterrupted : best.result.termination;
   for (const double cost : summary->start_costs)
     summary->starts_agree = summary->starts_agree && cost <= best.result.cost * (1 + kAgree);
-  summary->shift_s = best.stage->problem.Shift(best.result.point);
+  summary->stamps = best.stage->problem.Stamps(best.result.point);
   return best;
 }
 
@@ -215,8 +216,8 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   FitOptions fit =
       MakeFitOptions(options, {}, mode == ReplayMode::kWindows ? ObjectiveKind::kWindows : ObjectiveKind::kFreeRun);
   fit.lead_in_s = 0;
-  fit.fit_shift = !fixed.shift_s;
-  fit.shift_s = fixed.shift_s.value_or(0);
+  fit.fit_shift = !fixed.stamps;
+  fit.stamps = fixed.stamps.value_or(StampShift{});
   FitProblem problem(model, recordings, fit, fixed.values, pool);
   ProblemObjective objective(problem);
   Work work;

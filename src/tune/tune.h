@@ -34,7 +34,8 @@ struct TuneSummary {
   std::vector<double> start_costs;
   std::size_t evaluations = 0, replays = 0;
   double wall_s = 0, solve_s = 0;  // all; the optimiser alone, without intervals and scores
-  double time_step_s = 0, shift_s = 0;
+  double time_step_s = 0;
+  StampShift stamps;
   std::vector<double> values;  // all parameters of the model
   std::vector<TunedParameter> tuned;
   std::vector<FlatDirection> flat;
@@ -54,7 +55,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
 // scored.
 struct FixedParameters {
   const std::vector<double>& values;
-  std::optional<double> shift_s;  // of the commands; none: fitted too, within one sample
+  std::optional<StampShift> stamps;  // none: fitted too, within one sample
 };
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
                                 const FixedParameters& fixed, ReplayMode mode, const TuneOptions& options,

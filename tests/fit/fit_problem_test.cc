@@ -377,6 +377,40 @@ TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   EXPECT_LT(CostOf(from_nothing, point), 1e-4 * before);
 }
 
+// A force jumps with its command, and a log reads it at a stamp just before or just after: here before at every stamp,
+// after at every stamp, and before at every other one. What is made of the stamps must not go into the gain.
+TEST(FitShiftTest, ForcesReadOnEitherSideOfTheirCommandLeaveTheGainAlone) {
+  const Rig rig = LoadCart(-10, 10, true);
+  constexpr double kGain = 1.2;
+  for (const double after : {0.0, 0.5, 1.0}) {
+    Recording log = CartLog(rig, 1500, 1e-4);
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    std::vector<double>& command = log.commands.front().values;
+    for (double& u : command) u += uniform(random);
+    log.measured.front().values = CartMotion(kGain, 0.1, -0.3, command);
+    log.measured.push_back({.spec = rig.experiment.measured[1], .index = 1, .column = "f", .values = command});
+    std::vector<double>& force = log.measured.back().values;
+    for (std::size_t k = command.size() - 1; k > 0; --k)
+      force[k] = kGain * command[after == 1 || (after == 0.5 && k % 2 == 0) ? k : k - 1];
+    FitOptions options = CartOptions(rig, ObjectiveKind::kWindows);
+    const std::vector<Recording> logs = {log};
+    ThreadPool pool(1);
+    const auto solved = [&](bool shift) {
+      options.fit_shift = shift;
+      FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
+      const FitPoint point = Solve(problem, problem.Start(), {.tolerance = 1e-8}).point;
+      return std::pair(problem.Values(point)[rig.Index("cart.gain")], problem.Stamps(point));
+    };
+    const auto [gain, stamps] = solved(true);
+    EXPECT_NEAR(gain, kGain, 0.02 * kGain) << after;
+    EXPECT_NEAR(stamps.forces_s, after * kCartStep_s, 0.1 * kCartStep_s) << after;
+    EXPECT_NEAR(stamps.commands_s, 0, 0.1 * kCartStep_s) << after;
+    if (after == 0) continue;
+    EXPECT_GT(std::abs(solved(false).first - kGain), 0.05 * kGain) << after;
+  }
+}
+
 // A command later than one sample drives the nuisance shift onto its bound: a column must still tell what a delay would
 // explain.
 TEST(ExtraColumnTest, SeesADelayBeyondTheNuisanceShift) {
@@ -390,7 +424,7 @@ TEST(ExtraColumnTest, SeesADelayBeyondTheNuisanceShift) {
       .time_step_s = 0.004};
   FitProblem parent(*rig.model, logs, options, rig.model->Nominal(), pool);
   const FitPoint point = Solve(parent, parent.Start(), {.tolerance = 1e-5}).point;
-  EXPECT_NEAR(parent.Shift(point), 0.004, 1e-9);
+  EXPECT_NEAR(parent.Stamps(point).commands_s, 0.004, 1e-9);
   FitOptions of_child = options;
   of_child.free = {truth.Index("motor.torque_per_ampere"), truth.Index("hub.inertia"), truth.Index("link.stiffness"),
                    truth.Index("command_delay@motor.delay_s")};

@@ -60,14 +60,15 @@ struct Folder {
   ~Folder() { std::filesystem::remove_all(path); }
 };
 
-Rig LoadCart(double low, double high) {
+Rig LoadCart(double low, double high, bool force) {
   static const Folder owner;
   const auto& folder = owner.path;
   const std::string bounds = "[" + std::to_string(low) + ", " + std::to_string(high) + "]";
   const std::string yaml =
       "schema: gapscope.experiment/1\nmodel: cart.xml\nlog: {time: {column: t, unit: s}}\n"
       "commands: [{actuator: motor, column: u, unit: N}]\n"
-      "measured: [{signal: cart_m, column: x, joint: cart, unit: m}]\n"
+      "measured:\n  - {signal: cart_m, column: x, joint: cart, unit: m}\n" +
+      (force ? "  - {signal: force_n, kind: torque, column: f, actuator: motor, unit: N}\n" : std::string()) +
       "parameters:\n"
       "  cart.gain: {unit: \"1\", nominal: 1.5, bounds: " +
       bounds +

@@ -29,7 +29,8 @@ Rig LoadCubicCable();
 
 // A cart of 2 kg on a spring of 8 N/m, driven by gain * u: q'' = (gain u - 8 q - damping q') / 2, Euler at the sample
 // time. Parameters: cart.gain (1.5, within [low, high]; in units, not logarithmic), cart.damping (0, [0, 4], frozen).
-Rig LoadCart(double low = -10, double high = 10);
+// With `force`, the motor's force is measured too.
+Rig LoadCart(double low = -10, double high = 10, bool force = false);
 inline constexpr double kCartMass_kg = 2, kCartStiffness_n_per_m = 8, kCartStep_s = 0.004;
 // Three such carts side by side, by Runge-Kutta: a, b, c; the second one drags the third along where `linked`.
 // Parameters: CART.gain, CART.damping, free.

@@ -134,7 +134,7 @@ TEST(TuneTest, HeldOutDataIsNeverFitted) {
   const auto b = Tune(*rig.model, SplitData(spoilt, {1}), rig.model->Nominal(), options, pool);
   ASSERT_TRUE(a.ok() && b.ok());
   EXPECT_EQ(a.value().values, b.value().values);
-  EXPECT_EQ(a.value().shift_s, b.value().shift_s);
+  EXPECT_EQ(a.value().stamps.commands_s, b.value().stamps.commands_s);
   EXPECT_EQ(a.value().time_step_s, b.value().time_step_s);
   EXPECT_EQ(a.value().error_train, b.value().error_train);
   EXPECT_GT(b.value().error_held_out, 5 * a.value().error_held_out);

@@ -13,7 +13,7 @@ Effect Effect_torque_constant_droop() {
                .scale = ScaleKind::kOne,
                .neutral = 0,
                .low = 0,
-               .high = 0.8,
+               .high = 2,  // the rig's largest torque is a guess from the nominal model: late, it reaches half of it
                .trials = {0.1, 0.3, 0.5},
                .start = 0.1},
               {.key = "exponent",

@@ -85,7 +85,7 @@ inline constexpr std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"generating_factor", "1", 1, 0, 1e6},
     {"sag_fraction", "1", 0, 0, 100, Combine::kSum, Needs::kActivation},
     {"sag_time_constant_s", "s", 0.3, 0, 1e6, Combine::kSum, Needs::kNothing, "", true},
-    {"droop_at_peak", "1", 0, 0, 1},
+    {"droop_at_peak", "1", 0, 0, 10},
     {"droop_reference_n_m", "N m", 1, 1e-12, 1e9},
     {"droop_exponent", "1", 1, 0.1, 10},
     {"asymmetry", "1", 0, -1, 1},

@@ -118,6 +118,34 @@ Vector3 MountOf(const Model& model, const FreeStart& start, std::span<const doub
   return mount;
 }
 
+// A row of a log, and the values that its sensors are read with.
+struct LogAt {
+  const Model& model;
+  const Recording& recording;
+  std::size_t row;
+  std::span<const double> values;
+};
+
+// Where the log has a body; what it does not measure of it is as it was.
+BodyState Placed(const LogAt& at, const FreeStart& start, BodyState body) {
+  const auto& [model, recording, row, values] = at;
+  const int rotation = FindMeasured(recording, start.rotation), place = FindMeasured(recording, start.position[0]);
+  if (rotation >= 0) {
+    const auto* turns = recording.measured.data() + rotation;
+    FitTurn(recording, turns, row, DelayOf(model.source(turns->index), values), &body);
+    TakeOff(start.mounted * ExpRotation(MountOf(model, start, values)), &body);
+  }
+  for (std::size_t i = 0; i < 3 && place >= 0; ++i) {
+    const auto& measured = recording.measured[static_cast<std::size_t>(FindMeasured(recording, start.position[i]))];
+    const SignalSource& source = model.source(measured.index);
+    const LocalFit fit = FitLater(SampledOf(recording, measured), row, DelayOf(source, values));
+    body.place[i] = fit.value - OffsetOf(source, values);
+    body.velocity[i] = fit.slope;
+  }
+  if (place >= 0) MoveAlong(start, -1, &body);
+  return body;
+}
+
 }  // namespace
 
 int FindMeasured(const Recording& recording, int index) {
@@ -134,24 +162,26 @@ InitialState AtRest(const Model& model) {
 
 void PlaceFreeBodies(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values,
                      std::span<double> qpos, std::span<double> qvel) {
-  for (const FreeStart& start : model.free_starts()) {
-    BodyState body = ReadBody(start, qpos, qvel);
-    const int rotation = FindMeasured(recording, start.rotation), place = FindMeasured(recording, start.position[0]);
-    if (rotation >= 0) {
-      const auto* turns = recording.measured.data() + rotation;
-      FitTurn(recording, turns, row, DelayOf(model.source(turns->index), values), &body);
-      TakeOff(start.mounted * ExpRotation(MountOf(model, start, values)), &body);
-    }
-    for (std::size_t i = 0; i < 3 && place >= 0; ++i) {
-      const auto& measured = recording.measured[static_cast<std::size_t>(FindMeasured(recording, start.position[i]))];
-      const SignalSource& source = model.source(measured.index);
-      const LocalFit fit = FitLater(SampledOf(recording, measured), row, DelayOf(source, values));
-      body.place[i] = fit.value - OffsetOf(source, values);
-      body.velocity[i] = fit.slope;
-    }
-    if (place >= 0) MoveAlong(start, -1, &body);
-    WriteBody(start, body, qpos, qvel);
+  const LogAt at{model, recording, row, values};
+  for (const FreeStart& start : model.free_starts())
+    WriteBody(start, Placed(at, start, ReadBody(start, qpos, qvel)), qpos, qvel);
+}
+
+bool StandHeldBodies(const Model& model, const Recording& recording, std::span<const double> values, mjModel* written) {
+  bool moved = false;
+  for (const FreeStart& start : model.held_starts()) {
+    const double *place = model.compiled().body_pos + 3 * start.body,
+                 *turn = model.compiled().body_quat + 4 * start.body;
+    const BodyState body =
+        Placed({model, recording, 0, values}, start,
+               {.place = {place[0], place[1], place[2]}, .turn = {turn[0], turn[1], turn[2], turn[3]}});
+    double *pos = written->body_pos + 3 * start.body, *quat = written->body_quat + 4 * start.body;
+    moved = moved || !std::ranges::equal(body.place, std::span(pos, 3)) ||
+            !std::ranges::equal(body.turn, std::span(quat, 4));
+    std::ranges::copy(body.place, pos);
+    std::ranges::copy(body.turn, quat);
   }
+  return moved;
 }
 
 void Remount(const Model& model, const FreeStart& start, std::span<const double> values, const Vector3& turn,

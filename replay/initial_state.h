@@ -31,6 +31,10 @@ InitialState InitialStateAt(const Model& model, const Recording& recording, std:
 void PlaceFreeBodies(const Model& model, const Recording& recording, std::size_t row, std::span<const double> values,
                      std::span<double> qpos, std::span<double> qvel);
 
+// Puts the bodies on `hold` whose pose the log measures where its first row has them. False: there are none, or they
+// stand there already. MuJoCo's derived constants are left as they were (mj_setConst).
+bool StandHeldBodies(const Model& model, const Recording& recording, std::span<const double> values, mjModel* written);
+
 // Moves a free body that was placed by its sensors to where it is if its orientation's sensor is turned by `turn` more,
 // in the sensor's own frame. `values`: those that it was placed with.
 void Remount(const Model& model, const FreeStart& start, std::span<const double> values, const Vector3& turn,

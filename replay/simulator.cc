@@ -106,7 +106,10 @@ bool Simulator::SetParameters(std::span<const double> values, const Recording& r
   }
   late_ = std::any_of(delays_s_.begin(), delays_s_.end(), [](double delay_s) { return delay_s != 0; });
   latest_s_ = delays_s_.empty() ? stamps_.commands_s : *std::max_element(delays_s_.begin(), delays_s_.end());
-  return writer_.Write(values, recording.values);
+  const bool moved = StandHeldBodies(model_, recording, values, mujoco_.get());
+  if (!writer_.Write(values, recording.values)) return false;
+  if (moved) mj_setConst(mujoco_.get(), data_.get());
+  return true;
 }
 
 void Simulator::SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s) {

@@ -52,10 +52,13 @@ Status AddActuatorEffects(const TuneFlags& flags, ModelFlags* model) {
   return Ok();
 }
 
-// Indices of the parameters that are tuned.
-Result<std::vector<int>> FreeParameters(const TuneFlags& flags, const Session& session) {
+// Indices of the parameters that are tuned, and of those that are where the logs know them.
+Status ChooseParameters(const TuneFlags& flags, const Session& session, TuneOptions* options) {
   const std::vector<int> usual = session.model->FreeParameters();
-  std::set<int> free(usual.begin(), usual.end());
+  std::set<int> free(usual.begin(), usual.end()), if_known;
+  for (std::size_t i = 0; i < session.model->parameters().size(); ++i) {
+    if (session.model->parameters()[i].if_known) if_known.insert(static_cast<int>(i));
+  }
   for (const auto& name : flags.free) {
     GS_ASSIGN(const int index, session.model->Find(name, "--free"));
     const Parameter& p = session.model->parameters()[index];
@@ -64,12 +67,16 @@ Result<std::vector<int>> FreeParameters(const TuneFlags& flags, const Session& s
                    .where = "--free",
                    .cure = "give it 'bounds' in " + session.experiment.path};
     free.insert(index);
+    if_known.erase(index);
   }
   for (const auto& name : flags.freeze) {
     GS_ASSIGN(const int index, session.model->Find(name, "--freeze"));
     free.erase(index);
+    if_known.erase(index);
   }
-  return std::vector<int>(free.begin(), free.end());
+  options->free.assign(free.begin(), free.end());
+  options->if_known.assign(if_known.begin(), if_known.end());
+  return Ok();
 }
 
 Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
@@ -90,7 +97,7 @@ Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
     if (nuisance == "shift") options.fit_shift = false;
     if (nuisance == "state") options.fit_states = false;
   }
-  GS_ASSIGN(options.free, FreeParameters(flags, session));
+  GS_RETURN_IF_ERROR(ChooseParameters(flags, session, &options));
   if (flags.budget_s > 0)
     options.solve.deadline.time =
         std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<long long>(1e6 * flags.budget_s));

@@ -58,8 +58,9 @@ Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalO
   for (const auto& limit : experiment.limits) {
     if (!limit.actuator.empty() && std::find(names.begin(), names.end(), limit.actuator) == names.end()) {
       return Error{.what = "a limit on an actuator that no command drives",
-                   .where = experiment.path,
-                   .actual = "'" + limit.actuator + "'"};
+                   .where = limit.where,
+                   .actual = "'" + limit.actuator + "'",
+                   .allowed = Join(names)};
     }
   }
   if (options.actuator.empty()) return std::size_t{0};

@@ -121,18 +121,19 @@ Status ReadAddedActuators(const std::vector<YAML::Node>& items, const std::strin
   return Ok();
 }
 
-Status ReadHold(const YAML::Node& node, const std::string& path, Experiment* experiment) {
+Status ReadBodies(const YAML::Node& node, const std::string& path, const char* key, std::vector<NamedBody>* bodies) {
   if (!node.IsDefined()) return Ok();
   const auto fail = [&](const YAML::Node& at, const std::string& what) {
-    return Error{.what = what, .where = YamlPlace(path, at), .allowed = "a list of bodies, as in [pelvis]"};
+    return Error{
+        .what = std::string("'") + key + "' " + what, .where = YamlPlace(path, at), .allowed = "a list of bodies"};
   };
-  if (!node.IsSequence()) return fail(node, "'hold' is not a list of bodies");
+  if (!node.IsSequence()) return fail(node, "is not a list of bodies");
   for (const YAML::Node& item : node) {
-    if (!item.IsScalar() || item.Scalar().empty()) return fail(item, "'hold' names bodies");
-    for (const HeldBody& other : experiment->hold) {
-      if (other.name == item.Scalar()) return fail(item, "the body '" + other.name + "' is held twice");
+    if (!item.IsScalar() || item.Scalar().empty()) return fail(item, "names bodies");
+    for (const NamedBody& other : *bodies) {
+      if (other.name == item.Scalar()) return fail(item, "names the body '" + other.name + "' twice");
     }
-    experiment->hold.push_back({.name = item.Scalar(), .where = YamlPlace(path, item)});
+    bodies->push_back({.name = item.Scalar(), .where = YamlPlace(path, item)});
   }
   return Ok();
 }

@@ -13,8 +13,8 @@ namespace gapscope {
 // Errors: a name twice, a number out of range, gains that the kind does not have.
 Status ReadAddedActuators(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment);
 
-// Reads `hold:`, names of bodies. Errors: not a list of names, a name twice.
-Status ReadHold(const YAML::Node& node, const std::string& path, Experiment* experiment);
+// Reads `hold:` or `inertia:`, names of bodies. Errors: not a list of names, a name twice.
+Status ReadBodies(const YAML::Node& node, const std::string& path, const char* key, std::vector<NamedBody>* bodies);
 
 // The name as expressions can read it: other characters than letters, digits, '_' and '.' become '_'.
 std::string NameForExpressions(std::string name);

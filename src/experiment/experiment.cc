@@ -315,7 +315,8 @@ Status ReadLimits(const std::vector<YAML::Node>& items, const std::string& path,
                 .position = map.Number("angle_rad", 0),
                 .speed = map.Number("speed_rad_per_s", 0),
                 .command = map.Number("command", 0),
-                .torque = map.Number("torque_n_m", 0)};
+                .torque = map.Number("torque_n_m", 0),
+                .where = YamlPlace(path, item)};
     const bool of_joint = !limit.joint.empty();
     if (of_joint != limit.actuator.empty())
       map.Fail(item, {.what = "a limit needs exactly one of 'joint' or 'actuator'"});
@@ -425,7 +426,7 @@ Result<Experiment> LoadExperiment(const std::string& path) {
                                 limits = map.List("limits"), actuators = map.List("actuators");
   const YAML::Node log = map.Child("log"), values = map.Child("values"), measured = map.Child("measured"),
                    parameters = map.Child("parameters"), set = map.Child("set"), without = map.Child("without"),
-                   replay = map.Child("replay"), hold = map.Child("hold");
+                   replay = map.Child("replay"), hold = map.Child("hold"), inertia = map.Child("inertia");
   map.Child("controller");  // LoadController of replay/controller.h reads it
   GS_RETURN_IF_ERROR(map.Finish());
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
@@ -438,7 +439,8 @@ Result<Experiment> LoadExperiment(const std::string& path) {
   GS_RETURN_IF_ERROR(ReadParameters(parameters, path, &experiment));
   if (set.IsDefined()) GS_RETURN_IF_ERROR(ReadFieldSettings(set, path, &experiment.settings));
   GS_RETURN_IF_ERROR(ReadAddedActuators(actuators, path, &experiment));
-  GS_RETURN_IF_ERROR(ReadHold(hold, path, &experiment));
+  GS_RETURN_IF_ERROR(ReadBodies(hold, path, "hold", &experiment.hold));
+  GS_RETURN_IF_ERROR(ReadBodies(inertia, path, "inertia", &experiment.inertia));
   GS_RETURN_IF_ERROR(ReadOwnEffects(candidates, path, &experiment));
   GS_RETURN_IF_ERROR(ReadSwitchedOff(without, path, &experiment));
   GS_RETURN_IF_ERROR(ReadLimits(limits, path, &experiment));

@@ -51,9 +51,9 @@ struct AddedActuator {
   std::string where = "";                                 // file:line:column, for errors
 };
 
-// A body whose free joint is taken away: a robot on a stand, at the pose that the MJCF gives it.
-struct HeldBody {
-  std::string name, where = "";  // of the body, or of its free joint; file:line:column
+// A body that the experiment file names in a list.
+struct NamedBody {
+  std::string name, where = "";  // file:line:column
 };
 
 // kOrientation: one of the three numbers of a sensor's rotation vector (orientation.h).
@@ -110,7 +110,8 @@ struct MeasuredSpec {
 struct Parameter {
   std::string name, unit, doc;
   double nominal = 0, low = 0, high = 0;
-  bool frozen = false;  // not tuned unless freed by name
+  bool frozen = false;    // not tuned unless freed by name
+  bool if_known = false;  // frozen, but tuned where the logs know it
   // Another parameter, a size, with which this one acts linearly though not alone: kAngle: size * (cos, sin) of this;
   // kRest: size * this; kCubic: the third power's coefficient about that rest. Empty: none.
   enum class With { kNone, kAngle, kRest, kCubic } with = With::kNone;
@@ -170,6 +171,7 @@ struct Limit {
   std::string joint, actuator;
   double position = 0, speed = 0;  // of the joint: rad and rad/s (m and m/s)
   double command = 0, torque = 0;  // of the actuator: the command in its SI unit; N m (N) at its joint
+  std::string where = "";          // file:line:column, for errors
 };
 
 enum class ReplayMode { kFreeRun, kWindows, kClosedLoop };
@@ -191,7 +193,8 @@ struct Experiment {
   TimelineOptions timeline;
   std::vector<LogValue> values;
   std::vector<AddedActuator> actuators;
-  std::vector<HeldBody> hold;
+  std::vector<NamedBody> hold;     // their free joint, which may be named too, is taken away: a robot on a stand
+  std::vector<NamedBody> inertia;  // their inertia is tuned as far as logs know it (pseudo_inertia.h)
   std::vector<CommandSpec> commands;
   std::vector<MeasuredSpec> measured;
   std::vector<Parameter> parameters;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "src/core/dense.h"
 #include "src/core/statistics.h"
@@ -144,6 +145,45 @@ std::vector<FlatDirection> FlatDirections(const FitProblem& problem, const Covar
 }
 
 }  // namespace
+
+std::vector<int> KnownOf(const FitProblem& problem, const Linearization& at, const std::vector<int>& asked) {
+  const Prior& prior = problem.prior();
+  const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
+  Eigen::MatrixXd hessian = at.hessian;
+  hessian.diagonal() -= prior.weight - prior.scale * prior.known;
+  hessian = range.asDiagonal() * hessian * range.asDiagonal();
+  const Eigen::VectorXd gradient = range.asDiagonal() * at.gradient;
+  const auto inverse = [](const Eigen::MatrixXd& symmetric) -> Eigen::MatrixXd {
+    const SymmetricEigen eigen(symmetric);
+    const double least = kCovariancePolicy.least_eigenvalue * std::max(eigen.values.maxCoeff(), 1e-300);
+    return eigen.vectors * eigen.values.cwiseMax(least).cwiseInverse().asDiagonal() * eigen.vectors.transpose();
+  };
+  const double left = std::max(0.0, at.reduced_cost - 0.5 * gradient.dot(inverse(hessian) * gradient));
+  const double noise = std::max(2 * left / std::max<double>(1, static_cast<double>(problem.residuals())),
+                                kCovariancePolicy.least_misfit * kCovariancePolicy.least_misfit);
+  std::vector<Eigen::Index> kept(static_cast<std::size_t>(hessian.rows()));
+  std::iota(kept.begin(), kept.end(), Eigen::Index{0});
+  const auto& coordinates = problem.space().coordinates();
+  const auto parameter = [&](Eigen::Index i) {
+    return i < problem.space().size() ? coordinates[static_cast<std::size_t>(i)].parameter : -1;
+  };
+  std::vector<int> known = asked;
+  while (!known.empty()) {
+    const Eigen::MatrixXd covariance = noise * inverse(hessian(kept, kept));
+    auto worst = kept.end();
+    double most = kCovariancePolicy.flat_share * kCovariancePolicy.flat_share;
+    for (auto i = kept.begin(); i != kept.end(); ++i) {
+      const Eigen::Index at_row = i - kept.begin();
+      if (std::ranges::find(known, parameter(*i)) == known.end() || !(covariance(at_row, at_row) >= most)) continue;
+      most = covariance(at_row, at_row);
+      worst = i;
+    }
+    if (worst == kept.end()) break;
+    std::erase(known, parameter(*worst));
+    kept.erase(worst);
+  }
+  return known;
+}
 
 double HalfInterval(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& of_prior, double freedom,
                     const Eigen::VectorXd& direction) {

@@ -43,6 +43,11 @@ struct Uncertainty {
 double HalfInterval(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& of_prior, double freedom,
                     const Eigen::VectorXd& direction);
 
+// Of parameters that are fitted only where the logs know them: those that do, judged by how residuals move at a point
+// that need not be solved. The least known one is left out until the rest is as well known as `identifiable` asks, so
+// that of numbers that act as one combination one stays. The noise is what one step of Gauss and Newton leaves.
+std::vector<int> KnownOf(const FitProblem& problem, const Linearization& at, const std::vector<int>& asked);
+
 // At a solved point. `at`: linearized there by central differences, with blocks. `beside`: a covariance of y that is
 // added, for what the residuals do not say (a model's own error); empty: none.
 Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point, const Linearization& at,

@@ -271,10 +271,12 @@ std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
       return;
     }
     auto& signals = logs[window.log].signals;
-    // Windows share their border row; the later one leaves it to the earlier.
+    // Windows share their border row; the later one leaves it to the earlier. What is not scored is not said: a force
+    // shows what a start's speed is wrong by, which nothing there holds.
+    const std::size_t first = options_.lead_in_s > 0 ? window.first_scored : window.rows.begin == 0 ? 0 : 1;
     for (std::size_t s = 0; s < signals.size(); ++s) {
       const double offset = layout_.Offset(point.y, window.log, s);
-      for (std::size_t r = window.rows.begin == 0 ? 0 : 1; r < window.rows.rows(); ++r)
+      for (std::size_t r = first; r < window.rows.rows(); ++r)
         signals[s].predicted[window.rows.begin + r] = worker.base[r * signals.size() + s] + offset;
     }
   });

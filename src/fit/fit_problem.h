@@ -102,7 +102,7 @@ class FitProblem {
   Work WorkOf(const DifferenceOptions& options, bool base_known) const;
   // Cost of one window with these residuals and this state.
   double WindowCost(std::size_t window, const Eigen::VectorXd& residual, const Eigen::VectorXd& state) const;
-  // Predictions on all rows of the problem's windows, offsets added: one entry per recording.
+  // Predictions on the rows of the problem's windows, offsets added, without lead-ins: one entry per recording.
   std::vector<LogReplay> Predict(const FitPoint& point);
 
   // In all replays from now on.

@@ -54,6 +54,8 @@ inline constexpr LmPolicy kLmPolicy;
 
 struct CovariancePolicy {
   double flat_share = 0.25;  // a direction whose deviation exceeds this share of the range is not known
+  // Of a signal's deviation: with less misfit no model of a rig is left, whatever a linear step promises.
+  double least_misfit = 1e-3;
   double correlated = 0.95;
   double bound_share = 1e-3;        // of the range: nearer is on the bound
   double least_eigenvalue = 1e-13;  // of the largest: below is rounding

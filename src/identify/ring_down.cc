@@ -14,6 +14,7 @@
 #include <functional>
 #include <numbers>
 
+#include "replay/initial_state.h"
 #include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
@@ -379,6 +380,7 @@ Result<double> InertiaAbout(const IdentifyInput& input, int joint) {
   const mjModel& m = input.model.compiled();
   const DataPtr data(mj_makeData(&m));
   const ModelPtr copy(mj_copyModel(nullptr, &m));
+  StandHeldBodies(input.model, input.recordings.front(), input.values, copy.get());
   ParameterWriter writer(input.model, copy.get(), data.get());
   if (!writer.Write(input.values, input.recordings.front().values))
     return Error{.what = "the parameters make no model", .where = input.model.experiment().path};

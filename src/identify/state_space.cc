@@ -16,6 +16,7 @@
 #include <nlopt.hpp>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "replay/initial_state.h"
 #include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/regression.h"
@@ -59,6 +60,7 @@ System Nominal(const IdentifyInput& input, int base, int link) {
   const mjModel& compiled = input.model.compiled();
   const ModelPtr m(mj_copyModel(nullptr, &compiled));
   const DataPtr d(mj_makeData(m.get()));
+  StandHeldBodies(input.model, input.recordings.front(), input.values, m.get());
   ParameterWriter writer(input.model, m.get(), d.get());
   writer.Write(input.values, input.recordings.front().values);
   const int qb = m->jnt_qposadr[base], vb = m->jnt_dofadr[base], ql = m->jnt_qposadr[link], vl = m->jnt_dofadr[link],

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "replay/initial_state.h"
 #include "src/core/statistics.h"
 #include "src/identify/filter.h"
 #include "src/identify/plateaus.h"
@@ -36,8 +37,10 @@ Result<std::vector<double>> DriveTorques(const IdentifyInput& input, int joint, 
   const int dof = base.jnt_dofadr[joint];
   std::vector<double> drive;
   for (const auto& p : plateaus) {
+    const Recording& recording = input.recordings[static_cast<std::size_t>(p.log)];
+    StandHeldBodies(input.model, recording, input.values, m.get());
     ParameterWriter writer(input.model, m.get(), d.get());
-    if (!writer.Write(input.values, input.recordings[static_cast<std::size_t>(p.log)].values))
+    if (!writer.Write(input.values, recording.values))
       return Error{.what = "the parameters make no model", .where = input.model.experiment().path};
     mj_resetData(m.get(), d.get());
     d->qvel[dof] = p.speed;

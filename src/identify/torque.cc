@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "replay/initial_state.h"
 #include "src/core/statistics.h"
 #include "src/model/parameter_writer.h"
 
@@ -59,6 +60,7 @@ Result<BalanceModels> MakeBalanceModels(const IdentifyInput& input, const Record
                        .data = DataPtr(mj_makeData(&base))};
   const int dof = base.jnt_dofadr[joint], body = base.jnt_bodyid[joint];
   for (mjModel* m : {models.whole.get(), models.light.get()}) {
+    StandHeldBodies(input.model, recording, input.values, m);
     ParameterWriter writer(input.model, m, models.data.get());
     if (!writer.Write(input.values, recording.values))
       return Error{.what = "the parameters make no model", .where = input.model.experiment().path};

@@ -64,9 +64,12 @@ mjsElement* FreeJointOf(mjSpec* spec, const std::string& name) {
   return nullptr;
 }
 
-Status Hold(const HeldBody& held, mjSpec* spec) {
+Status Hold(mjSpec* spec, NamedBody& held) {
   mjsElement* joint = FreeJointOf(spec, held.name);
   if (joint) {
+    mjsElement* body = mjs_getParent(joint)->element;
+    if (*mjs_getString(mjs_getName(body)) == 0) mjs_setName(body, held.name.c_str());
+    held.name = mjs_getString(mjs_getName(body));
     mjs_delete(spec, joint);
     return Ok();
   }
@@ -103,15 +106,23 @@ void DeleteKeys(mjSpec* spec) {
 
 }  // namespace
 
-Status AddToSpec(const Experiment& experiment, mjSpec* spec) {
-  for (const AddedActuator& actuator : experiment.actuators) GS_RETURN_IF_ERROR(AddActuator(actuator, spec));
-  for (const HeldBody& held : experiment.hold) GS_RETURN_IF_ERROR(Hold(held, spec));
-  if (!experiment.hold.empty()) DeleteKeys(spec);
-  for (const MeasuredSpec& measured : experiment.measured) GS_RETURN_IF_ERROR(AddPoseSensor(measured, spec));
-  for (const CommandSpec& command : experiment.commands) {
+Status AddToSpec(Experiment* experiment, mjSpec* spec) {
+  for (const AddedActuator& actuator : experiment->actuators) GS_RETURN_IF_ERROR(AddActuator(actuator, spec));
+  for (NamedBody& held : experiment->hold) GS_RETURN_IF_ERROR(Hold(spec, held));
+  if (!experiment->hold.empty()) DeleteKeys(spec);
+  for (const MeasuredSpec& measured : experiment->measured) GS_RETURN_IF_ERROR(AddPoseSensor(measured, spec));
+  for (const CommandSpec& command : experiment->commands) {
     if (mjs_findElement(spec, mjOBJ_ACTUATOR, command.actuator.c_str())) continue;
     return NoSuch("a command drives an actuator that the MJCF lacks", command.actuator, NamesIn(spec, mjOBJ_ACTUATOR),
                   command.where);
+  }
+  for (const Limit& limit : experiment->limits) {
+    const mjtObj type = limit.joint.empty() ? mjOBJ_ACTUATOR : mjOBJ_JOINT;
+    const std::string& name = limit.joint.empty() ? limit.actuator : limit.joint;
+    if (mjs_findElement(spec, type, name.c_str())) continue;
+    return NoSuch(
+        std::string("a limit is of ") + (limit.joint.empty() ? "an actuator" : "a joint") + " that the MJCF lacks",
+        name, NamesIn(spec, type), limit.where);
   }
   return Ok();
 }

@@ -11,7 +11,7 @@ namespace gapscope {
 // Changes a spec that has not been compiled. Errors, with file:line: an actuator whose name the MJCF has already, or on
 // a joint that is not there or no hinge or slide; a body to hold that is not there or has no free joint; a pose of a
 // body or a site that is not there; a command for an actuator that neither has.
-Status AddToSpec(const Experiment& experiment, mjSpec* spec);
+Status AddToSpec(Experiment* experiment, mjSpec* spec);
 
 }  // namespace gapscope
 

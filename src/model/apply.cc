@@ -215,10 +215,11 @@ class Notes {
     // A body's own place, and what its <inertial> holds.
     if (kind == "body") return field == "pos" ? Texts{"pos"} : Texts{};
     if (kind == "inertial")
-      return field == "mass"      ? Texts{"mass"}
-             : field == "inertia" ? Texts{"diaginertia"}
-             : field == "ipos"    ? Texts{"pos"}
-                                  : Texts{};
+      return field == "mass"             ? Texts{"mass"}
+             : field == "inertia"        ? Texts{"diaginertia"}
+             : field == "ipos"           ? Texts{"pos"}
+             : field == "pseudo_inertia" ? Texts{"mass", "pos", "quat", "diaginertia"}
+                                         : Texts{};
     if (field == "damping_quadratic") return {"damping"};
     if (field == "stiffness_cubic") return {"stiffness"};
     if (field == "solref_limit") return {"solreflimit"};

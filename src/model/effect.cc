@@ -6,6 +6,7 @@
 #include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/model/effects/catalogue.h"
+#include "src/model/pseudo_inertia.h"
 
 namespace gapscope {
 
@@ -202,11 +203,11 @@ std::vector<EffectUse> EveryUse(const Rig& rig) {
 Scales ScalesOfBody(const std::string& name, const Rig& rig) {
   const mjModel& m = rig.compiled();
   const int body = mj_name2id(&m, mjOBJ_BODY, name.c_str());
-  const double mass = m.body_mass[body], *inertia = m.body_inertia + 3 * body, *centre = m.body_ipos + 3 * body;
+  const BodyInertia inertia = InertiaOf(m, body);
   Scales scales;
-  if (mass > 0) {
-    scales.mass_kg = mass;
-    scales.length_m = std::hypot(mju_norm3(centre), std::sqrt(std::max({inertia[0], inertia[1], inertia[2]}) / mass));
+  if (inertia.mass_kg > 0) {
+    scales.mass_kg = inertia.mass_kg;
+    scales.length_m = LengthOf(inertia);
   }
   return scales;
 }

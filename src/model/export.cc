@@ -1,6 +1,10 @@
 // What a model becomes outside a replay: an MJCF of its own, and a model to draw.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <iterator>
+#include <limits>
+#include <numeric>
 
 #include "src/core/collect.h"
 #include "src/model/model.h"
@@ -18,6 +22,59 @@ std::vector<std::string> Read(const std::vector<std::string>& expressions, const
                        [&](const std::string& expression) { return Mentions(expression, name); });
   });
   return read;
+}
+
+// Writes an inertia into an element, if it is another one than before; whether it is.
+bool SetInertia(const BodyInertia& before, const BodyInertia& inertia, mjsBody* body) {
+  const auto same = [](const auto& a, const auto& b) {
+    constexpr double kRounding = 1e-12;
+    return std::ranges::equal(a, b, [](double x, double y) { return std::abs(x - y) <= kRounding * std::abs(y); });
+  };
+  if (same(std::array{inertia.mass_kg}, std::array{before.mass_kg}) && same(inertia.centre_m, before.centre_m) &&
+      same(inertia.moments_kg_m2, before.moments_kg_m2) && same(inertia.axes, before.axes))
+    return false;
+  body->mass = inertia.mass_kg;
+  std::ranges::copy(inertia.centre_m, body->ipos);
+  std::ranges::copy(inertia.axes, body->iquat);
+  std::ranges::copy(inertia.moments_kg_m2, body->inertia);
+  std::ranges::fill(body->fullinertia, std::numeric_limits<double>::quiet_NaN());
+  body->ialt.type = mjORIENTATION_QUAT;
+  body->explicitinertial = 1;
+  return true;
+}
+
+// Of a rod or a plate a moment is the sum of the others. It must not be more once they are written with six digits.
+void MakeRoomForDigits(mjsBody* body) {
+  constexpr double kPrinted = 1e-5;
+  double *most = std::ranges::max_element(body->inertia), *least = std::ranges::min_element(body->inertia);
+  const double room = std::accumulate(body->inertia, body->inertia + 3, 0.0) - 2 * *most;
+  *least += std::max(0.0, kPrinted * *most - room);
+}
+
+// Whether a body's frame is its inertia's decides what MuJoCo compiles: inertias that move go into the spec itself.
+// False as ParameterWriter::Write.
+bool BakeInertias(const Model& model, std::span<const double> values, const std::map<std::string, double>& log_values,
+                  Structure* structure, ExportedModel* result) {
+  const ModelPtr written(mj_copyModel(nullptr, &model.compiled()));
+  const DataPtr scratch(mj_makeData(written.get()));
+  const bool good = ParameterWriter(model, written.get(), scratch.get()).Write(values, log_values);
+  std::erase_if(structure->settings, [&](const FieldSetting& setting) {
+    mjsBody* body = BodyOfInertia(*structure->spec, setting.field);
+    if (!body) return false;
+    const int id = mj_name2id(written.get(), mjOBJ_BODY, ElementOfField(setting.field).c_str());
+    const BodyInertia before = InertiaOf(model.compiled(), id), after = InertiaOf(*written, id);
+    if (setting.field.ends_with("/ipos")) {  // mass and moments may be settings too, of a log that is not here
+      BodyInertia moved = before;
+      moved.centre_m = after.centre_m;
+      SetInertia(before, moved, body);
+    } else if (SetInertia(before, after, body)) {
+      MakeRoomForDigits(body);
+    }
+    result->origins.push_back(
+        {setting.field, Read(setting.expressions, Collect(model.parameters(), &Parameter::name))});
+    return true;
+  });
+  return good;
 }
 
 }  // namespace
@@ -54,15 +111,17 @@ Result<ExportedModel> Model::Export(std::span<const double> values, const std::m
       return depends;
     });
   }
+  const std::map<std::string, double> none;
+  const bool good = BakeInertias(*this, values, log_values ? *log_values : none, &structure, &result);
   Model exported;
   exported.rig_ = rig_;
   GS_RETURN_IF_ERROR(exported.Compile(&structure));
   const DataPtr data(mj_makeData(exported.compiled_.get()));
   ParameterWriter writer(exported, exported.compiled_.get(), data.get());
-  if (!writer.Write(values, log_values ? *log_values : std::map<std::string, double>()))
+  if (!writer.Write(values, log_values ? *log_values : none) || (log_values && !good))
     return Error{.what = "the tuned model has a parameter that is not finite", .where = experiment().model_path};
   mj_copyBack(structure.spec.get(), exported.compiled_.get());
-  const std::vector<std::string> names = Collect(exported.parameters_, &Parameter::name);
+  const std::vector<std::string> names = Collect(parameters_, &Parameter::name);
   for (const auto& setting : exported.settings_)
     result.origins.push_back({setting.name, Read(setting.expressions, names)});
   for (const auto& split : structure.splits) {

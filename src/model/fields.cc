@@ -167,7 +167,22 @@ Result<Field> JointField(const mjModel& m, const std::string& name, const std::s
 Result<Field> BodyField(const mjModel& m, const std::string& name, const std::string& field, const std::string& where) {
   GS_ASSIGN(const int id, IdOf(m, mjOBJ_BODY, "body", name, where));
   if (const auto found = BodyFields().find(field); found != BodyFields().end()) return ArrayAt(m, found->second, id);
-  return NoSuch("unknown field of a body", field, Keys(BodyFields()), where);
+  if (field == "pseudo_inertia") {
+    const BodyInertia inertia = InertiaOf(m, id);
+    if (!(inertia.mass_kg > 0)) {
+      return Error{.what = "the body '" + name + "' has no inertia that could be changed",
+                   .where = where,
+                   .actual = "mass 0",
+                   .allowed = "a body with mass",
+                   .cure = "give it an <inertial> in the MJCF, or name the body that carries the mass"};
+    }
+    return Field{.components = std::vector<std::vector<FieldSlot>>(kPseudoInertia.size()),
+                 .derived = true,
+                 .inertial = Field::Inertial{.body = id, .compiled = inertia}};
+  }
+  std::vector<std::string> names = Keys(BodyFields());
+  names.emplace_back("pseudo_inertia");
+  return NoSuch("unknown field of a body", field, names, where);
 }
 
 Result<Field> TendonField(const mjModel& m, const std::string& name, const std::string& field,
@@ -179,6 +194,16 @@ Result<Field> TendonField(const mjModel& m, const std::string& name, const std::
 }
 
 }  // namespace
+
+Status CheckCount(const Field& field, const FieldSetting& setting) {
+  const std::size_t count = field.components.size();
+  if (setting.expressions.size() == count) return Ok();
+  const std::vector<std::string> names(kPseudoInertia.begin(), kPseudoInertia.end());
+  return Error{.what = "the field '" + setting.field + "' has " + std::to_string(count) + " numbers",
+               .where = setting.where,
+               .actual = std::to_string(setting.expressions.size()) + " expressions",
+               .allowed = field.inertial ? "[" + Join(names) + "]" : "a list of " + std::to_string(count)};
+}
 
 std::string ElementOfField(const std::string& field) {
   const std::size_t first = field.find('/'), last = field.rfind('/');

@@ -6,10 +6,12 @@
 #include <mujoco/mujoco.h>
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "src/core/result.h"
+#include "src/model/pseudo_inertia.h"
 
 namespace gapscope {
 
@@ -23,6 +25,12 @@ struct FieldSlot {
 struct Field {
   std::vector<std::vector<FieldSlot>> components;  // every slot of a component receives the component's value
   bool derived = false;                            // MuJoCo's derived constants depend on it (mj_setConst)
+  // Of a body's pseudo-inertia: its numbers have no slots, for they change together what the body was when compiled.
+  struct Inertial {
+    int body = 0;
+    BodyInertia compiled;
+  };
+  std::optional<Inertial> inertial = {};
 };
 
 // Resolves KIND/NAME/FIELD; the fields are listed in docs/experiment.md. `where` is for errors: unknown kind, no such
@@ -30,8 +38,12 @@ struct Field {
 // without such a stage.
 Result<Field> ResolveField(const mjModel& model, const std::string& field, const std::string& where);
 
-// What a component is, by its first slot.
+// An error when the setting has another number of expressions than the field has numbers.
+Status CheckCount(const Field& field, const FieldSetting& setting);
+
+// What a component is, by its first slot; without slots nothing is changed yet.
 inline double ReadComponent(const mjModel& model, const std::vector<FieldSlot>& slots) {
+  if (slots.empty()) return 0;
   const FieldSlot& slot = slots.front();
   const char* base = slot.in_options ? reinterpret_cast<const char*>(&model.opt) : static_cast<char*>(model.buffer);
   return *reinterpret_cast<const mjtNum*>(base + slot.offset) / slot.factor;

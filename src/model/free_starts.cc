@@ -27,13 +27,24 @@ int BodyOf(const mjModel& m, int sensor) {
   }
 }
 
-// The free joint of the body that the sensor's object is fixed to; -1: it has another joint, or none.
-int CarryingJoint(const mjModel& m, int sensor) {
-  const int body = BodyOf(m, sensor);
-  if (body < 0 || m.sensor_refid[sensor] >= 0) return -1;
-  const int carrier = m.body_weldid[body];
-  const bool free = m.body_jntnum[carrier] == 1 && m.jnt_type[m.body_jntadr[carrier]] == mjJNT_FREE;
-  return free ? m.body_jntadr[carrier] : -1;
+// The body of `bodies` that the sensor's object is fixed to; -1: none of them.
+int CarrierOf(const mjModel& m, int sensor, const std::vector<int>& bodies) {
+  if (m.sensor_refid[sensor] >= 0) return -1;
+  for (int body = BodyOf(m, sensor); body > 0; body = m.body_parentid[body]) {
+    if (std::ranges::find(bodies, body) != bodies.end()) return body;
+    if (m.body_jntnum[body] > 0) break;
+  }
+  return -1;
+}
+
+// What may start or stand where a log says.
+std::vector<int> FreeAndHeld(const mjModel& m, const Experiment& experiment) {
+  std::vector<int> bodies;
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_type[j] == mjJNT_FREE) bodies.push_back(m.jnt_bodyid[j]);
+  }
+  for (const NamedBody& held : experiment.hold) bodies.push_back(mj_name2id(&m, mjOBJ_BODY, held.name.c_str()));
+  return bodies;
 }
 
 struct Frame {
@@ -64,11 +75,10 @@ Frame ObjectFrame(const mjModel& m, const mjData& d, int sensor) {
 }
 
 // As the body carries it.
-Frame OnBody(const mjModel& m, int sensor, int joint) {
+Frame OnBody(const mjModel& m, int sensor, int body) {
   const DataPtr d(mj_makeData(&m));
   mj_kinematics(&m, d.get());
   mj_camlight(&m, d.get());
-  const int body = m.jnt_bodyid[joint];
   const Frame carrier = FrameOf(d->xpos + 3 * body, d->xmat + 9 * body), object = ObjectFrame(m, *d, sensor);
   const Quaternion back = Conjugate(carrier.turn);
   const Vector3 apart = {object.place[0] - carrier.place[0], object.place[1] - carrier.place[1],
@@ -96,29 +106,27 @@ std::array<int, 3> ElementsOf(const Experiment& experiment, const std::string& s
 }
 
 // Why a signal that is asked to give a start gives none.
-Error NoStart(const mjModel& m, const MeasuredSpec& spec, int sensor) {
+Error NoStart(const mjModel& m, const std::vector<int>& bodies, const MeasuredSpec& spec, int sensor) {
   const bool pose = SaysPlace(m, spec, sensor) || SaysTurn(m, spec, sensor);
   std::vector<std::string> free;
-  for (int j = 0; j < m.njnt; ++j) {
-    if (m.jnt_type[j] == mjJNT_FREE) free.push_back(NameOf(m, mjOBJ_BODY, m.jnt_bodyid[j]));
-  }
+  for (const int body : bodies) free.push_back(NameOf(m, mjOBJ_BODY, body));
   Error error{.what = "no window can start from the signal '" + spec.signal + "'", .where = spec.where};
   if (!pose) {
     error.actual = "the sensor '" + spec.on + "' measures no pose";
     error.allowed = "'framepos' and 'framequat'";
-  } else if (CarryingJoint(m, sensor) < 0) {
+  } else if (CarrierOf(m, sensor, bodies) < 0) {
     const int body = BodyOf(m, sensor);
     error.actual = m.sensor_refid[sensor] >= 0 ? "the sensor '" + spec.on + "' has a 'reftype'"
                    : body < 0                  ? "the sensor '" + spec.on + "' is on no body"
-                                               : "the body '" + NameOf(m, mjOBJ_BODY, body) + "' has no free joint";
-    error.allowed =
-        free.empty() ? "a body with a free joint; the model has none" : "sensors in the world's frame on " + Join(free);
+                              : "the body '" + NameOf(m, mjOBJ_BODY, body) + "' has no free joint and is not on 'hold'";
+    error.allowed = free.empty() ? "a body with a free joint or on 'hold'; the model has none"
+                                 : "sensors in the world's frame on " + Join(free);
   } else {
     error.actual =
         "not all of x, y, z of '" + spec.on + "' are measured, or another sensor of the body gives its start";
     error.allowed = "'columns_of_elements' with three columns, of one sensor a body";
   }
-  error.cure = "drop 'start: true'; a body that is on 'hold' has no free joint";
+  error.cure = "drop 'start: true'";
   return error;
 }
 
@@ -126,22 +134,26 @@ Error NoStart(const mjModel& m, const MeasuredSpec& spec, int sensor) {
 
 Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& m, const Experiment& experiment) {
   std::vector<FreeStart> starts;
-  for (int joint = 0; joint < m.njnt; ++joint) {
-    if (m.jnt_type[joint] != mjJNT_FREE) continue;
-    FreeStart start{.qpos = m.jnt_qposadr[joint], .dof = m.jnt_dofadr[joint]};
+  const std::vector<int> bodies = FreeAndHeld(m, experiment);
+  for (const int body : bodies) {
+    FreeStart start{.body = body};
+    if (m.body_jntnum[body] == 1 && m.jnt_type[m.body_jntadr[body]] == mjJNT_FREE) {
+      start.qpos = m.jnt_qposadr[m.body_jntadr[body]];
+      start.dof = m.jnt_dofadr[m.body_jntadr[body]];
+    }
     for (std::size_t i = 0; i < experiment.measured.size(); ++i) {
       const MeasuredSpec& spec = experiment.measured[i];
       const int sensor =
           TraitsOf(spec.kind).site == SignalSite::kSensor ? mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()) : -1;
-      if (sensor < 0 || !spec.starts.value_or(true) || CarryingJoint(m, sensor) != joint) continue;
+      if (sensor < 0 || !spec.starts.value_or(true) || CarrierOf(m, sensor, bodies) != body) continue;
       if (SaysPlace(m, spec, sensor) && start.position[0] < 0) {
         const std::array<int, 3> elements = ElementsOf(experiment, spec.on);
         if (std::ranges::find(elements, -1) != elements.end()) continue;
         start.position = elements;
-        start.place = OnBody(m, sensor, joint).place;
+        start.place = OnBody(m, sensor, body).place;
       } else if (SaysTurn(m, spec, sensor) && start.rotation < 0) {
         start.rotation = static_cast<int>(i);
-        start.mounted = OnBody(m, sensor, joint).turn;
+        start.mounted = OnBody(m, sensor, body).turn;
       }
     }
     if (start.position[0] >= 0 || start.rotation >= 0) starts.push_back(start);
@@ -152,7 +164,8 @@ Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& m, const Experiment
       return std::ranges::find(start.position, i) != start.position.end() ||
              (start.rotation >= 0 && i >= start.rotation && i < start.rotation + 3);
     });
-    if (spec.starts.value_or(false) && !used) return NoStart(m, spec, mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()));
+    if (spec.starts.value_or(false) && !used)
+      return NoStart(m, bodies, spec, mj_name2id(&m, mjOBJ_SENSOR, spec.on.c_str()));
   }
   return starts;
 }

@@ -1,5 +1,7 @@
 #include "src/model/model.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 
 #include "src/core/collect.h"
@@ -53,6 +55,7 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step
   GS_RETURN_IF_ERROR(model->Compile(&structure));
   for (const auto& split : model->splits_) model->mirrored_.emplace_back(split.motor_joint, split.load_joint);
+  GS_RETURN_IF_ERROR(model->CheckInertias());
   GS_RETURN_IF_ERROR(model->ResolveNames());
   model->FindDelays(structure);
   model->FindMemories();
@@ -62,6 +65,10 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
 Status Model::Compile(Structure* structure) {
   const std::string& path = experiment().model_path;
   parameters_ = structure->parameters;
+  // MuJoCo's short cuts for a body whose frame is its inertia's hold for as long as it is.
+  for (const FieldSetting& setting : structure->settings) {
+    if (mjsBody* body = BodyOfInertia(*structure->spec, setting.field)) body->simple = 0;
+  }
   try {
     compiled_.reset(mj_compile(structure->spec.get(), nullptr));
     if (!compiled_) {
@@ -78,22 +85,7 @@ Status Model::Compile(Structure* structure) {
   } catch (const std::exception& e) {
     return Error{.what = "MuJoCo refuses the model: " + OneLine(e.what()), .where = path};
   }
-  const std::vector<std::string> names = VariableNames(parameters_, experiment());
-  std::vector<double> ones(names.size(), 1.0);
-  for (auto& setting : structure->settings) {
-    GS_ASSIGN(Field field, ResolveField(*compiled_, setting.field, setting.where));
-    if (field.components.size() != setting.expressions.size()) {
-      return Error{
-          .what = "the field '" + setting.field + "' has " + std::to_string(field.components.size()) + " numbers",
-          .where = setting.where,
-          .actual = std::to_string(setting.expressions.size()) + " expressions"};
-    }
-    for (const auto& text : setting.expressions) {
-      if (const auto parsed = Expression::Parse(text, names, ones.data(), setting.where); !parsed.ok())
-        return parsed.error();
-    }
-    settings_.push_back({setting.field, setting.where, std::move(setting.expressions), std::move(field)});
-  }
+  GS_RETURN_IF_ERROR(ResolveSettings(std::move(structure->settings)));
   const bool written = std::any_of(settings_.begin(), settings_.end(),
                                    [](const auto& setting) { return setting.name.ends_with("/frictionloss"); });
   // A solver without a row costs 10 to 15 % of a step.
@@ -105,9 +97,64 @@ Status Model::Compile(Structure* structure) {
   return Ok();
 }
 
+Status Model::ResolveSettings(std::vector<FieldSetting> settings) {
+  const std::vector<std::string> names = VariableNames(parameters_, experiment());
+  std::vector<double> ones(names.size(), 1.0);
+  for (FieldSetting& setting : settings) {
+    GS_ASSIGN(Field field, ResolveField(*compiled_, setting.field, setting.where));
+    GS_RETURN_IF_ERROR(CheckCount(field, setting));
+    for (const auto& text : setting.expressions) {
+      if (const auto parsed = Expression::Parse(text, names, ones.data(), setting.where); !parsed.ok())
+        return parsed.error();
+    }
+    settings_.push_back({setting.field, setting.where, std::move(setting.expressions), std::move(field)});
+  }
+  for (const Setting& whole : settings_) {
+    if (!whole.field.inertial) continue;
+    const std::string body = "body/" + ElementOfField(whole.name) + "/";
+    for (const Setting& other : settings_) {
+      const bool part = other.name == body + "mass" || other.name == body + "inertia" || other.name == body + "ipos";
+      if (!part && (&other == &whole || other.name != whole.name)) continue;
+      return Error{.what = "the inertia of the body '" + ElementOfField(whole.name) + "' is set twice",
+                   .where = whole.where,
+                   .actual = "'" + other.name + "' too (" + other.where + ")",
+                   .allowed = "its ten numbers, or mass, inertia and ipos",
+                   .cure = "drop one: alpha scales mass and inertia, t1 t2 t3 move the centre of mass"};
+    }
+  }
+  return Ok();
+}
+
+Status Model::CheckInertias() const {
+  std::map<std::string, double> nominal;
+  for (const Parameter& p : parameters_) nominal[p.name] = p.nominal;
+  for (const Setting& setting : settings_) {
+    const bool of_mass = setting.name.ends_with("/mass"), of_inertia = setting.name.ends_with("/inertia");
+    if (!setting.name.starts_with("body/") || (!of_mass && !of_inertia)) continue;
+    std::vector<double> values;
+    for (const std::string& text : setting.expressions) {
+      const auto value = EvaluateOnce(text, nominal, setting.where);
+      if (value.ok()) values.push_back(value.value());  // else a log's numbers decide
+    }
+    if (values.size() != setting.expressions.size()) continue;
+    const std::string body = ElementOfField(setting.name);
+    const int id = mj_name2id(compiled_.get(), mjOBJ_BODY, body.c_str());
+    const bool has_inertia = mju_norm3(compiled_->body_inertia + 3 * id) > 0;
+    const bool physical = of_inertia ? IsInertia(values.data()) : values[0] > 0 || (values[0] == 0 && !has_inertia);
+    if (physical) continue;
+    return Error{.what = std::string("the ") + (of_mass ? "mass" : "inertia") + " of the body '" + body +
+                         "' is not physical at the parameters' nominal values",
+                 .where = setting.where,
+                 .actual = Join(Collect(values, [](double value) { return fmt::format("{:.6g}", value); })),
+                 .allowed = of_mass ? "above 0, kg" : "three moments above 0, none larger than the other two together",
+                 .cure = "correct the expression or a nominal value; body/" + body +
+                         "/pseudo_inertia is physical whatever its numbers"};
+  }
+  return Ok();
+}
+
 Status Model::ResolveNames() {
   const mjModel& m = *compiled_;
-  const std::string& file = experiment().path;
   for (const auto& command : experiment().commands) {
     const int id = mj_name2id(&m, mjOBJ_ACTUATOR, command.actuator.c_str());
     GS_CHECK(id >= 0 && "an actuator of the rig");  // AddToSpec
@@ -128,7 +175,7 @@ Status Model::ResolveNames() {
       source.joint = mj_name2id(&m, mjOBJ_JOINT, measured.on.c_str());
       if (source.joint < 0)
         return NoSuch("a measured signal is of a joint that the MJCF lacks", measured.on, ElementNames(m, mjOBJ_JOINT),
-                      file);
+                      measured.where);
     }
     if (source.joint >= 0) {
       if (m.jnt_type[source.joint] != mjJNT_HINGE && m.jnt_type[source.joint] != mjJNT_SLIDE) {
@@ -150,7 +197,8 @@ Status Model::ResolveNames() {
     }
     sources_.push_back(source);
   }
-  GS_ASSIGN(free_starts_, FindFreeStarts(m, experiment()));
+  GS_ASSIGN(const std::vector<FreeStart> starts, FindFreeStarts(m, experiment()));
+  for (const FreeStart& start : starts) (start.qpos >= 0 ? free_starts_ : held_starts_).push_back(start);
   return Ok();
 }
 

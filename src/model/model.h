@@ -81,6 +81,8 @@ class Model {
   const std::vector<std::pair<int, int>>& mirrored_joints() const { return mirrored_; }
   // Bodies that start where a measured pose is.
   const std::vector<FreeStart>& free_starts() const { return free_starts_; }
+  // Bodies on `hold` that stand where a measured pose is.
+  const std::vector<FreeStart>& held_starts() const { return held_starts_; }
   // Whether quick steps (StepKind) are another thing than its own: two bodies on a stiff link always take their own.
   bool HasQuickSteps() const { return compiled().opt.integrator == mjINT_RK4 && mirrored_.empty(); }
 
@@ -113,6 +115,8 @@ class Model {
   Model() = default;
   // Compiles a finished structure and resolves its settings in the result; they leave the structure.
   Status Compile(Structure* structure);
+  Status ResolveSettings(std::vector<FieldSetting> settings);
+  Status CheckInertias() const;
   Status ResolveNames();
   void FindDelays(const Structure& structure);
   void FindMemories();
@@ -126,7 +130,7 @@ class Model {
   std::vector<int> command_ctrl_;
   std::vector<SignalSource> sources_;
   std::vector<std::pair<int, int>> mirrored_;
-  std::vector<FreeStart> free_starts_;
+  std::vector<FreeStart> free_starts_, held_starts_;
   std::vector<int> command_delays_;
   std::vector<int> memories_;
 };

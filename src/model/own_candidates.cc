@@ -147,12 +147,7 @@ Status CheckFields(const OwnEffect& own, OwnProbe& probe, const Rig& rig) {
   auto at = neutral.begin();
   for (const FieldSetting& setting : own.settings) {
     GS_ASSIGN(const Field field, ResolveField(rig.compiled(), setting.field, setting.where));
-    if (field.components.size() != setting.expressions.size()) {
-      return Error{
-          .what = "the field '" + setting.field + "' has " + std::to_string(field.components.size()) + " numbers",
-          .where = setting.where,
-          .actual = std::to_string(setting.expressions.size()) + " expressions"};
-    }
+    GS_RETURN_IF_ERROR(CheckCount(field, setting));
     GS_ASSIGN(const Values base, BaseValues(setting, rig));
     for (std::size_t i = 0; i < setting.expressions.size(); ++i, ++at) {
       constexpr double kPrinted = 1e-4;  // of an MJCF with rounded numbers

@@ -56,19 +56,24 @@ bool ParameterWriter::Write(std::span<const double> values, const std::map<std::
   }
   bool good = true, derived = !splits_.empty();
   for (const auto& bound : bound_) {
+    PseudoInertia change = {};
     for (std::size_t i = 0; i < bound.expressions.size(); ++i) {
       const double value = bound.expressions[i].Evaluate();
-      if (std::isfinite(value)) {
-        WriteComponent(*target_, bound.field->components[i], value);
-      } else {
+      if (!std::isfinite(value)) {
         good = false;
+      } else if (bound.field->inertial) {
+        change[i] = value;
+      } else {
+        WriteComponent(*target_, bound.field->components[i], value);
       }
     }
+    if (const auto& inertial = bound.field->inertial)
+      WriteInertia(Changed(inertial->compiled, change), inertial->body, target_);
     derived = derived || bound.field->derived;
   }
   for (int body = 1; body < target_->nbody; ++body) {
-    good = good && target_->body_mass[body] >= 0;
-    for (int i = 0; i < 3; ++i) good = good && target_->body_inertia[3 * body + i] >= 0;
+    good = good && std::isfinite(target_->body_mass[body]) && target_->body_mass[body] >= 0;
+    good = good && IsInertia(target_->body_inertia + 3 * body);
   }
   if (!good) return false;
   WriteSplits();
@@ -83,7 +88,8 @@ void ParameterWriter::WriteSplits() {
     const bool written = std::any_of(bound_.begin(), bound_.end(), [&](const Bound& b) {
       const auto offset =
           reinterpret_cast<const char*>(target_->dof_armature + load) - static_cast<const char*>(target_->buffer);
-      return b.field->components[0][0].offset == offset && !b.field->components[0][0].in_options;
+      const std::vector<FieldSlot>& slots = b.field->components[0];
+      return !slots.empty() && slots[0].offset == offset && !slots[0].in_options;
     });
     if (!written) target_->dof_armature[load] = model_.compiled_->dof_armature[load];
     const double moved = split.share.Evaluate() * DrivenInertia(*target_, split.load_joint);

@@ -24,8 +24,8 @@ class ParameterWriter {
   ParameterWriter(const ParameterWriter&) = delete;
   ParameterWriter& operator=(const ParameterWriter&) = delete;
 
-  // Writes all settings. Returns false, having written what it could, when an expression is not finite or a mass or
-  // inertia is negative.
+  // Writes all settings. Returns false, having written what it could, when an expression is not finite, a mass negative
+  // or an inertia one that no mass has (IsInertia).
   bool Write(std::span<const double> values, const std::map<std::string, double>& log_values);
 
  private:

@@ -4,7 +4,9 @@
 
 #include "src/core/collect.h"
 #include "src/model/add_actuators.h"
+#include "src/model/element_names.h"
 #include "src/model/own_candidates.h"
+#include "src/model/pseudo_inertia.h"
 
 namespace gapscope {
 namespace {
@@ -30,7 +32,7 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
   char message[1024] = "";
   const SpecPtr read(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
   if (!read) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
-  GS_RETURN_IF_ERROR(AddToSpec(experiment, read.get()));
+  GS_RETURN_IF_ERROR(AddToSpec(&rig->experiment_, read.get()));
   rig->spec_.reset(mj_copySpec(read.get()));
   try {
     // What was read is compiled, not a copy: copying leaves out what refers to nothing, which is an error here.
@@ -42,6 +44,7 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
     return Error{.what = "the MJCF does not compile: " + OneLine(mjs_getError(read.get())),
                  .where = experiment.model_path};
   }
+  GS_RETURN_IF_ERROR(AddInertiaParameters(*rig->compiled_, &rig->experiment_));
   rig->effects_ = Catalogue();
   GS_ASSIGN(CandidateEffects own, OwnCandidates(*rig));
   std::move(own.effects.begin(), own.effects.end(), std::back_inserter(rig->effects_));

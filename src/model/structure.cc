@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "src/core/names.h"
+#include "src/model/fields.h"
 #include "src/plugins/friction/friction.h"
 #include "src/plugins/motor/motor_config.h"
 #include "src/plugins/spring/spring.h"
@@ -12,6 +13,11 @@
 namespace gapscope {
 
 std::string ExactText(double value) { return fmt::format("{:.17g}", value); }
+
+mjsBody* BodyOfInertia(mjSpec& spec, const std::string& field) {
+  const bool moves = field.starts_with("body/") && (field.ends_with("/ipos") || field.ends_with("/pseudo_inertia"));
+  return moves ? mjs_findBody(&spec, ElementOfField(field).c_str()) : nullptr;
+}
 
 void Structure::AddTerm(std::span<const plugins::ParameterSpec> specs, Terms* terms, const std::string& key,
                         const std::string& expression) {

@@ -24,6 +24,9 @@ inline std::string OwnInstance(const std::string& joint, const std::string& cand
   return joint + ".own." + candidate;
 }
 
+// The body whose inertial frame a field moves; null: the field is another.
+mjsBody* BodyOfInertia(mjSpec& spec, const std::string& field);
+
 class Structure {
  public:
   // key of a plugin's live parameter -> expression of parameters

@@ -47,6 +47,7 @@ void ReadKnowledge(const ordered_json& json, TuneRun* run) {
                                .at_bound = p.at("at_bound"),
                                .identifiable = p.at("identifiable")});
   }
+  run->left_frozen = json.value("left_frozen", std::vector<std::string>{});
   for (const auto& entry : json.at("flat")) {
     TuneRun::Flat flat{.direction = {}, .text = entry.at("text")};
     for (const auto& [name, weight] : entry.at("direction").items())

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace gapscope {
@@ -41,6 +42,19 @@ std::vector<std::string> FlatTexts(const TuneRun& run) {
   return texts;
 }
 
+// By what stands before the last dot of a name: "link: d2, t1".
+std::string LeftFrozenText(const TuneRun& run) {
+  std::map<std::string, std::string> bodies;
+  for (const std::string& name : run.left_frozen) {
+    const std::size_t dot = name.rfind('.');
+    std::string& keys = bodies[name.substr(0, dot)];
+    keys += (keys.empty() ? "" : ", ") + name.substr(dot + 1);
+  }
+  std::string text;
+  for (const auto& [body, keys] : bodies) text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", body, keys);
+  return "frozen, for these logs do not know them: " + text;
+}
+
 std::string CorrelatedText(const TuneRun::Correlated& pair) {
   return fmt::format("{} and {} go together (correlation {:.3f})", pair.a, pair.b, pair.correlation);
 }
@@ -54,6 +68,7 @@ std::string ParameterLines(const TuneRun& run, const Console& console) {
                         p.identifiable ? fmt::format("{:.4g} .. {:.4g}", p.low, p.high) : "not known", p.unit,
                         p.at_bound ? console.Warn("  at its bound") : "");
   }
+  if (!run.left_frozen.empty()) text += LeftFrozenText(run) + "\n";
   for (const auto& flat : FlatTexts(run)) text += "flat: " + flat + "\n";
   for (const auto& pair : run.correlated) text += CorrelatedText(pair) + "\n";
   return text;
@@ -101,6 +116,7 @@ std::string FlatText(const FlatDirection& flat, const Model& model) {
 
 std::vector<std::string> ParameterNotes(const TuneRun& run) {
   std::vector<std::string> notes = FlatTexts(run);
+  if (!run.left_frozen.empty()) notes.insert(notes.begin(), LeftFrozenText(run));
   for (const auto& pair : run.correlated) notes.push_back(CorrelatedText(pair));
   return notes;
 }
@@ -131,6 +147,7 @@ TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t 
     const gapscope::Parameter& p = model.parameters()[t.index];
     run.parameters.push_back({p.name, p.unit, p.nominal, t.value, t.low, t.high, t.at_bound, t.identifiable});
   }
+  for (const int index : summary.left_frozen) run.left_frozen.push_back(name(index));
   for (const auto& flat : summary.flat) {
     TuneRun::Flat entry{.direction = {}, .text = FlatText(flat, model)};
     for (const auto& [index, weight] : flat.parts) entry.direction.emplace_back(name(index), weight);
@@ -171,6 +188,7 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
     json["solve_s"] = run.solve_s;
   }
   json["parameters"] = JsonParameters(run);
+  json["left_frozen"] = run.left_frozen;
   json["flat"] = ordered_json::array();
   for (const auto& flat : run.flat) {
     ordered_json parts = ordered_json::object();

@@ -44,6 +44,7 @@ struct TuneRun {
   std::size_t evaluations = 0, replays = 0;
   double wall_s = 0, solve_s = 0;  // all; the optimiser alone
   std::vector<Parameter> parameters;
+  std::vector<std::string> left_frozen;  // parameters that would be tuned if the logs knew them
   std::vector<Flat> flat;
   std::vector<Correlated> correlated;
   double error_nominal = 0, error_train = 0, error_held_out = 0;

@@ -54,7 +54,11 @@ std::uint64_t JobKey(const Model& model, const DataSplit& data, const std::vecto
                             static_cast<double>(solve.max_iterations),
                             static_cast<double>(solve.seed)};
   hasher.Text(solve.optimizer).Numbers(numbers);
-  return hasher.Bytes(options.free.data(), sizeof(int) * options.free.size()).value();
+  for (const std::vector<int>* indices : {&options.free, &options.if_known}) {
+    hasher.Number(static_cast<double>(indices->size()));
+    hasher.Bytes(indices->data(), sizeof(int) * indices->size());
+  }
+  return hasher.value();
 }
 
 // A random start inside the middle of the bounds.
@@ -172,6 +176,29 @@ Found FitFrom(const Fit& fit, const std::optional<std::vector<double>>& random) 
   return found;
 }
 
+// The parameters that are fitted: what is free, and of `options.if_known` what the logs know beside it.
+std::vector<int> ChooseFree(const Fit& fit, TuneSummary* summary) {
+  const std::vector<int>& asked = fit.options.if_known;
+  std::vector<int> all = fit.free;
+  if (asked.empty()) return all;
+  all.insert(all.end(), asked.begin(), asked.end());
+  Stage stage(fit.model, fit.data, MakeFitOptions(fit.options, all, ObjectiveKind::kWindows), fit.start, fit.pool,
+              nullptr);
+  Work work;
+  const Solved at = SolveStatesAndWeigh(stage.problem, stage.objective(), stage.problem.Start(), &work);
+  const Linearization linear = stage.objective().Linearize(
+      at.point, {.step = fit.options.solve.fine_step, .columns = DifferenceOptions::Columns::kCentral});
+  work += linear.work;
+  summary->evaluations += work.evaluations, summary->replays += work.replays;
+  const std::vector<int> known = linear.valid ? KnownOf(stage.problem, linear, asked) : std::vector<int>{};
+  for (const int index : asked) {
+    if (std::ranges::find(known, index) != known.end()) continue;
+    summary->left_frozen.push_back(index);
+    std::erase(all, index);
+  }
+  return all;
+}
+
 void Score(const Model& model, const DataSplit& data, const TuneOptions& options, ThreadPool& pool,
            TuneSummary* summary) {
   const ReplayMode mode = model.experiment().replay.mode;
@@ -234,8 +261,8 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - when).count();
   };
   TuneOptions options = asked;
-  const std::vector<int> free = options.free.empty() ? model.FreeParameters() : options.free;
-  if (free.empty())
+  std::vector<int> free = options.free.empty() ? model.FreeParameters() : options.free;
+  if (free.empty() && options.if_known.empty())
     return Error{.what = "no parameter is free", .where = model.experiment().path, .cure = "use --free NAME"};
   TuneSummary summary{.optimizer = options.solve.optimizer, .values = start, .split = data.how};
   if (options.time_step_s <= 0) {
@@ -248,14 +275,19 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     GS_ASSIGN(journal, Journal::Open(options.journal, JobKey(model, data, start, options), options.resume));
   }
   const auto solve_begin = std::chrono::steady_clock::now();
-  const Found best = FitFromAll({.model = model,
-                                 .data = data,
-                                 .start = start,
-                                 .options = options,
-                                 .free = free,
-                                 .pool = pool,
-                                 .journal = journal.get()},
-                                &summary);
+  const Fit fit{.model = model,
+                .data = data,
+                .start = start,
+                .options = options,
+                .free = free,
+                .pool = pool,
+                .journal = journal.get()};
+  free = ChooseFree(fit, &summary);
+  if (free.empty())
+    return Error{.what = "these logs know none of the numbers that may be tuned",
+                 .where = model.experiment().path,
+                 .cure = "use --free NAME, or logs that move the bodies under 'inertia'"};
+  const Found best = FitFromAll(fit, &summary);
   if (best.result.termination == Termination::kNotSimulated) {
     return Error{.what = "the model cannot be simulated at the start of the fit",
                  .where = model.experiment().path,

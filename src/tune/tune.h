@@ -14,7 +14,8 @@
 namespace gapscope {
 
 struct TuneOptions {
-  std::vector<int> free;  // parameters; empty: all that are not frozen
+  std::vector<int> free;      // parameters; empty: all that are not frozen
+  std::vector<int> if_known;  // beside them those of these that the logs know (KnownOf)
   ObjectiveKind objective = ObjectiveKind::kBoth;
   double window_s = 1.0;
   bool fit_offsets = true, fit_shift = true, fit_states = true;
@@ -38,6 +39,7 @@ struct TuneSummary {
   StampShift stamps;
   std::vector<double> values;  // all parameters of the model
   std::vector<TunedParameter> tuned;
+  std::vector<int> left_frozen;  // of TuneOptions::if_known
   std::vector<FlatDirection> flat;
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above 0.95
   std::vector<LogReplay> train, held_out;                // at the tuned values

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 
+#include "replay/initial_state.h"
 #include "src/compare/score.h"
 #include "src/core/statistics.h"
 #include "src/video/cairo_library.h"
@@ -34,6 +35,7 @@ Result<Actor> Rehearse(const Recording& recording, const VideoModel& model, cons
   ReplayResult result = Replay(*model.model, {recording}, replay, pool);
   Actor actor{.drawn = nullptr, .predicted = {}, .measured = {}, .replay = std::move(result.logs.front()), .error = 0};
   GS_ASSIGN(actor.drawn, model.model->CompileForDrawing(model.values, recording.values));
+  StandHeldBodies(*model.model, recording, model.values, actor.drawn.get());
   actor.predicted = PredictedPoses(*model.model, model.values, recording, actor.replay);
   actor.measured = MeasuredPoses(*model.model, model.values, recording, actor.predicted);
   std::vector<SignalScore> scores;

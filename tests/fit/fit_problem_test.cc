@@ -377,6 +377,20 @@ TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
   EXPECT_LT(CostOf(from_nothing, point), 1e-4 * before);
 }
 
+// A held-out error is of the rows that a fit looks at: what a window's start is wrong by shows in forces before them.
+TEST(FitProblemTest, LeadInsAreNotPredicted) {
+  const Rig rig = LoadCart();
+  const std::vector<Recording> logs = {CartLog(rig, 400, 0)};
+  ThreadPool pool(1);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, ObjectiveKind::kWindows), rig.model->Nominal(), pool);
+  const std::vector<double> predicted = problem.Predict(problem.Start()).front().signals.front().predicted;
+  for (const FitWindow& window : problem.windows()) {
+    EXPECT_GT(window.first_scored, 3u);
+    for (std::size_t r = 1; r < window.rows.rows(); ++r)
+      EXPECT_EQ(std::isfinite(predicted[window.rows.begin + r]), r >= window.first_scored) << window.rows.begin + r;
+  }
+}
+
 // A force jumps with its command, and a log reads it at a stamp just before or just after: here before at every stamp,
 // after at every stamp, and before at every other one. What is made of the stamps must not go into the gain.
 TEST(FitShiftTest, ForcesReadOnEitherSideOfTheirCommandLeaveTheGainAlone) {

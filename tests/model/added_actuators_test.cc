@@ -203,7 +203,7 @@ TEST_F(AddedActuatorsTest, WhatDoesNotFitIsRefusedWithItsLine) {
       {"actuator: wrist", "actuator: rist", "did you mean 'wrist'?"},
       {"hold: [trunk]", "hold: [upper]", "experiment.yaml:2:8: the body 'upper' is held, but has no free joint"},
       {"hold: [trunk]", "hold: [trunc]", "experiment.yaml:2:8: a body is held that the MJCF lacks"},
-      {"hold: [trunk]", "hold: [trunk, trunk]", "experiment.yaml:2:15: the body 'trunk' is held twice"},
+      {"hold: [trunk]", "hold: [trunk, trunk]", "experiment.yaml:2:15: 'hold' names the body 'trunk' twice"},
       {"hold: [trunk]", "hold: trunk", "experiment.yaml:2:7: 'hold' is not a list of bodies"},
   };
   for (const auto& [from, to, says] : cases) {

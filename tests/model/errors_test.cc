@@ -169,7 +169,7 @@ TEST(ParameterWriterTest, RefusesWhatIsNotFiniteOrNotPhysical) {
   const Scratch scratch;
   const std::string yaml = std::string(kYaml) +
                            "  body/bar/mass: 1 - hinge.damping\n  body/bar/ipos: [\"1 / (hinge.damping - 0.5)\", "
-                           "\"0\", \"0\"]\n  body/bar/inertia: [\"0.01\", \"0.9 - hinge.damping\", \"0.01\"]\n";
+                           "\"0\", \"0\"]\n  body/bar/inertia: [\"0.5\", \"0.9 - hinge.damping\", \"0.5\"]\n";
   const auto model = MakeModel(MakeExperiment(scratch, kRobot, yaml));
   ASSERT_NE(model, nullptr);
   const ModelPtr copy(mj_copyModel(nullptr, &model->compiled()));
@@ -183,6 +183,7 @@ TEST(ParameterWriterTest, RefusesWhatIsNotFiniteOrNotPhysical) {
   EXPECT_FALSE(writer.Write(std::vector<double>{INFINITY}, {}));
   EXPECT_FALSE(writer.Write(std::vector<double>{1.5}, {})) << "a negative mass";
   EXPECT_FALSE(writer.Write(std::vector<double>{0.95}, {})) << "a negative inertia";
+  EXPECT_FALSE(writer.Write(std::vector<double>{-0.2}, {})) << "a moment above the sum of the others";
   EXPECT_TRUE(writer.Write(std::vector<double>{0.1}, {}));
 }
 

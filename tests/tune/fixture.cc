@@ -80,6 +80,23 @@ Rig LoadCart(double low, double high, bool force) {
   return Build((folder / "experiment.yaml").string(), {});
 }
 
+Rig LoadLink() {
+  static const Folder owner;
+  WriteFile((owner.path / "link.xml").string(),
+            "<mujoco><option timestep='0.002' integrator='RK4'><flag contact='disable'/></option><worldbody>"
+            "<body name='link'><joint name='hinge' axis='0 1 0' damping='0.05'/><inertial pos='0.02 0 -0.2' mass='1' "
+            "diaginertia='0.02 0.021 0.002'/></body></worldbody>"
+            "<actuator><motor name='motor' joint='hinge'/></actuator></mujoco>")
+      .value();
+  const std::string path = (owner.path / "experiment.yaml").string();
+  WriteFile(path,
+            "model: link.xml\nlog: {time: {column: t, unit: s}}\ninertia: [link]\n"
+            "commands: [{actuator: motor, column: u, unit: N m}]\n"
+            "measured: [{signal: angle, column: q, joint: hinge, unit: rad}]\n")
+      .value();
+  return Build(path, {});
+}
+
 Rig LoadThreeCarts(bool linked) {
   static const Folder owner;
   const std::string name = linked ? "linked" : "apart";

@@ -32,6 +32,8 @@ Rig LoadCubicCable();
 // With `force`, the motor's force is measured too.
 Rig LoadCart(double low = -10, double high = 10, bool force = false);
 inline constexpr double kCartMass_kg = 2, kCartStiffness_n_per_m = 8, kCartStep_s = 0.004;
+// A link on a hinge about its y axis, in gravity, whose inertia is under `inertia:`: link.alpha ... link.t3.
+Rig LoadLink();
 // Three such carts side by side, by Runge-Kutta: a, b, c; the second one drags the third along where `linked`.
 // Parameters: CART.gain, CART.damping, free.
 Rig LoadThreeCarts(bool linked);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "src/model/parameter_writer.h"
 #include "src/report/tune_report.h"
 #include "tests/tune/fixture.h"
 
@@ -209,6 +210,79 @@ TEST(TuneTest, NothingFreeIsAnError) {
                           model->Nominal(), {}, pool);
   ASSERT_FALSE(found.ok());
   EXPECT_NE(found.error().Text().find("--free"), std::string::npos);
+}
+
+// What a hinge about y sees of a body: m x, m z and the inertia about the axis.
+std::array<double, 3> SeenByHinge(const Rig& rig, const std::vector<double>& values) {
+  const ModelPtr written(mj_copyModel(nullptr, &rig.model->compiled()));
+  const DataPtr data(mj_makeData(written.get()));
+  EXPECT_TRUE(ParameterWriter(*rig.model, written.get(), data.get()).Write(values, {}));
+  const BodyInertia b = InertiaOf(*written, 1);
+  return {b.mass_kg * b.centre_m[0], b.mass_kg * b.centre_m[2], DrivenInertia(*written, 0)};
+}
+
+class TenNumbersTest : public ::testing::Test {
+ protected:
+  TenNumbersTest() {
+    for (int k = 0; k < 3; ++k) {
+      const auto command = [k](double t) { return 1.5 * std::sin((3 + k) * t + 1.2 * t * t); };
+      logs_.push_back(MakeLog(rig_, truth_, command, 4, 0.004, 1e-3, static_cast<unsigned long>(k + 1)));
+      logs_.back().log_path = "log" + std::to_string(k);
+    }
+  }
+  TuneSummary Tuned(bool fit_offsets) {
+    TuneOptions options{.fit_offsets = fit_offsets, .starts = 1};
+    for (int i = 0; i < 10; ++i) options.if_known.push_back(i);
+    ThreadPool pool(2);
+    return Tune(*rig_.model, SplitData(logs_, {}), rig_.model->Nominal(), options, pool).value();
+  }
+  // `known` of ten numbers are tuned, the rest stays and is named.
+  void ExpectKnown(const TuneSummary& summary, std::size_t known) {
+    EXPECT_EQ(summary.tuned.size(), known);
+    EXPECT_EQ(summary.left_frozen.size(), 10 - known);
+    for (const TunedParameter& t : summary.tuned) EXPECT_TRUE(t.identifiable) << t.index;
+    for (const int index : summary.left_frozen) EXPECT_EQ(summary.values[static_cast<std::size_t>(index)], 0);
+    for (const char* unseen : {"link.d2", "link.s12", "link.s23", "link.t2"})
+      EXPECT_NE(std::ranges::find(summary.left_frozen, rig_.Index(unseen)), summary.left_frozen.end()) << unseen;
+    EXPECT_NE(ToTable(TuneRunOf(summary, *rig_.model, 0)).find("frozen, for these logs do not know them: link: "),
+              std::string::npos);
+  }
+  static constexpr double kShare = 0.01;  // of the truth, at a noise of 1 mrad
+  const Rig rig_ = LoadLink();
+  const std::vector<double> truth_ =
+      rig_.Values({{"link.alpha", 0.12}, {"link.d3", -0.1}, {"link.t1", 0.03}, {"link.t3", -0.02}, {"link.s12", 0.2}});
+  std::vector<Recording> logs_;
+};
+
+TEST_F(TenNumbersTest, ThreeSayAllThatAHingeSees) {
+  const TuneSummary summary = Tuned(/*fit_offsets=*/false);
+  ExpectKnown(summary, 3);
+  const auto wanted = SeenByHinge(rig_, truth_), found = SeenByHinge(rig_, summary.values),
+             before = SeenByHinge(rig_, rig_.model->Nominal());
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(found[i], wanted[i], kShare * std::abs(wanted[i])) << i;
+    EXPECT_GT(std::abs(before[i] - wanted[i]), 5 * kShare * std::abs(wanted[i])) << i;
+  }
+}
+
+TEST_F(TenNumbersTest, ASensorsUnknownZeroHidesTheDirectionOfTheCentre) {
+  const TuneSummary summary = Tuned(/*fit_offsets=*/true);
+  ExpectKnown(summary, 2);
+  const auto [x, z, inertia] = SeenByHinge(rig_, truth_);
+  const auto [found_x, found_z, found_inertia] = SeenByHinge(rig_, summary.values);
+  EXPECT_NEAR(std::hypot(found_x, found_z), std::hypot(x, z), kShare * std::hypot(x, z));
+  EXPECT_NEAR(found_inertia, inertia, kShare * inertia);
+}
+
+TEST(TuneTest, NothingKnownIsSaid) {
+  const Rig rig = LoadLink();
+  TuneOptions options;
+  options.if_known = {rig.Index("link.t2"), rig.Index("link.s23")};
+  ThreadPool pool(1);
+  const Recording log = MakeLog(rig, rig.model->Nominal(), [](double t) { return std::sin(4 * t); }, 2, 0.004, 1e-3, 1);
+  const auto tuned = Tune(*rig.model, SplitData({log}, {}), rig.model->Nominal(), options, pool);
+  ASSERT_FALSE(tuned.ok());
+  EXPECT_NE(tuned.error().Text().find("these logs know none"), std::string::npos) << tuned.error().Text();
 }
 
 }  // namespace

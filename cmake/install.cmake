@@ -15,14 +15,14 @@ set(_package ${CMAKE_INSTALL_LIBDIR}/cmake/gapscope)
 
 file(RELATIVE_PATH _bin_to_libraries ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_PREFIX}/${_libraries})
 set_target_properties(gapscope PROPERTIES INSTALL_RPATH "$ORIGIN/${_bin_to_libraries}")
-install(TARGETS gapscope RUNTIME)
+install(TARGETS gapscope RUNTIME COMPONENT program)
 
 # Every folder's library that this build has, with its headers.
 foreach(name core log experiment model replay compare fit tune identify design diagnose video report plugins warnings)
   if(TARGET gapscope_${name})
     set_target_properties(gapscope_${name} PROPERTIES EXPORT_NAME ${name})
     install(TARGETS gapscope_${name} EXPORT gapscope LIBRARY DESTINATION ${_libraries}
-            ARCHIVE DESTINATION ${_libraries})
+            COMPONENT program ARCHIVE DESTINATION ${_libraries})
   endif()
 endforeach()
 foreach(folder src/core src/log src/experiment src/model src/compare src/fit src/tune src/identify
@@ -38,10 +38,10 @@ set(GAPSCOPE_MUJOCO_SONAME "")
 if(GAPSCOPE_MUJOCO_LIBRARY)
   get_filename_component(GAPSCOPE_MUJOCO_SONAME ${GAPSCOPE_MUJOCO_LIBRARY} NAME)
   get_filename_component(_sdk ${GAPSCOPE_MUJOCO_LIBRARY} DIRECTORY)
-  install(FILES ${GAPSCOPE_MUJOCO_LIBRARY} DESTINATION ${_libraries})
+  install(FILES ${GAPSCOPE_MUJOCO_LIBRARY} DESTINATION ${_libraries} COMPONENT program)
   install(DIRECTORY ${_sdk}/include/mujoco DESTINATION ${_headers})
   file(GLOB_RECURSE _licenses ${_sdk}/../*LICENSE*)
-  install(FILES ${_licenses} DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope/mujoco)
+  install(FILES ${_licenses} DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope/mujoco COMPONENT program)
 endif()
 configure_package_config_file(cmake/gapscope-config.cmake.in ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake
                               INSTALL_DESTINATION ${_package} PATH_VARS _libraries _headers)
@@ -49,7 +49,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/gapscope-config-versi
 install(FILES ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake ${CMAKE_BINARY_DIR}/cmake/gapscope-config-version.cmake
         DESTINATION ${_package})
 
-install(DIRECTORY models DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope)
+install(DIRECTORY models DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope COMPONENT program)
 install(FILES cmake/gapscope.bash RENAME gapscope DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 
 # The manual page says what the program says.

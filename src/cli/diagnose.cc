@@ -1,5 +1,4 @@
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -9,6 +8,7 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
+#include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -196,16 +196,23 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);
   GS_ASSIGN(DiagnoseOptions options, OptionsOf(flags, experiment));
   GS_RETURN_IF_ERROR(AddKnown(flags, experiment, data, &options));
-  const bool live = !flags.common.quiet && isatty(2);
-  if (live) options.progress = [](const std::string& text) { fmt::print(stderr, "\r\033[K{}", text); };
-  auto diagnosed = Diagnose(experiment, data, options, pool);
-  if (live) fmt::print(stderr, "\r\033[K");
+  options.stop = CatchInterrupts();
+  auto diagnosed = [&] {
+    ProgressLine line(flags.common);
+    if (line.live())
+      options.progress = [&line](const DiagnoseProgress& p) {
+        line.Show({p.stage, static_cast<double>(p.steps), p.most_steps > 0 ? static_cast<double>(p.most_steps) : kNaN},
+                  p.stage);
+      };
+    return Diagnose(experiment, data, options, pool);
+  }();
   if (!diagnosed.ok()) return diagnosed.error();
   PrintLeftOut(*diagnosed.value().model->rig());
   const DiagnoseRun run{.info = {.seed = flags.common.seed}, .diagnosis = std::move(diagnosed).value()};
   if (!flags.common.out.empty()) {
     GS_RETURN_IF_ERROR(WriteDiagnosis(flags.common.out, experiment, data, log_values, run, pool));
-    DiagnosisJournal::Remove(options.journal);
+    // An interrupted search can go on.
+    if (!run.diagnosis.interrupted) DiagnosisJournal::Remove(options.journal);
   }
   fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;

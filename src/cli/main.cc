@@ -6,25 +6,27 @@
 
 #include "src/cli/arguments.h"
 #include "src/cli/html.h"
+#include "src/cli/progress.h"
 #include "src/cli/session.h"
 
 namespace gapscope::cli {
 namespace {
 
-int Refuse(const Error& error) {
-  fmt::print(stderr, "gapscope: {}\n", error.Text());
+int Refuse(const Error& error, bool json) {
+  fmt::print(stderr, "{}", json ? ErrorLine(error) : "gapscope: " + error.Text() + "\n");
   return kBadInput;
 }
 
 int Main(int argc, char** argv) {
   SetCommandLine(argc, argv);
+  const bool json = AsksForJsonProgress(argc, argv);
   const std::vector<Command> commands = AllCommands();
   int status = kDone;
   const auto command = ReadArguments(argc, argv, commands, &status);
-  if (!command.ok()) return Refuse(command.error());
+  if (!command.ok()) return Refuse(command.error(), json);
   if (!command.value()) return status;
   const auto done = command.value()->run();
-  return done.ok() ? done.value() : Refuse(done.error());
+  return done.ok() ? done.value() : Refuse(done.error(), json);
 }
 
 }  // namespace

@@ -1,15 +1,13 @@
 #include <fmt/core.h>
-#include <signal.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/progress.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/report/html_report.h"
@@ -30,9 +28,6 @@ struct RenderFlags {
   std::optional<ReplayMode> mode;
   double speed = 1, from_s = 0, to_s = -1, at_s = -1, frames_per_s = 30, window_s = 0;
 };
-
-std::atomic<bool> interrupted = false;
-void Interrupt(int) { interrupted = true; }
 
 Status ReadSize(const std::string& text, int& width, int& height) {
   const char* end = text.data() + text.size();
@@ -123,17 +118,16 @@ Result<int> RunRender(RenderFlags flags) {
   options.window_s = flags.window_s > 0 ? flags.window_s : session.experiment.replay.window_s;
   GS_ASSIGN(const auto models, ModelsOf(flags, session));
 
-  struct sigaction action{};
-  action.sa_handler = Interrupt;
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
-  options.stop = &interrupted;
-  const bool live = !flags.common.quiet && isatty(2);
-  if (live)
-    options.progress = [](std::size_t done, std::size_t all) {
-      fmt::print(stderr, "\r\033[Kframe {} of {}", done, all);
-    };
-  auto rendered = RenderVideo(session.recordings.front(), models, options, *session.pool);
-  if (live) fmt::print(stderr, "\r\033[K");
+  options.stop = CatchInterrupts();
+  auto rendered = [&] {
+    ProgressLine line(flags.common);
+    if (line.live())
+      options.progress = [&line](std::size_t done, std::size_t all) {
+        line.Show({"frames", static_cast<double>(done), static_cast<double>(all)},
+                  fmt::format("frame {} of {}", done, all));
+      };
+    return RenderVideo(session.recordings.front(), models, options, *session.pool);
+  }();
   if (!rendered.ok()) return rendered.error();
   const VideoSummary& summary = rendered.value();
   RenderRun run = RunOf(flags, models, options, summary);

@@ -15,11 +15,18 @@
 namespace gapscope::cli {
 
 std::vector<Option> PrintOptions(CommonFlags& flags) {
-  return {{.flag = "--json",
-           .value = &flags.json,
-           .help = "Print the result as JSON on stdout, nothing else",
-           .more = "Messages go to stderr either way. The JSON names its schema and the versions that made it"},
-          {.flag = "--quiet", .value = &flags.quiet, .help = "No messages on stderr but errors"}};
+  return {
+      {.flag = "--json",
+       .value = &flags.json,
+       .help = "Print the result as JSON on stdout, nothing else",
+       .more = "Messages go to stderr either way. The JSON names its schema and the versions that made it"},
+      {.flag = "--quiet", .value = &flags.quiet, .help = "No messages on stderr but errors"},
+      {.flag = "--progress",
+       .value = ChoiceOf(flags.progress),
+       .help = "How progress and an error are said on stderr: a line for people, or a JSON object a line",
+       .more = "json: {\"stage\", \"done\", \"total\", \"best\", \"elapsed_s\"} while it runs, null where it is not "
+               "known, and {\"error\": {\"what\", \"where\", \"actual\", \"allowed\", \"cure\"}}. Other lines are "
+               "messages for people"}};
 }
 
 std::vector<Option> CommonOptions(CommonFlags& flags) {

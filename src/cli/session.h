@@ -18,14 +18,17 @@ namespace gapscope::cli {
 // Exit statuses of the program: what scripts rely on.
 inline constexpr int kDone = 0, kBelowThreshold = 1, kBadInput = 2, kBug = 3;
 
+enum class ProgressForm { kText, kJson };
+
 struct CommonFlags {
+  ProgressForm progress = ProgressForm::kText;
   bool json = false, quiet = false;
   int jobs = 0;
   std::uint64_t seed = 0;
   std::string out;
 };
 
-// --json and --quiet.
+// --json, --quiet and --progress.
 std::vector<Option> PrintOptions(CommonFlags& flags);
 // Those, --jobs and --seed.
 std::vector<Option> CommonOptions(CommonFlags& flags);
@@ -88,5 +91,12 @@ void PrintLeftOut(const Rig& rig);
 void PrintFindings(const std::vector<Recording>& recordings, bool quiet);
 
 }  // namespace gapscope::cli
+
+namespace gapscope {
+
+template <>
+std::span<const EnumName<cli::ProgressForm>> EnumNames<cli::ProgressForm>();
+
+}  // namespace gapscope
 
 #endif  // GAPSCOPE_CLI_SESSION_H_

@@ -1,5 +1,4 @@
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -8,6 +7,7 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
+#include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/report/tune_report.h"
 #include "src/report/write_run.h"
@@ -99,7 +99,7 @@ Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
   }
   GS_RETURN_IF_ERROR(ChooseParameters(flags, session, &options));
   if (flags.budget_s > 0)
-    options.solve.deadline =
+    options.solve.deadline.time =
         std::chrono::steady_clock::now() + std::chrono::microseconds(static_cast<long long>(1e6 * flags.budget_s));
   if (!flags.common.out.empty()) options.journal = std::filesystem::path(flags.common.out) / "journal.bin";
   if (flags.resume && flags.common.out.empty())
@@ -108,12 +108,11 @@ Result<TuneOptions> OptionsOf(const TuneFlags& flags, const Session& session) {
   return options;
 }
 
-// A line on stderr that is written over.
-void ShowProgress(double budget_s, TuneOptions* options) {
-  options->solve.progress = [begin = std::chrono::steady_clock::now(), budget_s](const Progress& p) {
-    const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    fmt::print(stderr, "\r\033[Kcost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, elapsed,
-               budget_s > 0 ? fmt::format(" of {:.0f} s", budget_s) : "");
+void ShowProgress(double budget_s, ProgressLine& line, TuneOptions* options) {
+  options->solve.progress = [&line, budget_s](const Progress& p) {
+    line.Show({.stage = "fit", .done = static_cast<double>(p.evaluations), .best = p.best},
+              fmt::format("cost {:.6g}, {} evaluations, {:.1f} s{}", p.best, p.evaluations, line.elapsed_s(),
+                          budget_s > 0 ? fmt::format(" of {:.0f} s", budget_s) : ""));
   };
 }
 
@@ -146,11 +145,13 @@ Result<int> RunTune(const TuneFlags& flags) {
   GS_ASSIGN(Session session, LoadSession(model, flags.common));
   PrintFindings(session.recordings, flags.common.quiet);
   GS_ASSIGN(TuneOptions options, OptionsOf(flags, session));
-  const bool live = !flags.common.quiet && isatty(2);
-  if (live) ShowProgress(flags.budget_s, &options);
   const DataSplit data = SplitData(std::move(session.recordings), logs.held_out);
-  const auto tuned = Tune(*session.model, data, session.values, options, *session.pool);
-  if (live) fmt::print(stderr, "\r\033[K");
+  const auto tuned = [&] {
+    ProgressLine line(flags.common);
+    if (line.live()) ShowProgress(flags.budget_s, line, &options);
+    options.solve.deadline.stop = CatchInterrupts();
+    return Tune(*session.model, data, session.values, options, *session.pool);
+  }();
   if (!tuned.ok()) return tuned.error();
   for (const auto& warning : tuned.value().warnings) fmt::print(stderr, "warning: {}\n", warning);
   const TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);

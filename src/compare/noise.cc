@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "src/compare/spectrum.h"
@@ -174,10 +175,30 @@ std::size_t LowestNoiseBand(const DensityFitter& fitter, std::size_t start) {
   return first;
 }
 
+// The rows that have a value, where they are an axis of their own (a sensor that is slower than the log): a line drawn
+// between them would pass for a quiet sensor. Gaps in one axis are not.
+struct OwnRows {
+  std::vector<double> time_s, values;
+};
+std::optional<OwnRows> RowsOfItsOwn(std::span<const double> time_s, std::span<const double> values) {
+  constexpr double kSlower = 1.5;
+  OwnRows own;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) continue;
+    own.time_s.push_back(time_s[i]);
+    own.values.push_back(values[i]);
+  }
+  if (own.values.size() == values.size() || own.values.size() < 2 ||
+      MedianStep(own.time_s) < kSlower * MedianStep(time_s))
+    return std::nullopt;
+  return own;
+}
+
 }  // namespace
 
 NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double> values, const NoiseOptions& options) {
   GS_CHECK(time_s.size() == values.size() && options.resolution >= 0 && options.motion_band_hz >= 0);
+  if (const auto own = RowsOfItsOwn(time_s, values)) return EstimateNoise(own->time_s, own->values, options);
   NoiseFloor floor{.white_std = kNaN,
                    .coloured_std = kNaN,
                    .correlation_time_s = kNaN,

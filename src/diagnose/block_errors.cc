@@ -16,7 +16,7 @@ BlockErrors ErrorsByBlock(const std::vector<LogReplay>& logs) {
       SignalErrors errors{.scored = trace.scored, .deviation = MomentsOf(trace.measured).deviation};
       for (std::size_t r = 0; r < log.time_s.size(); ++r) {
         const double error = trace.predicted[r] - trace.measured[r];
-        errors.rows += std::isfinite(trace.predicted[r]);
+        errors.rows += std::isfinite(error);
         if (std::isfinite(error))
           errors.squares[std::lround(std::floor(log.time_s[r] / kFitPolicy.block_s))] += error * error;
       }

@@ -1,6 +1,7 @@
 #include "src/diagnose/coarsen.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
@@ -43,7 +44,11 @@ Recording Coarsen(const Recording& recording, double least_step_s) {
   const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
     return m.spec.scored && TraitsOf(m.spec.kind).stage != SignalStage::kState;
   });
-  if (torque) return recording;
+  // Where a sensor is slower than the log, the rows picked would miss its values.
+  const bool kept_gaps = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
+    return std::any_of(m.values.begin(), m.values.end(), [](double value) { return !std::isfinite(value); });
+  });
+  if (torque || kept_gaps) return recording;
   constexpr double kSlack = 0.95;  // of the step: stamps jitter
   std::vector<std::size_t> kept;
   for (std::size_t row = 0; row < recording.rows(); ++row) {

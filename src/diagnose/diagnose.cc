@@ -163,8 +163,10 @@ DataSplit Coarsened(DataSplit data, double sample_s) {
 }
 
 Deadline DeadlineOf(const DiagnoseOptions& options, std::chrono::steady_clock::time_point begin) {
-  if (!(options.budget_s > 0)) return {};
-  return begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
+  Deadline deadline{.stop = options.stop};
+  if (options.budget_s > 0)
+    deadline.time = begin + std::chrono::microseconds(static_cast<long long>(0.9e6 * options.budget_s));
+  return deadline;
 }
 
 // Null: none is asked for.
@@ -233,6 +235,19 @@ void NameLogs(const DataSplit& data, Diagnosis* result) {
   result->split = data.how;
 }
 
+// Of the search; `replay_steps`: of one replay of the training windows.
+std::size_t MostSteps(SearchEffort effort, std::size_t replay_steps) {
+  return static_cast<std::size_t>(ShareOfWork(effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
+                                  static_cast<double>(replay_steps));
+}
+
+// Tells what is done, and how much of the work of `bench`, once there is one.
+Say Teller(const DiagnoseOptions& options, const Workbench* const& bench) {
+  return [&](const std::string& stage) {
+    if (options.progress) options.progress({stage, bench ? bench->work->steps : 0, bench ? bench->most_steps : 0});
+  };
+}
+
 }  // namespace
 
 Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, const DiagnoseOptions& options,
@@ -245,7 +260,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   GS_RETURN_IF_ERROR(CheckPriors(options.priors, *model->rig()));
   const ScaleTable scales = EstimateScales(*model, fine.train);
   const std::vector<double> noise = SignalNoise(experiment, fine);
-  const Say say = options.progress ? options.progress : [](const std::string&) {};
+  const Workbench* at = nullptr;
+  const Say say = Teller(options, at);
   const Deadline deadline = DeadlineOf(options, begin);
   GS_ASSIGN(const auto journal, OpenJournal(*model, fine, options, deadline));
   bool fewer_windows = false;
@@ -267,15 +283,13 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
     ChooseFitted(*model, options.replay_steps, by_windows, &bench);
-    const std::size_t replay_steps = KeepToTime(*model, options, &bench, &fewer_windows);
+    bench.most_steps = MostSteps(options.effort, KeepToTime(*model, options, &bench, &fewer_windows));
     bench.deadline = deadline;
     bench.journal = journal.get();
-    bench.most_steps =
-        static_cast<std::size_t>(ShareOfWork(options.effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
-                                 static_cast<double>(replay_steps));
     return bench;
   };
   const Workbench bench = make_bench(data, false);
+  at = &bench;
   GS_ASSIGN(const auto found, Search(bench, !data.asked, say));
   const DescribeOptions describe{noise, options.seed, options.next_experiment};
   Diagnosis result;
@@ -283,6 +297,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
     const DataSplit blocks = InWindows(data);
     const Workbench again = make_bench(blocks, true);
+    at = &again;
     GS_ASSIGN(const auto second, Search(again, false, say));
     GS_ASSIGN(result, Describe(*second, again, describe, say));
     NameLogs(blocks, &result);
@@ -291,6 +306,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     NameLogs(data, &result);
   }
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
+  result.interrupted = deadline.stopped();
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

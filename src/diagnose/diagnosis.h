@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 #define GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
@@ -175,7 +176,8 @@ struct Diagnosis {
   double wall_s = 0;
   Work work;                           // spent
   std::size_t most_steps = 0;          // the budget, simulator steps
-  std::vector<std::string> cut;        // what the budget left out
+  std::vector<std::string> cut;        // what the budget or an interruption left out
+  bool interrupted = false;            // DiagnoseOptions::stop was set before the end
   bool uneven = false;                 // train and held-out logs show the gap very differently
   std::shared_ptr<const Model> model;  // with the effects found
   std::vector<double> values;
@@ -188,6 +190,12 @@ struct Diagnosis {
 enum class SearchEffort { kQuick, kNormal, kThorough };
 template <>
 std::span<const EnumName<SearchEffort>> EnumNames<SearchEffort>();
+
+// What a diagnosis does, and of the search's work how much is done: simulated steps; 0: no limit.
+struct DiagnoseProgress {
+  std::string stage;
+  std::size_t steps = 0, most_steps = 0;
+};
 
 struct DiagnoseOptions {
   double budget_s = 0;  // 0: no limit of time
@@ -202,7 +210,8 @@ struct DiagnoseOptions {
   std::vector<EffectUse> known;
   std::map<std::string, double> values;
   std::set<std::string> frozen;  // names of parameters that are held at their value
-  std::function<void(const std::string&)> progress;
+  std::function<void(const DiagnoseProgress&)> progress;
+  const std::atomic<bool>* stop = nullptr;  // set: the best verdict so far
   // Folder of a DiagnosisJournal, empty: none; whether the run recorded there goes on. It stays when the run has ended:
   // what it led to is to be written first (DiagnosisJournal::Remove).
   std::string journal;

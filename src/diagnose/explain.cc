@@ -28,6 +28,11 @@ std::string ExplainEffects(const Diagnosis& d) {
                             d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);
 }
 
+std::string EarlyEnd(const Diagnosis& d) {
+  if (d.interrupted) return " It was interrupted: this is the best so far.";
+  return d.cut.empty() ? "" : " The budget ended the search early.";
+}
+
 }  // namespace
 
 std::string Explain(const Diagnosis& d) {
@@ -86,8 +91,7 @@ std::string Explain(const Diagnosis& d) {
     for (const LeftOutCandidate& candidate : d.model->rig()->left_out())
       text += " Not asked about: " + candidate.Text() + ".";
   }
-  if (!d.cut.empty()) text += " The budget ended the search early.";
-  return text;
+  return text + EarlyEnd(d);
 }
 
 }  // namespace gapscope

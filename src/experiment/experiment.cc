@@ -54,10 +54,11 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
   if (const YAML::Node repair = map.Child("repair"); repair.IsDefined()) {
     YamlMap policy(repair, path, "'repair'");
     constexpr TimeRepair kTime[] = {TimeRepair::kDropRows, TimeRepair::kError};
-    constexpr MissingRepair kMissing[] = {MissingRepair::kHold, MissingRepair::kDropRows, MissingRepair::kError};
+    constexpr MissingRepair kMissing[] = {MissingRepair::kHold, MissingRepair::kKeep, MissingRepair::kDropRows,
+                                          MissingRepair::kError};
     experiment->timeline.repeated = kTime[policy.Choice("repeated", {"drop_rows", "error"}, 0)];
     experiment->timeline.reversed = kTime[policy.Choice("reversed", {"drop_rows", "error"}, 0)];
-    experiment->timeline.missing = kMissing[policy.Choice("missing", {"hold", "drop_rows", "error"}, 0)];
+    experiment->timeline.missing = kMissing[policy.Choice("missing", {"hold", "keep", "drop_rows", "error"}, 0)];
     experiment->timeline.gap_factor = policy.Number("gap_factor", experiment->timeline.gap_factor);
     if (!(experiment->timeline.gap_factor > 1))
       policy.Fail(repair, {.what = "'gap_factor' is in median steps", .allowed = "> 1"});

@@ -13,14 +13,19 @@ namespace {
 bool StartsAtRest(const Sampled& samples) {
   constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
   const auto t = samples.time_s, values = samples.values;
-  std::size_t k = 1;
+  const auto next = [&](std::size_t k) {
+    while (++k < t.size() && !std::isfinite(values[k])) {
+    }
+    return k;
+  };
+  std::size_t k = next(0);
   bool stays = true;
-  for (; k < t.size() && (k < 3 || t[k] - t[0] <= kBegin_s); ++k)
+  for (int count = 1; k < t.size() && (count < 3 || t[k] - t[0] <= kBegin_s); ++count, k = next(k))
     stays = stays && std::abs(values[k] - values[0]) <= 1.01 * samples.resolution;
   if (stays) return true;
-  std::size_t begin = 1, end = 1;
-  while (begin + 1 < t.size() && t[begin] - t[0] < kBegin_s) ++begin;
-  while (end + 1 < t.size() && t[end] - t[0] < kEnd_s) ++end;
+  std::size_t begin = next(0), end = begin;
+  while (next(begin) < t.size() && t[begin] - t[0] < kBegin_s) begin = next(begin);
+  while (next(end) < t.size() && t[end] - t[0] < kEnd_s) end = next(end);
   return kFarther * std::abs(values[begin] - values[0]) <= std::abs(values[end] - values[begin]);
 }
 
@@ -30,13 +35,16 @@ struct Reach {
   std::size_t first = 0, last = 0;
 };
 
-Reach ReachOf(std::span<const double> t, std::size_t row, double half_width_s) {
+Reach ReachOf(const Sampled& samples, std::size_t row, double half_width_s) {
+  const auto t = samples.time_s, values = samples.values;
   std::size_t first = row, last = row;
   while (first > 0 && t[row] - t[first - 1] <= half_width_s) --first;
   while (last + 1 < t.size() && t[last + 1] - t[row] <= half_width_s) ++last;
-  while (last - first < 6 && (first > 0 || last + 1 < t.size())) {
-    if (last + 1 < t.size()) ++last;
-    if (last - first < 6 && first > 0) --first;
+  int there = 0;
+  for (std::size_t k = first; k <= last; ++k) there += std::isfinite(values[k]);
+  while (there < 7 && (first > 0 || last + 1 < t.size())) {
+    if (last + 1 < t.size()) there += std::isfinite(values[++last]);
+    if (there < 7 && first > 0) there += std::isfinite(values[--first]);
   }
   return {first, last};
 }
@@ -77,9 +85,9 @@ Normal NormalOf(const Sampled& samples, std::size_t row, const Reach& reach) {
 }  // namespace
 
 LocalFit FitLocally(const Sampled& samples, std::size_t row, double half_width_s) {
-  const auto t = samples.time_s, values = samples.values;
+  const auto values = samples.values;
   if (row == 0 && std::isfinite(values[0]) && StartsAtRest(samples)) return {values[0], 0};
-  const Normal normal = NormalOf(samples, row, ReachOf(t, row, half_width_s));
+  const Normal normal = NormalOf(samples, row, ReachOf(samples, row, half_width_s));
   const LocalFit rest{std::isfinite(values[row]) ? values[row] : 0, 0};
   if (normal.count < 4) return rest;
   const double quantisation = samples.resolution * samples.resolution / 12;

@@ -34,7 +34,7 @@ std::vector<const Column*> ColumnsOf(const Log& log, const MeasuredSpec& spec) {
 
 Error MissingColumn(const Log& log, const std::vector<std::string>& names, const std::string& purpose) {
   return Error{.what = "no column '" + names.front() + "' for " + purpose,
-               .where = log.path + ":1",
+               .where = log.WhereHeader(),
                .actual = "columns " + Join(log.ColumnNames()),
                .cure = DidYouMean(names.front(), log.ColumnNames(), "name the right column in the experiment file")};
 }
@@ -104,7 +104,7 @@ Result<std::map<std::string, double>> BindValues(const Experiment& experiment, c
       return Error{.what = "the log has no " +
                            (spec.header.empty() ? "column '" + spec.column : "header value '" + spec.header) +
                            "', which gives '" + spec.name + "'",
-                   .where = log.path + ":1",
+                   .where = log.WhereHeader(),
                    .cure = "add 'default:' to it in the experiment file"};
     }
     values[spec.name] = *spec.fallback;
@@ -176,7 +176,10 @@ Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
     Recording::Command command{.actuator = spec.actuator};
     if (const Column* column = FindFirst(log, spec.columns)) {
       command.column = column->name;
-      const ColumnOptions options{.factor = spec.factor, .offset = spec.offset, .missing = experiment.timeline.missing};
+      const MissingRepair missing = experiment.timeline.missing;
+      const ColumnOptions options{.factor = spec.factor,
+                                  .offset = spec.offset,
+                                  .missing = missing == MissingRepair::kKeep ? MissingRepair::kHold : missing};
       GS_ASSIGN(command.values, ExtractColumn(log, timeline, *column, options, &recording.findings));
     } else if (spec.optional) {
       GS_ASSIGN(const double constant, EvaluateOnce(spec.fallback, recording.values,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <queue>
 
+#include "src/compare/spectrum.h"
 #include "src/core/statistics.h"
 
 namespace gapscope {
@@ -103,7 +104,7 @@ class Cells {
     std::vector<Series> all;
     for (std::size_t l = 0; l < recordings_.size(); ++l) {
       const std::vector<double>* values = series_of(recordings_[l]);
-      all.push_back(values ? Thin(*values, recordings_[l].time_s, strides_[l]) : Series());
+      all.push_back(values ? Thin(FillGaps(*values), recordings_[l].time_s, strides_[l]) : Series());
     }
     const Scale of_value(all, [](const Series& s) -> const auto& { return s.values; }),
         of_rate(all, [](const Series& s) -> const auto& { return s.rates; });

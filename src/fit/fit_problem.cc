@@ -13,11 +13,15 @@
 namespace gapscope {
 namespace {
 
-std::size_t CountResiduals(const FitLayout& layout, const std::vector<FitWindow>& windows) {
+std::size_t CountResiduals(const std::vector<Recording>& recordings, const FitLayout& layout,
+                           const std::vector<FitWindow>& windows) {
   std::size_t count = 0;
   for (const auto& window : windows) {
-    for (const auto& signal : layout.signals[window.log]) {
-      if (signal.weight > 0) count += static_cast<std::size_t>(window.scored());
+    for (std::size_t s = 0; s < layout.signals[window.log].size(); ++s) {
+      if (!(layout.signals[window.log][s].weight > 0)) continue;
+      const auto& measured = recordings[window.log].measured[s].values;
+      for (std::size_t row = window.rows.begin + window.first_scored; row < window.rows.end; ++row)
+        count += std::isfinite(measured[row]);
     }
   }
   return count;
@@ -74,15 +78,15 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       layout_(MakeLayout(model, recordings, options_, space_)),
       windows_(MakeFitWindows(model, recordings, options_, layout_, space_.start())),
       parameters_together_(MovedByParameters(model, options_, space_)),
-      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), CountResiduals(layout_, windows_),
-                       model.parameters())),
+      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_),
+                       CountResiduals(recordings_, layout_, windows_), model.parameters())),
       workers_(static_cast<std::size_t>(pool.workers())) {
   for (std::size_t l = 0; l < recordings.size(); ++l)
     states_together_.emplace_back(
         MovedByStates(recordings[l], layout_.signals[l], layout_.state_priors[l].size(), options_));
 }
 
-std::size_t FitProblem::residuals() const { return CountResiduals(layout_, windows_); }
+std::size_t FitProblem::residuals() const { return CountResiduals(recordings_, layout_, windows_); }
 
 FitPoint FitProblem::Start() const {
   FitPoint point{.y = StartY(space_, layout_), .states = {}};

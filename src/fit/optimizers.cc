@@ -53,6 +53,8 @@ std::string TerminationText(Termination termination) {
       return "iteration limit";
     case Termination::kBudget:
       return "budget spent";
+    case Termination::kInterrupted:
+      return "interrupted";
     case Termination::kStalled:
       return "stalled at the start";
     case Termination::kHopeless:

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_FIT_OPTIMIZERS_H_
 #define GAPSCOPE_FIT_OPTIMIZERS_H_
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -14,8 +15,16 @@
 
 namespace gapscope {
 
-using Deadline = std::optional<std::chrono::steady_clock::time_point>;
-inline bool IsLate(const Deadline& deadline) { return deadline && std::chrono::steady_clock::now() >= *deadline; }
+// When a search is to end with the best so far: at a time, or as soon as somebody asks.
+struct Deadline {
+  std::optional<std::chrono::steady_clock::time_point> time = {};
+  const std::atomic<bool>* stop = nullptr;
+
+  bool stopped() const { return stop && stop->load(); }
+};
+inline bool IsLate(const Deadline& deadline) {
+  return deadline.stopped() || (deadline.time && std::chrono::steady_clock::now() >= *deadline.time);
+}
 
 struct Progress {
   double best = 0;  // cost
@@ -47,7 +56,8 @@ struct SolveOptions {
   std::function<void(const Progress&)> progress;
 };
 
-enum class Termination { kConverged, kIterations, kBudget, kStalled, kHopeless, kNotSimulated };
+// kBudget: the deadline; kInterrupted: it was asked to stop.
+enum class Termination { kConverged, kIterations, kBudget, kStalled, kHopeless, kNotSimulated, kInterrupted };
 std::string TerminationText(Termination termination);
 
 struct SolveResult {

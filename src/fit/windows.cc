@@ -19,18 +19,22 @@ std::size_t FirstScored(const Recording& recording, const Window& rows, double l
 }
 
 // Root mean square of each signal's residuals over a log; 0 where there are none.
-std::vector<double> MismatchOf(std::size_t log, std::size_t signals, const std::vector<FitWindow>& windows,
+std::vector<double> MismatchOf(std::size_t log, const Recording& recording, const std::vector<FitWindow>& windows,
                                const Residuals& residuals) {
-  std::vector<double> squares(signals, 0.0);
-  std::size_t rows = 0;
+  const std::size_t signals = recording.measured.size();
+  std::vector<double> squares(signals, 0.0), rows(signals, 0.0);
   for (std::size_t w = 0; w < windows.size(); ++w) {
     if (windows[w].log != log) continue;
     const Eigen::Index scored = windows[w].scored();
-    for (std::size_t s = 0; s < signals && residuals[w].size() > 0; ++s)
-      squares[s] += residuals[w].segment(static_cast<Eigen::Index>(s) * scored, scored).squaredNorm();
-    rows += static_cast<std::size_t>(scored);
+    for (std::size_t s = 0; s < signals; ++s) {
+      if (residuals[w].size() > 0)
+        squares[s] += residuals[w].segment(static_cast<Eigen::Index>(s) * scored, scored).squaredNorm();
+      const auto& measured = recording.measured[s].values;
+      for (std::size_t row = windows[w].rows.begin + windows[w].first_scored; row < windows[w].rows.end; ++row)
+        rows[s] += std::isfinite(measured[row]);
+    }
   }
-  for (double& square : squares) square = rows > 0 ? std::sqrt(square / static_cast<double>(rows)) : 0;
+  for (std::size_t s = 0; s < signals; ++s) squares[s] = rows[s] > 0 ? std::sqrt(squares[s] / rows[s]) : 0;
   return squares;
 }
 
@@ -87,7 +91,7 @@ std::vector<Eigen::VectorXd> StatePriorsByNoise(const Model& model, const std::v
   std::vector<Eigen::VectorXd> priors = Collect(windows, &FitWindow::prior);
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     const auto& signals = layout.signals[l];
-    const std::vector<double> mismatch = MismatchOf(l, signals.size(), windows, residuals);
+    const std::vector<double> mismatch = MismatchOf(l, recordings[l], windows, residuals);
     // Of two numbers of a window's state, from `state` on, that signal `s` gives.
     const auto weigh = [&](std::size_t s, Eigen::Index state) {
       const auto& measured = recordings[l].measured[s];

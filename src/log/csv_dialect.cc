@@ -74,23 +74,6 @@ char ChooseDelimiter(std::string_view header, const std::vector<NumberedLine>& s
   return best;
 }
 
-// "voltage [V]" and "voltage (V)" -> name and unit. Round brackets only around something that is a unit.
-void SplitUnit(std::string_view heading, std::string* name, std::string* unit) {
-  *name = heading;
-  unit->clear();
-  if (heading.empty()) return;
-  const char close = heading.back();
-  const char open = close == ']' ? '[' : close == ')' ? '(' : '\0';
-  if (open == '\0') return;
-  const std::size_t at = heading.rfind(open);
-  if (at == std::string_view::npos || TrimBlanks(heading.substr(0, at)).empty()) return;
-  const std::string_view inside = TrimBlanks(heading.substr(at + 1, heading.size() - at - 2));
-  const bool index = !inside.empty() && inside.find_first_not_of("0123456789") == std::string_view::npos;
-  if (open == '[' ? index : !LooksLikeUnit(inside)) return;
-  *name = TrimBlanks(heading.substr(0, at));
-  *unit = inside;
-}
-
 std::string_view StripBrackets(std::string_view text) {
   if (text.size() >= 2 &&
       ((text.front() == '[' && text.back() == ']') || (text.front() == '(' && text.back() == ')'))) {
@@ -238,7 +221,7 @@ Status CheckNames(const std::string& path, CsvDialect* dialect) {
                    .cure = "convert it: iconv -f WINDOWS-1252 -t UTF-8 FILE > log.csv"};
     }
     const std::string heading = name;
-    SplitUnit(heading, &name, &dialect->units[c]);
+    SplitHeading(heading, &name, &dialect->units[c]);
     if (name.empty()) {
       name = fmt::format("column_{}", c + 1);
       dialect->findings.push_back({.kind = "unnamed_column",
@@ -276,6 +259,22 @@ void FindTextColumns(const std::vector<NumberedLine>& sample, std::size_t first,
 }
 
 }  // namespace
+
+void SplitHeading(std::string_view heading, std::string* name, std::string* unit) {
+  *name = heading;
+  unit->clear();
+  if (heading.empty()) return;
+  const char close = heading.back();
+  const char open = close == ']' ? '[' : close == ')' ? '(' : '\0';
+  if (open == '\0') return;
+  const std::size_t at = heading.rfind(open);
+  if (at == std::string_view::npos || TrimBlanks(heading.substr(0, at)).empty()) return;
+  const std::string_view inside = TrimBlanks(heading.substr(at + 1, heading.size() - at - 2));
+  const bool index = !inside.empty() && inside.find_first_not_of("0123456789") == std::string_view::npos;
+  if (open == '[' ? index : !LooksLikeUnit(inside)) return;
+  *name = TrimBlanks(heading.substr(0, at));
+  *unit = inside;
+}
 
 bool IsCsvComment(std::string_view line) {
   return line.starts_with('#') || line.starts_with('%') || line.starts_with("//");

@@ -26,6 +26,10 @@ struct CsvDialect {
 // without its partner, a line of names beyond 1 MB or 10,000 columns, names that are not UTF-8.
 Result<CsvDialect> DetectCsvDialect(const std::string& path, std::string_view bytes);
 
+// "voltage [V]" and "voltage (V)" -> name and unit. Round brackets only around something that is a unit; "q[3]" is a
+// name.
+void SplitHeading(std::string_view heading, std::string* name, std::string* unit);
+
 // Is this line (blanks at its start taken off) a comment: '#', '//' or '%'?
 bool IsCsvComment(std::string_view line);
 

@@ -21,6 +21,12 @@ void Hold(std::vector<double>* values) {
   }
 }
 
+Finding RepairOf(const Column& column, std::size_t missing, std::size_t first, std::size_t rows, bool held) {
+  return {held ? "held" : "kept", column.name, missing, first,
+          fmt::format("no value in {} of {} rows; {}", missing, rows,
+                      held ? "the last value before was held" : "those rows of it are not used")};
+}
+
 void ReportWraps(const Column& column, const Timeline& timeline, const ColumnOptions& options,
                  std::vector<double>* values, std::vector<Finding>* findings) {
   const bool known = options.wrap_period > 0;
@@ -71,19 +77,16 @@ Result<std::vector<double>> ExtractColumn(const Log& log, const Timeline& timeli
                  .cure = "choose another column, or leave this one out of the experiment file"};
   }
   if (missing > 0) {
-    if (options.missing != MissingRepair::kHold) {
+    const bool held = options.missing == MissingRepair::kHold;
+    if (!held && options.missing != MissingRepair::kKeep) {
       return Error{.what = "a missing value",
                    .where = log.Where(first_missing) + ", column " + column.name,
                    .actual = fmt::format("no value in {} of {} rows", missing, values.size()),
                    .allowed = "a value in every row",
                    .cure = "allow a repair in the experiment file: log: {repair: {missing: hold}}"};
     }
-    Hold(&values);
-    if (findings) {
-      findings->push_back(
-          {"held", column.name, missing, first_missing,
-           fmt::format("no value in {} of {} rows; the last value before was held", missing, values.size())});
-    }
+    if (held) Hold(&values);
+    if (findings) findings->push_back(RepairOf(column, missing, first_missing, values.size(), held));
   }
   const Saturation saturation = FindSaturation(values);
   ReportWraps(column, timeline, options, &values, findings);

@@ -11,6 +11,7 @@
 #include "src/log/bam_reader.h"
 #include "src/log/csv_reader.h"
 #include "src/log/list_reader.h"
+#include "src/log/npz_reader.h"
 #include "src/log/text.h"
 
 namespace gapscope {
@@ -18,6 +19,7 @@ namespace {
 
 // A new format is a reader and a row here, before the last.
 constexpr LogReader kReaders[] = {
+    {"npz", LooksLikeZip, ReadNpz},
     {"bam_json", LooksLikeJson, ReadBamJson},
     {"csv_lists", LooksLikeLists, ReadCsvLists},
     {"csv", [](const std::string&, std::string_view) { return true; }, ReadCsv},
@@ -118,6 +120,7 @@ const Column* Log::Find(std::string_view name) const {
 std::vector<std::string> Log::ColumnNames() const { return Collect(columns, &Column::name); }
 
 std::string Log::Where(std::size_t row) const {
+  if (header_line == 0) return fmt::format("{}: row {}", path, row + 1);
   const auto after =
       std::upper_bound(lines.begin(), lines.end(), row, [](std::size_t r, const LineAnchor& a) { return r < a.row; });
   if (after == lines.begin()) return At(path, header_line);
@@ -125,7 +128,7 @@ std::string Log::Where(std::size_t row) const {
   return At(path, anchor.line + (row - anchor.row));
 }
 
-std::string Log::WhereHeader() const { return At(path, header_line); }
+std::string Log::WhereHeader() const { return header_line == 0 ? path : At(path, header_line); }
 
 Result<Log> ReadLog(const std::string& given, const ReadOptions& options) {
   const std::string path = StateFileOf(given);

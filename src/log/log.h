@@ -43,16 +43,17 @@ struct Log {
   std::map<std::string, double> header;            // numbers of the header, by name
   std::map<std::string, std::string> header_text;  // texts of the header, by name
   std::string rig;                                 // what the header says it was recorded on; empty: nothing
+  std::string time_column;                         // that the file itself names as the time; empty: it does not
   std::vector<Finding> findings;
   std::vector<LineAnchor> lines;  // ascending in row; empty: a format without lines
-  std::size_t header_line = 1;    // where the columns' names are
+  std::size_t header_line = 1;    // where the columns' names are; 0: a format without lines
 
   std::size_t rows() const { return columns.empty() ? 0 : columns.front().values.size(); }
   // The column of that name, or null. The first one when the file repeats a name (reported as a finding). "voltage",
   // "voltage [V]" and "voltage (V)" all find the column whose heading was "voltage [V]".
   const Column* Find(std::string_view name) const;
   std::vector<std::string> ColumnNames() const;
-  // "path:line" of a row, or of the names, for error messages.
+  // "path:line" of a row, or of the names, for error messages; "path: row 17" (from 1) and "path" without lines.
   std::string Where(std::size_t row) const;
   std::string WhereHeader() const;
 };

@@ -167,7 +167,8 @@ double QuantisationStep(const std::vector<double>& values) {
   return 0;
 }
 
-double NoiseEstimate(const std::vector<double>& values, double step) {
+double NoiseEstimate(const std::vector<double>& all, double step) {
+  const std::vector<double> values = Finite(all);
   std::vector<double> bends;
   bends.reserve(values.size());
   for (std::size_t k = 1; k + 1 < values.size(); ++k) {

@@ -20,7 +20,7 @@ using namespace std::string_view_literals;
 constexpr const char* kExport = "export the log as CSV";
 constexpr std::array kMagics = {
     Magic{"\x1f\x8b"sv, "gzip data", "unpack it first: gunzip FILE"},
-    Magic{"PK\x03\x04"sv, "a ZIP archive (XLSX, NPZ, MLX ...)", kExport},
+    Magic{"PK\x03\x04"sv, "a ZIP archive (XLSX, MLX ...)", kExport},
     Magic{"\x28\xb5\x2f\xfd"sv, "Zstandard data", "unpack it first: unzstd FILE"},
     Magic{"\xfd"
           "7zXZ"sv,
@@ -33,7 +33,7 @@ constexpr std::array kMagics = {
     Magic{"#ROSBAG"sv, "a ROS 1 bag", "export a topic as CSV: rostopic echo -b FILE -p TOPIC > log.csv"},
     Magic{"SQLite format 3"sv, "an SQLite data base (ROS 2 db3?)", kExport},
     Magic{"PAR1"sv, "Parquet data", "export it as CSV: pandas.read_parquet(FILE).to_csv('log.csv', index=False)"},
-    Magic{"\x93NUMPY"sv, "a NumPy array", "export it as CSV: numpy.savetxt('log.csv', a, delimiter=',', header='t,x')"},
+    Magic{"\x93NUMPY"sv, "a NumPy array", "save it with names: numpy.savez('log.npz', t=a[:, 0], x=a[:, 1])"},
     Magic{"\x89PNG"sv, "a PNG picture", "name the log itself"},
     Magic{"%PDF"sv, "a PDF document", "name the log itself"},
     Magic{"\x7f"

@@ -178,7 +178,7 @@ bool LooksLikeUnit(std::string_view text) {
 }
 
 Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted) {
-  const Column* found = nullptr;
+  const Column* found = log.time_column.empty() ? nullptr : log.Find(log.time_column);
   if (!wanted.empty()) {
     found = log.Find(wanted);
     if (!found) {

@@ -16,7 +16,8 @@ bool IsTimeName(std::string_view name);
 // Is `text` a unit that a heading may carry: one that ParseUnit knows, or one with a degree sign and the like?
 bool LooksLikeUnit(std::string_view text);
 
-// The time column named by the caller, or the first one named like a time. Errors: none, or without any number.
+// The time column named by the caller, the one that the file names, or the first one named like a time. Errors: none,
+// or without any number.
 Result<const Column*> FindTimeColumn(const Log& log, const std::string& wanted);
 
 struct TimeUnit {

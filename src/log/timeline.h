@@ -14,8 +14,10 @@ namespace gapscope {
 // first row stays). Where the clock starts again for several rows (a reset, or recordings joined), the longest stretch
 // between such places is kept. A counter of 16 or 32 bits that wraps is carried on: no row is lost.
 enum class TimeRepair { kError, kDropRows };
-enum class MissingRepair { kError, kDropRows, kHold };  // NaN in a column that is used
-enum class WrapRepair { kKeep, kUnwrap };               // an encoder angle that jumps by a whole turn
+// NaN in a column that is used. kKeep: a measured value that is not there stays so, and its row is not compared, fitted
+// or used for noise; commands are held.
+enum class MissingRepair { kError, kDropRows, kHold, kKeep };
+enum class WrapRepair { kKeep, kUnwrap };  // an encoder angle that jumps by a whole turn
 
 struct TimelineOptions {
   std::string time_column =
@@ -23,7 +25,7 @@ struct TimelineOptions {
   std::string time_unit = {};  // "s", "ms", "us", "ns"; empty: from the name, then from the size of the steps
   TimeRepair repeated = TimeRepair::kDropRows;
   TimeRepair reversed = TimeRepair::kDropRows;
-  // For rows without a stamp kHold means kDropRows: a time cannot be held.
+  // For rows without a stamp kHold and kKeep mean kDropRows: a time cannot be held.
   MissingRepair missing = MissingRepair::kHold;
   std::vector<std::string> required =
       {};                 // with missing = kDropRows: rows with NaN in any of these columns are dropped
@@ -50,7 +52,7 @@ Result<Timeline> BuildTimeline(const Log& log, const TimelineOptions& options);
 // treated as kError here: rows are dropped in BuildTimeline only for columns listed in `required`).
 // Values before the first one that is there take that one. `wrap_period` > 0 with kUnwrap removes jumps by that many SI
 // units, taking each step as the shortest way round: right while the angle moves less than half a turn between rows.
-// Findings: "held" (of a missing value), "wrap" (also with kKeep, then as a warning), "saturation".
+// Findings: "held" and "kept" (of a missing value), "wrap" (also with kKeep, then as a warning), "saturation".
 // Errors: a NaN under kError or kDropRows, no value at all, a value that is not finite once scaled.
 struct ColumnOptions {
   double factor = 1, offset = 0;

@@ -306,6 +306,7 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
   if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
   json["budget"] = {{"work", d.most_steps}, {"spent", d.work.steps}, {"unit", "steps"}, {"cut", d.cut}};
+  json["termination"] = d.interrupted ? "interrupted" : d.cut.empty() ? "finished" : "budget spent";
   json["policy"] = JsonPolicy();
   json["seed"] = run.info.seed;
   json["versions"] = JsonVersions(run.info);
@@ -331,7 +332,8 @@ std::string ToTable(const DiagnoseRun& run) {
     for (const std::string& sentence : NextSentences(d.next)) text += Wrapped("- " + sentence, 120, "  ") + "\n";
     if (!d.next.command.empty()) text += WrappedCommand(d.next.command, 120) + "\n";
   }
-  text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, d.cut.empty() ? "" : ", the whole budget");
+  const char* const early = d.interrupted ? ", interrupted" : d.cut.empty() ? "" : ", the whole budget";
+  text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, early);
   return text;
 }
 

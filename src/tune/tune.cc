@@ -227,7 +227,7 @@ Found FitFromAll(const Fit& fit, TuneSummary* summary) {
       best = std::move(found);
   }
   summary->values = best.stage->problem.Values(best.result.point);
-  summary->termination = best.result.termination;
+  summary->termination = fit.options.solve.deadline.stopped() ? Termination::kInterrupted : best.result.termination;
   for (const double cost : summary->start_costs)
     summary->starts_agree = summary->starts_agree && cost <= best.result.cost * (1 + kAgree);
   summary->stamps = best.stage->problem.Stamps(best.result.point);

@@ -1,6 +1,5 @@
 #include "src/video/page.h"
 
-#include <cairo/cairo.h>
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include "src/compare/decimate.h"
 #include "src/core/file.h"
 #include "src/core/statistics.h"
+#include "src/video/cairo_library.h"
 
 namespace gapscope {
 namespace {
@@ -70,34 +70,34 @@ double NiceStep(double range, double count) {
 // A cairo surface over a picture's pixels.
 struct Page::Canvas {
   explicit Canvas(Picture& picture)
-      : surface(cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(picture.pixels.data()),
-                                                    CAIRO_FORMAT_RGB24, picture.width, picture.height,
-                                                    4 * picture.width)),
-        cr(cairo_create(surface)) {
-    cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
+      : surface(Cairo().cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(picture.pixels.data()),
+                                                            CAIRO_FORMAT_RGB24, picture.width, picture.height,
+                                                            4 * picture.width)),
+        cr(Cairo().cairo_create(surface)) {
+    Cairo().cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
   }
   ~Canvas() {
-    cairo_destroy(cr);
-    cairo_surface_destroy(surface);
+    Cairo().cairo_destroy(cr);
+    Cairo().cairo_surface_destroy(surface);
   }
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  void Ink(const Colour& c, double alpha = 1) { cairo_set_source_rgba(cr, c.r, c.g, c.b, alpha); }
+  void Ink(const Colour& c, double alpha = 1) { Cairo().cairo_set_source_rgba(cr, c.r, c.g, c.b, alpha); }
   void Font(double size, bool bold = false) {
-    cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
-                           bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cr, size);
+    Cairo().cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
+                                   bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    Cairo().cairo_set_font_size(cr, size);
   }
   double Width(const std::string& text) {
     cairo_text_extents_t extents;
-    cairo_text_extents(cr, text.c_str(), &extents);
+    Cairo().cairo_text_extents(cr, text.c_str(), &extents);
     return extents.x_advance;
   }
   // Text whose anchor (0 left, 0.5 middle, 1 right) is at x, on the base line y.
   void Text(const std::string& text, double x, double y, double anchor = 0) {
-    cairo_move_to(cr, x - anchor * Width(text), y);
-    cairo_show_text(cr, text.c_str());
+    Cairo().cairo_move_to(cr, x - anchor * Width(text), y);
+    Cairo().cairo_show_text(cr, text.c_str());
   }
   // As much of the text as fits.
   std::string Fit(std::string text, double width) {
@@ -110,17 +110,17 @@ struct Page::Canvas {
     return text + "\u2026";
   }
   void Box(double x, double y, double w, double h, double radius) {
-    cairo_new_sub_path(cr);
-    cairo_arc(cr, x + w - radius, y + radius, radius, -M_PI / 2, 0);
-    cairo_arc(cr, x + w - radius, y + h - radius, radius, 0, M_PI / 2);
-    cairo_arc(cr, x + radius, y + h - radius, radius, M_PI / 2, M_PI);
-    cairo_arc(cr, x + radius, y + radius, radius, M_PI, 3 * M_PI / 2);
-    cairo_close_path(cr);
+    Cairo().cairo_new_sub_path(cr);
+    Cairo().cairo_arc(cr, x + w - radius, y + radius, radius, -M_PI / 2, 0);
+    Cairo().cairo_arc(cr, x + w - radius, y + h - radius, radius, 0, M_PI / 2);
+    Cairo().cairo_arc(cr, x + radius, y + h - radius, radius, M_PI / 2, M_PI);
+    Cairo().cairo_arc(cr, x + radius, y + radius, radius, M_PI, 3 * M_PI / 2);
+    Cairo().cairo_close_path(cr);
   }
   void Card(double x, double y, double w, double h, double radius) {
     Box(x, y, w, h, radius);
     Ink(kPaper, 0.86);
-    cairo_fill(cr);
+    Cairo().cairo_fill(cr);
   }
   cairo_surface_t* surface;
   cairo_t* cr;
@@ -215,7 +215,7 @@ void Page::AddRow(const std::vector<const std::vector<double>*>& shown, double h
 
 void Page::DrawPaper(Canvas& c) const {
   c.Ink(kPaper);
-  cairo_paint(c.cr);
+  Cairo().cairo_paint(c.cr);
   for (std::size_t s = 0; s < traces_.signals.size(); ++s)
     DrawScale(c, rows_[s], traces_.signals[s].name, traces_.signals[s].unit);
   if (shows_command()) DrawScale(c, rows_.back(), traces_.commands.front().name, traces_.commands.front().unit);
@@ -264,48 +264,48 @@ void Page::DrawLine(Canvas& c, const Row& row, const std::vector<double>& values
     }
     const double x = margin_ + (time[begin + r] - options_.from_s) * pixels_per_s_,
                  y = row.top + row.height * (row.high - part[r]) / (row.high - row.low);
-    if (pen_down && steps) cairo_line_to(c.cr, x, y_before);
-    pen_down ? cairo_line_to(c.cr, x, y) : cairo_move_to(c.cr, x, y);
+    if (pen_down && steps) Cairo().cairo_line_to(c.cr, x, y_before);
+    pen_down ? Cairo().cairo_line_to(c.cr, x, y) : Cairo().cairo_move_to(c.cr, x, y);
     pen_down = true;
     y_before = y;
   }
-  cairo_stroke(c.cr);
+  Cairo().cairo_stroke(c.cr);
 }
 
 void Page::DrawStrip(Canvas& c, bool past) const {
   c.Ink(kPaper);
-  cairo_paint(c.cr);
+  Cairo().cairo_paint(c.cr);
   const double strength = past ? 1 : 0.28, width = future_.width - 2 * margin_;
   for (std::size_t s = 0; s < rows_.size(); ++s) {
     const Row& row = rows_[s];
-    cairo_save(c.cr);
-    cairo_rectangle(c.cr, margin_, row.top, width, row.height);
-    cairo_clip(c.cr);
+    Cairo().cairo_save(c.cr);
+    Cairo().cairo_rectangle(c.cr, margin_, row.top, width, row.height);
+    Cairo().cairo_clip(c.cr);
     c.Ink({0.972, 0.976, 0.982});
-    cairo_paint(c.cr);
+    Cairo().cairo_paint(c.cr);
     if (row.low < 0 && row.high > 0) {
       c.Ink(kGrid);
-      cairo_set_line_width(c.cr, unit_);
+      Cairo().cairo_set_line_width(c.cr, unit_);
       const double y = row.top + row.height * row.high / (row.high - row.low);
-      cairo_move_to(c.cr, margin_, y);
-      cairo_line_to(c.cr, margin_ + width, y);
-      cairo_stroke(c.cr);
+      Cairo().cairo_move_to(c.cr, margin_, y);
+      Cairo().cairo_line_to(c.cr, margin_ + width, y);
+      Cairo().cairo_stroke(c.cr);
     }
     if (s >= traces_.signals.size()) {
       c.Ink(kFaint, past ? 1 : 0.45);
-      cairo_set_line_width(c.cr, 1.3 * unit_);
+      Cairo().cairo_set_line_width(c.cr, 1.3 * unit_);
       DrawLine(c, row, traces_.commands.front().values, true);
     } else {
       c.Ink(kMeasured, strength);
-      cairo_set_line_width(c.cr, 3.4 * unit_);
+      Cairo().cairo_set_line_width(c.cr, 3.4 * unit_);
       DrawLine(c, row, traces_.signals[s].measured, false);
       for (std::size_t m = 0; m < models_.size(); ++m) {
         c.Ink(OfModel(m), strength);
-        cairo_set_line_width(c.cr, 1.6 * unit_);
+        Cairo().cairo_set_line_width(c.cr, 1.6 * unit_);
         DrawLine(c, row, traces_.signals[s].predicted[m], false);
       }
     }
-    cairo_restore(c.cr);
+    Cairo().cairo_restore(c.cr);
   }
   if (rolls_) DrawTimeAxis(c, margin_);
 }
@@ -317,10 +317,10 @@ void Page::DrawTimeAxis(Canvas& c, double left) const {
   for (double t = std::ceil(options_.from_s / step - 1e-9) * step; t <= options_.to_s + 1e-9 * step; t += step) {
     const double x = left + (t - options_.from_s) * pixels_per_s_;
     c.Ink(kGrid);
-    cairo_set_line_width(c.cr, unit_);
-    cairo_move_to(c.cr, x, axis_top_);
-    cairo_line_to(c.cr, x, axis_top_ + 4 * unit_);
-    cairo_stroke(c.cr);
+    Cairo().cairo_set_line_width(c.cr, unit_);
+    Cairo().cairo_move_to(c.cr, x, axis_top_);
+    Cairo().cairo_line_to(c.cr, x, axis_top_ + 4 * unit_);
+    Cairo().cairo_stroke(c.cr);
     c.Ink(kFaint);
     c.Text(fmt::format("{:g}", std::round(t / step) * step + 0.0), x, axis_top_ + 17 * unit_, 0.5);
   }
@@ -353,22 +353,22 @@ void Page::DrawCursor(Canvas& c, double time_s) const {
   const double shown_s = std::clamp(time_s, options_.from_s, options_.to_s);
   const double x = left_ + plot_left_ + (shown_s - options_.from_s) * pixels_per_s_ - StripBegin(time_s);
   c.Ink(kInk, 0.55);
-  cairo_set_line_width(c.cr, 1.2 * unit_);
+  Cairo().cairo_set_line_width(c.cr, 1.2 * unit_);
   for (const Row& row : rows_) {
     if (!beside_ && &row != &rows_.front()) continue;
-    cairo_move_to(c.cr, x, top_ + row.top);
-    cairo_line_to(c.cr, x, top_ + (beside_ ? row.top + row.height : axis_top_));
+    Cairo().cairo_move_to(c.cr, x, top_ + row.top);
+    Cairo().cairo_line_to(c.cr, x, top_ + (beside_ ? row.top + row.height : axis_top_));
   }
-  cairo_stroke(c.cr);
+  Cairo().cairo_stroke(c.cr);
   const auto dot = [&](const Row& row, double value, const Colour& colour) {
     if (!std::isfinite(value)) return;
     const double y = row.top + row.height * (row.high - std::clamp(value, row.low, row.high)) / (row.high - row.low);
-    cairo_arc(c.cr, x, top_ + y, 4.2 * unit_, 0, 2 * M_PI);
+    Cairo().cairo_arc(c.cr, x, top_ + y, 4.2 * unit_, 0, 2 * M_PI);
     c.Ink(colour);
-    cairo_fill_preserve(c.cr);
+    Cairo().cairo_fill_preserve(c.cr);
     c.Ink(kPaper);
-    cairo_set_line_width(c.cr, 1.2 * unit_);
-    cairo_stroke(c.cr);
+    Cairo().cairo_set_line_width(c.cr, 1.2 * unit_);
+    Cairo().cairo_stroke(c.cr);
   };
   for (std::size_t s = 0; s < traces_.signals.size(); ++s) {
     for (std::size_t m = 0; m < models_.size(); ++m)
@@ -430,7 +430,7 @@ void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
   c.Card(left, top, width, height, 7 * unit_);
   c.Ink(colour);
   c.Box(left + 12 * unit_, top + 11 * unit_, 14 * unit_, 14 * unit_, 3 * unit_);
-  cairo_fill(c.cr);
+  Cairo().cairo_fill(c.cr);
   c.Ink(kInk);
   c.Font(15 * unit_, true);
   c.Text(label, left + 34 * unit_, top + 23 * unit_);
@@ -440,7 +440,7 @@ void Page::DrawPanel(Canvas& c, std::size_t panel, double time_s) const {
     y += line_height;
     c.Ink(kMeasured, 0.5);
     c.Box(left + 12 * unit_, y - 11 * unit_, 14 * unit_, 14 * unit_, 3 * unit_);
-    cairo_fill(c.cr);
+    Cairo().cairo_fill(c.cr);
     c.Ink(kInk);
     c.Text("measured", left + 34 * unit_, y);
   }
@@ -489,12 +489,12 @@ void Page::DrawClock(Canvas& c, double time_s) const {
   };
   c.Box(bar_left, bar_top, bar_width, bar_height, bar_height / 2);
   c.Ink(kGrid);
-  cairo_fill(c.cr);
+  Cairo().cairo_fill(c.cr);
   const double zero = x_of(std::clamp(0.0, row.low, row.high));
   c.Ink(kInk, 0.75);
-  cairo_rectangle(c.cr, std::min(zero, x_of(value)), bar_top, std::max(1.5 * unit_, std::abs(x_of(value) - zero)),
-                  bar_height);
-  cairo_fill(c.cr);
+  Cairo().cairo_rectangle(c.cr, std::min(zero, x_of(value)), bar_top,
+                          std::max(1.5 * unit_, std::abs(x_of(value) - zero)), bar_height);
+  Cairo().cairo_fill(c.cr);
 }
 
 void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& frame) const {
@@ -518,8 +518,8 @@ void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& fram
   Canvas canvas(frame);
   canvas.Ink(kPaper);
   for (std::size_t p = 1; p < panels_; ++p) {
-    cairo_rectangle(canvas.cr, static_cast<double>(p) * scene_width_ - unit_, 0, 2 * unit_, scene_height_);
-    cairo_fill(canvas.cr);
+    Cairo().cairo_rectangle(canvas.cr, static_cast<double>(p) * scene_width_ - unit_, 0, 2 * unit_, scene_height_);
+    Cairo().cairo_fill(canvas.cr);
   }
   for (std::size_t p = 0; p < panels_; ++p) DrawPanel(canvas, p, time_s);
   DrawClock(canvas, time_s);
@@ -529,17 +529,17 @@ void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& fram
 
 Status WritePng(const std::string& path, const Picture& picture) {
   std::string bytes;
-  cairo_surface_t* surface = cairo_image_surface_create_for_data(
+  cairo_surface_t* surface = Cairo().cairo_image_surface_create_for_data(
       reinterpret_cast<unsigned char*>(const_cast<std::uint32_t*>(picture.pixels.data())), CAIRO_FORMAT_RGB24,
       picture.width, picture.height, 4 * picture.width);
   const auto append = [](void* to, const unsigned char* data, unsigned int size) {
     static_cast<std::string*>(to)->append(reinterpret_cast<const char*>(data), size);
     return CAIRO_STATUS_SUCCESS;
   };
-  const cairo_status_t status = cairo_surface_write_to_png_stream(surface, append, &bytes);
-  cairo_surface_destroy(surface);
+  const cairo_status_t status = Cairo().cairo_surface_write_to_png_stream(surface, append, &bytes);
+  Cairo().cairo_surface_destroy(surface);
   if (status != CAIRO_STATUS_SUCCESS)
-    return Error{.what = "cannot make the PNG", .where = path, .actual = cairo_status_to_string(status)};
+    return Error{.what = "cannot make the PNG", .where = path, .actual = Cairo().cairo_status_to_string(status)};
   return WriteFile(path, bytes);
 }
 

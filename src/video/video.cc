@@ -15,6 +15,7 @@
 #include "replay/initial_state.h"
 #include "src/compare/score.h"
 #include "src/core/statistics.h"
+#include "src/video/cairo_library.h"
 #include "src/video/encoder.h"
 
 namespace gapscope {
@@ -349,6 +350,7 @@ Result<VideoSummary> RenderVideo(const Recording& recording, const std::vector<V
   GS_CHECK(!models.empty());
   VideoOptions options = asked;
   GS_RETURN_IF_ERROR(Validate(recording, *models.front().model, &options));
+  GS_RETURN_IF_ERROR(OpenCairo());
   VideoSummary summary;
   GS_ASSIGN(summary.gl, OpenGl(options.gl, pool.workers(), &summary.note));
   GS_ASSIGN(const std::vector<Actor> actors, RehearseAll(recording, models, options, pool));

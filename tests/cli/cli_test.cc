@@ -216,6 +216,53 @@ TEST_F(CliTest, JsonAloneOnStdoutMessagesOnStderr) {
   EXPECT_TRUE(Files(scratch_.Path("cwd")).empty()) << "nothing is left in the working folder";
 }
 
+TEST_F(CliTest, ProgressAndErrorsAsJson) {
+  const std::string log = JointLog();
+  const Answer good = Run("tune " + Joint() + " '" + log + "' --starts 1 --freeze motor.kp --json --progress json");
+  ASSERT_EQ(good.status, 0) << good.err;
+  std::istringstream lines(good.err);
+  int seen = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line.front() != '{') continue;
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json.at("stage"), "fit");
+    EXPECT_TRUE(json.at("done").is_number_integer() && json.at("best").is_number() && json.at("total").is_null());
+    EXPECT_GE(json.at("elapsed_s"), 0);
+    ++seen;
+  }
+  EXPECT_GT(seen, 0) << good.err;
+  EXPECT_EQ(Run("tune " + Joint() + " '" + log + "' --starts 1 --json --progress json --quiet").err, "");
+  for (const std::string& wrong :
+       {"replay " + Joint() + " 'gone.csv'", "replay " + Joint() + " '" + log + "' --jobs -1"}) {
+    const Answer answer = Run(wrong + " --progress json");
+    EXPECT_EQ(answer.status, 2);
+    const auto error = nlohmann::json::parse(answer.err).at("error");
+    for (const char* part : {"what", "where", "actual", "allowed", "cure"}) EXPECT_TRUE(error.contains(part)) << part;
+    EXPECT_FALSE(error.at("what").get<std::string>().empty());
+  }
+}
+
+// A fit that would go on for minutes, told to stop as soon as it has said what it does.
+TEST_F(CliTest, AnInterruptedTuneWritesTheBestSoFar) {
+  const std::string log = JointLog();
+  for (const char* signal : {"INT", "TERM"}) {
+    SCOPED_TRACE(signal);
+    const std::string cwd = scratch_.Path("cwd");
+    std::filesystem::create_directories(cwd);
+    // As soon as it has said what it does; waited for a minute at most.
+    const Answer answer = scratch_.Shell("cd '" + cwd + "'; '" GAPSCOPE_PROGRAM "' tune " + Joint() + " '" + log +
+                                         "' --starts 1000 --json --progress json --out stopped_" + signal +
+                                         " 2> told & pid=$!; for i in $(seq 600); do grep -q stage '" + cwd +
+                                         "/told' && break; sleep 0.1; done; kill -" + signal + " $pid; wait $pid");
+    EXPECT_EQ(answer.status, 0) << answer.err;
+    const auto json = nlohmann::json::parse(answer.out);
+    EXPECT_EQ(json.at("termination"), "interrupted");
+    EXPECT_TRUE(json.at("error").at("held_out").is_number());
+    EXPECT_TRUE(Files(scratch_.Path("cwd/stopped_") + signal).contains("result.json"));
+    std::filesystem::remove(scratch_.Path("cwd/told"));
+  }
+}
+
 TEST_F(CliTest, ADivergenceIsAResultAndLeavesTheStreamsClean) {
   std::string text = "time_s,target_rad,position_rad\n";
   for (int k = 0; k < 200; ++k) text += std::to_string(0.002 * k) + (k < 20 ? ",0,0\n" : ",1e9,0.1\n");

@@ -111,6 +111,20 @@ TEST(NoiseTest, WhiteNoiseOnMotionAndAlone) {
   ExpectTotal({.white = 1e-5, .coloured = 0, .tau_s = 0.01, .moving = true}, 0.1);
 }
 
+// A sensor at a third of the log's rate: lines between its values would pass for less noise.
+TEST(NoiseTest, ASlowerSensorIsJudgedOnItsOwnRows) {
+  const std::vector<double> time_s = Times(15000, 0.002), motion = Motion(time_s), noise = Coloured(15000, 0, 3);
+  std::vector<double> values(time_s.size(), kNaN), own_time_s, own;
+  for (std::size_t i = 0; i < values.size(); i += 3) {
+    values[i] = 0.1 * motion[i] + 1e-3 * noise[i];
+    own_time_s.push_back(time_s[i]);
+    own.push_back(values[i]);
+  }
+  const NoiseFloor floor = EstimateNoise(time_s, values, {});
+  EXPECT_EQ(floor.total_std, EstimateNoise(own_time_s, own, {}).total_std);
+  EXPECT_NEAR(floor.total_std, 1e-3, 1e-4);
+}
+
 TEST(NoiseTest, ColouredNoiseOnMotionAndAlone) {
   ExpectTotal({.white = 2e-4, .coloured = 1e-3, .tau_s = 0.01, .moving = false}, 0.1);
   ExpectTotal({.white = 2e-4, .coloured = 1e-3, .tau_s = 0.01, .moving = true}, 0.15);

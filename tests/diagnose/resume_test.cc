@@ -53,7 +53,7 @@ class ResumeTest : public ::testing::Test {
   // The journal of a whole run as it was each time that the run told what it does: a kill leaves the same.
   std::vector<std::string> Killed(std::string* whole) {
     std::vector<std::string> left;
-    const auto copy = [&](const std::string&) {
+    const auto copy = [&](const DiagnoseProgress&) {
       left.push_back(Path("killed_" + std::to_string(left.size())));
       fs::copy(Path("journal"), left.back(), fs::copy_options::recursive);
     };

@@ -76,7 +76,9 @@ const std::vector<Broken>& Table() {
       {"model: robot.xml", "model: [robot.xml]", {"'model'", "not a text"}},
       // Schema and choices.
       {"gapscope.experiment/1", "gapscope.experiment/2", {"unknown schema", "gapscope.experiment/1"}},
-      {"format: csv", "format: cvs", {"'format'", "'cvs'", "auto, bam_json, csv_lists, csv", "did you mean 'csv'?"}},
+      {"format: csv",
+       "format: cvs",
+       {"'format'", "'cvs'", "auto, npz, bam_json, csv_lists, csv", "did you mean 'csv'?"}},
       {"time_s, unit: s", "time_s, unit: minutes", {"'unit'", "'minutes'"}},
       {"repeated: drop_rows", "repeated: drop", {"'repeated'", "drop_rows, error"}},
       {"kind: velocity", "kind: speed", {"'kind'", "position, velocity, torque"}},

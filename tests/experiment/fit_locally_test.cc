@@ -84,6 +84,23 @@ TEST(FitLocallyTest, IrregularStampsChangeNothing) {
   EXPECT_NEAR(fit.slope, 1 - 8 * r.time_s[20], 1e-9);
 }
 
+// A sensor slower than its log: two of three rows are missing, the row itself among them.
+TEST(FitLocallyTest, MissingValuesChangeNothing) {
+  const auto y = [](double t) { return 1 - 2 * t + 3 * t * t; };
+  Recording r = Sampled(200, 0.002, y);
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    if (k % 3 != 0) r.measured[0].values[k] = std::nan("");
+  }
+  for (const std::size_t row : {std::size_t{0}, std::size_t{1}, std::size_t{100}, std::size_t{199}}) {
+    const double t = r.time_s[row];
+    EXPECT_NEAR(Fit(r, row).value, y(t), 1e-12) << row;
+    EXPECT_NEAR(Fit(r, row).slope, -2 + 6 * t, 1e-9) << row;
+  }
+  Recording still = Sampled(200, 0.002, [](double t) { return t > 0.012 ? 20 * (t - 0.012) * (t - 0.012) : 0; }, 1e-3);
+  still.measured[0].values[1] = std::nan("");
+  EXPECT_EQ(Fit(still, 0).slope, 0);
+}
+
 TEST(FitLocallyTest, ALogThatBeginsAtRestStartsAtRest) {
   // Still for 12 ms, then off with 40 rad/s^2.
   const Recording r =

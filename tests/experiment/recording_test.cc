@@ -94,6 +94,20 @@ TEST_F(RecordingTest, ValuesOfTheHeader) {
   EXPECT_NE(missing.find("default:"), std::string::npos) << missing;
 }
 
+// Two rates merged into one table: the sensor's rows between stay empty, the command is held.
+TEST_F(RecordingTest, KeepLeavesMeasuredValuesMissing) {
+  const std::string log = "time_s,u,q\n0,100,1\n1,,\n2,300,\n3,,4\n";
+  const std::string experiment = Replaced(kExperiment, "unit: s}}", "unit: s}, repair: {missing: keep}}");
+  const auto kept = Load(log, experiment);
+  ASSERT_TRUE(kept.ok()) << kept.error().Text();
+  EXPECT_EQ(kept.value().commands[0].values, (std::vector<double>{1.1, 1.1, 1.3, 1.3}));
+  const std::vector<double>& q = kept.value().measured[0].values;
+  EXPECT_TRUE(std::isfinite(q[0]) && std::isnan(q[1]) && std::isnan(q[2]) && std::isfinite(q[3]));
+  const auto held = Load(log);
+  ASSERT_TRUE(held.ok()) << held.error().Text();
+  EXPECT_EQ(held.value().measured[0].values[2], q[0]);
+}
+
 TEST_F(RecordingTest, MissingColumnsNameTheNearest) {
   const std::string command = MessageOf("time_s,uu,q\n0,1,2\n1,1,2\n");
   EXPECT_NE(command.find("log.csv:1: no column 'u' for the actuator 'motor'"), std::string::npos) << command;

@@ -97,8 +97,8 @@ TEST(SolveTest, SpentBudgetGivesTheBestSoFar) {
   for (const char* optimizer : {"lm", "nlopt:slsqp", "nlopt:bobyqa", "nlopt:crs2"}) {
     FitProblem problem(*rig.model, one.logs, OnlyGain(rig), rig.model->Nominal(), pool);
     const double start = CostOf(problem, problem.Start());
-    const SolveResult found =
-        Solve(problem, problem.Start(), {.optimizer = optimizer, .deadline = std::chrono::steady_clock::now()});
+    const SolveResult found = Solve(problem, problem.Start(),
+                                    {.optimizer = optimizer, .deadline = {.time = std::chrono::steady_clock::now()}});
     EXPECT_EQ(found.termination, Termination::kBudget);
     EXPECT_LE(found.cost, start);
     EXPECT_EQ(CostOf(problem, found.point), found.cost);

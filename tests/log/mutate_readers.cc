@@ -13,7 +13,9 @@
 #include "src/log/csv_reader.h"
 #include "src/log/inspect.h"
 #include "src/log/list_reader.h"
+#include "src/log/npz_reader.h"
 #include "src/log/timeline.h"
+#include "tests/log/npz_fixture.h"
 
 namespace gapscope {
 namespace {
@@ -23,6 +25,30 @@ struct Sample {
   std::string bytes;
   Result<Log> (*read)(const std::string& path, std::string_view bytes);
 };
+
+// Damage to an archive is found by its checksums; here it is done to the arrays, and packed behind right ones.
+Result<Log> ReadPacked(const std::string& path, std::string_view bytes) {
+  std::vector<Member> members;
+  for (std::size_t at = 0; at < bytes.size();) {
+    const std::size_t end = std::min(bytes.find("|||", at), bytes.size());
+    const std::size_t name = std::min(bytes.find(':', at), end);
+    members.push_back({std::string(bytes.substr(at, name - at)),
+                       std::string(bytes.substr(std::min(name + 1, end), end - std::min(name + 1, end))),
+                       members.size() % 2 == 1});
+    at = end + 3;
+  }
+  return ReadNpz(path, Zip(members));
+}
+
+std::vector<Sample> NpzSamples() {
+  std::vector<double> t, q;
+  for (int k = 0; k < 40; ++k) t.push_back(0.004 * k), q.push_back(0.1 * k);
+  const std::string meta = "{\"schema\": \"gapscope.log/1\", \"names\": [\"t\", \"q\"], \"units\": [\"s\", \"rad\"]}";
+  const std::string table = Npy("|u1", "(" + std::to_string(meta.size()) + ",)", meta);
+  return {{"log.npz", Zip({{"t.npy", Npy(t)}, {"q.npy", Npy("<f4", "(40, 2)", BytesOf(t)), true}}), ReadNpz},
+          {"log.npz", "t.npy:" + Npy(t) + "|||q.npy:" + Npy("<i2", "(40, 4)", BytesOf(q)), ReadPacked},
+          {"log.npz", "meta.npy:" + table + "|||c0.npy:" + Npy(t) + "|||c1.npy:" + Npy(q), ReadPacked}};
+}
 
 std::vector<Sample> Samples() {
   std::string csv = "time_s,voltage_v,arm_rad\n", german = "\xEF\xBB\xBFZeit [ms];\"u (V)\";x [\xC2\xB0]\r\n";
@@ -164,7 +190,9 @@ struct Outcome {
 
 Outcome Take(const Sample& sample, const std::string& bytes) {
   const auto refused = [&](const Error& error) {
-    const bool placed = error.where.starts_with(std::string(sample.path) + ":") && error.Text().size() < 20'000;
+    const bool lines = sample.path != std::string_view("log.npz");
+    const bool placed =
+        error.where.starts_with(std::string(sample.path) + (lines ? ":" : "")) && error.Text().size() < 20'000;
     return Outcome{false, placed && !error.what.empty() ? "" : "an error without file and line: " + error.Text()};
   };
   const Result<Log> log = sample.read(sample.path, bytes);
@@ -196,7 +224,8 @@ Outcome Take(const Sample& sample, const std::string& bytes) {
 }
 
 int Run(double seconds, std::uint64_t seed) {
-  const std::vector<Sample> samples = Samples();
+  std::vector<Sample> samples = Samples();
+  for (Sample& sample : NpzSamples()) samples.push_back(std::move(sample));
   for (const auto& sample : samples) {
     if (const Outcome outcome = Take(sample, sample.bytes); !outcome.accepted) {
       std::fprintf(stderr, "a sample that must be read was refused: %s\n%s\n", outcome.complaint.c_str(),

@@ -145,13 +145,56 @@ TEST(TuneTest, SpentBudgetStillGivesAScoredResult) {
   const Rig rig = LoadRig("qube");
   ThreadPool pool(2);
   TuneOptions options{.starts = 3};
-  options.solve.deadline = std::chrono::steady_clock::now();
+  options.solve.deadline.time = std::chrono::steady_clock::now();
   const auto found = Tune(*rig.model, SplitData({QubeLog(rig, rig.Values({{"arm.damping", 4e-4}}), 0, 2)}, {}),
                           rig.model->Nominal(), options, pool);
   ASSERT_TRUE(found.ok());
   EXPECT_EQ(found.value().termination, Termination::kBudget);
   EXPECT_EQ(found.value().start_costs.size(), 1u);
   EXPECT_TRUE(std::isfinite(found.value().error_held_out));
+}
+
+TEST(TuneTest, AnInterruptedFitGivesTheBestSoFar) {
+  const Rig rig = LoadRig("qube");
+  ThreadPool pool(2);
+  std::atomic<bool> stop = false;
+  TuneOptions options{.starts = 3};
+  options.solve.deadline.stop = &stop;
+  options.solve.progress = [&](const Progress&) { stop = true; };
+  const auto found = Tune(*rig.model, SplitData({QubeLog(rig, rig.Values({{"arm.damping", 4e-4}}), 0, 2)}, {}),
+                          rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(found.ok());
+  EXPECT_EQ(found.value().termination, Termination::kInterrupted);
+  EXPECT_EQ(TerminationText(found.value().termination), "interrupted");
+  EXPECT_EQ(found.value().start_costs.size(), 1u);
+  EXPECT_NE(found.value().values, rig.model->Nominal());  // the step that was under way was made
+  EXPECT_TRUE(std::isfinite(found.value().error_held_out));
+}
+
+// A sensor that is slower than the commands: the same parameters come back, and the intervals know that there is less.
+TEST(TuneTest, RowsWithoutAValueAreNotFitted) {
+  const Rig rig = LoadRig("qube");
+  const auto truth = rig.Values({{"arm.damping", 4e-4}});
+  ThreadPool pool(2);
+  const int damping = rig.Index("arm.damping");
+  TuneOptions options{.free = {damping}, .starts = 1};
+  std::vector<Recording> logs = {QubeLog(rig, truth, 0, 2), QubeLog(rig, truth, 1, 2)};
+  const auto whole = Tune(*rig.model, SplitData(logs, {1}), rig.model->Nominal(), options, pool);
+  for (Recording& log : logs) {
+    for (auto& measured : log.measured) {
+      for (std::size_t row = 0; row < measured.values.size(); ++row) {
+        if (row % 3 != 1) measured.values[row] = std::nan("");
+      }
+    }
+  }
+  const auto third = Tune(*rig.model, SplitData(logs, {1}), rig.model->Nominal(), options, pool);
+  ASSERT_TRUE(whole.ok() && third.ok());
+  const TunedParameter a = Of(whole.value(), damping), b = Of(third.value(), damping);
+  EXPECT_LT(b.low, 4e-4);
+  EXPECT_GT(b.high, 4e-4);
+  EXPECT_LT(b.low, a.value);
+  EXPECT_GT(b.high, a.value);
+  EXPECT_NEAR(third.value().error_held_out, whole.value().error_held_out, 0.3 * whole.value().error_held_out);
 }
 
 TEST(TuneTest, NothingFreeIsAnError) {

@@ -1,0 +1,69 @@
+"""Finds why a MuJoCo model does not move like its hardware log.
+
+>>> import gapscope as gs                                                           # doctest: +SKIP
+>>> gs.replay("experiment.yaml", gs.Log(df, time="t"), with_="cable_spring@arm")    # doctest: +SKIP
+
+The program does the work, as a child process: no call of this package can take the interpreter down with it, and
+Ctrl-C gives what a search has found so far. docs/python.md tells more.
+"""
+
+from gapscope._commands import diagnose, inspect, render, replay, tune
+from gapscope._errors import Bug, InputError, Interrupted
+from gapscope._experiment import Experiment
+from gapscope._log import Log, read
+from gapscope._plugins import load_plugins, plugin_library
+from gapscope._program import Progress, bar
+from gapscope._results import (
+    Channel,
+    Diagnosis,
+    FoundEffect,
+    Inspection,
+    Interval,
+    LogResult,
+    Model,
+    Parameter,
+    Replay,
+    Report,
+    SignalScore,
+    Statement,
+    Trace,
+    Traces,
+    Tune,
+    Video,
+    Where,
+)
+
+__all__ = [
+    "Bug",
+    "Channel",
+    "Diagnosis",
+    "Experiment",
+    "FoundEffect",
+    "InputError",
+    "Inspection",
+    "Interrupted",
+    "Interval",
+    "Log",
+    "LogResult",
+    "Model",
+    "Parameter",
+    "Progress",
+    "Replay",
+    "Report",
+    "SignalScore",
+    "Statement",
+    "Trace",
+    "Traces",
+    "Tune",
+    "Video",
+    "Where",
+    "bar",
+    "diagnose",
+    "inspect",
+    "load_plugins",
+    "plugin_library",
+    "read",
+    "render",
+    "replay",
+    "tune",
+]

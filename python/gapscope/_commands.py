@@ -1,0 +1,264 @@
+"""The commands of the program as functions."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+from gapscope._errors import InputError, Interrupted
+from gapscope._experiment import Experiment
+from gapscope._log import Log
+from gapscope._program import Finished, ProgressCallback, run
+from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video, from_json
+
+Source: TypeAlias = Experiment | str | os.PathLike[str] | Mapping[str, Any]
+OneLog: TypeAlias = Log | str | os.PathLike[str]
+Logs: TypeAlias = OneLog | Sequence[OneLog]
+Texts: TypeAlias = str | Sequence[str]
+Values: TypeAlias = Mapping[str, float] | None
+Folder: TypeAlias = str | os.PathLike[str] | None
+# Any other option of the program's command (docs/options.md), without its dashes: {"huber": 2, "no-next-experiment":
+# True}.
+Options: TypeAlias = Mapping[str, object] | None
+R = TypeVar("R", bound=Run)
+
+
+@dataclass
+class _Job:
+    """A command's folder, its arguments, and what its logs are called."""
+
+    out: Path
+    keep: tempfile.TemporaryDirectory[str] | None
+    arguments: list[str]
+    names: dict[str, str]  # of logs from memory, by the files that the program is given
+
+    def json(self, text: str) -> dict[str, Any]:
+        for path, name in self.names.items():
+            text = text.replace(json.dumps(path)[1:-1], json.dumps(name)[1:-1])
+        data: dict[str, Any] = json.loads(text)
+        return data
+
+    def messages(self, finished: Finished) -> tuple[str, ...]:
+        def named(line: str) -> str:
+            for path, name in self.names.items():
+                line = line.replace(path, name)
+            return line
+
+        return tuple(named(line) for line in finished.messages)
+
+
+def _job(command: str, exp: Source, out: Folder) -> _Job:
+    keep = None if out is not None else tempfile.TemporaryDirectory(prefix="gapscope_")
+    folder = Path(out) if out is not None else Path(keep.name)  # type: ignore[union-attr]
+    folder.mkdir(parents=True, exist_ok=True)
+    experiment = exp if isinstance(exp, Experiment) else Experiment(exp)
+    return _Job(folder, keep, [command, str(experiment.file(folder))], {})
+
+
+def _list(logs: Logs) -> list[OneLog]:
+    return [logs] if isinstance(logs, (Log, str, os.PathLike)) else list(logs)
+
+
+def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
+    """The logs' files; those in memory are written beside the result."""
+    files = []
+    for log in _list(logs):
+        if not isinstance(log, (Log, str, os.PathLike)):
+            log = Log(log)
+        if not isinstance(log, Log):
+            files.append(os.fspath(log))
+        elif log.path is not None:
+            files.append(str(log.path))
+        else:
+            name = log.name or f"log_{len(job.names)}"
+            path = job.out / "logs" / f"{name}.npz"
+            if Path(name).name != name or str(path) in job.names:
+                raise InputError("not a log's name", "Log.name", repr(name), "names that differ, without /")
+            path.parent.mkdir(exist_ok=True)
+            log.save(path)
+            job.names[str(path)] = name
+            files.append(str(path))
+    if not files:
+        raise InputError("no log", what, "an empty list", "at least one")
+    return files
+
+
+def _add(job: _Job, flag: str, values: Texts | Values | float | None) -> None:
+    """A flag for each of the values; none where there is no value."""
+    if values is None:
+        return
+    if isinstance(values, Mapping):
+        values = [f"{name}={float(value)!r}" for name, value in values.items()]
+    elif isinstance(values, (str, int, float)):
+        values = [str(values)]
+    for value in values:
+        job.arguments += [flag, value]
+
+
+def _add_options(job: _Job, options: Options) -> None:
+    for name, value in (options or {}).items():
+        if value is True:
+            job.arguments.append(f"--{name}")
+        elif value is not False and value is not None:
+            many = value if isinstance(value, (list, tuple)) else [value]
+            _add(job, f"--{name}", [str(one) for one in many])
+
+
+def _finish(kind: type[R], job: _Job, progress: ProgressCallback | None) -> R:
+    """Runs the job and reads its result; Interrupted where Ctrl-C cut it short."""
+    job.arguments += ["--json", "--out", str(job.out)]
+    finished = _run(job, progress)
+    if not finished.stdout:
+        raise Interrupted
+    result = from_json(
+        kind, job.json(finished.stdout), out=job.out, messages=job.messages(finished), _keep=job.keep
+    )
+    if finished.interrupted:
+        raise Interrupted(result if isinstance(result, (Tune, Diagnosis)) else None)
+    return result
+
+
+def _run(job: _Job, progress: ProgressCallback | None) -> Finished:
+    try:
+        return run(job.arguments, progress)
+    except InputError as error:
+        for path, name in job.names.items():
+            error = InputError(*(str(part).replace(path, name) for part in error.args))
+        raise error from None
+
+
+def inspect(exp: Source, logs: Logs, *, options: Options = None) -> tuple[Inspection, ...]:
+    """Is each log fit for use: timing, gaps, repairs, saturation, excitation."""
+    job = _job("inspect", exp, None)
+    job.arguments += [*_files(job, logs), "--json"]
+    _add_options(job, options)
+    finished = _run(job, None)
+    if finished.interrupted:
+        raise Interrupted
+    return tuple(from_json(Inspection, log) for log in job.json(finished.stdout)["logs"])
+
+
+def replay(
+    exp: Source,
+    logs: Logs,
+    *,
+    with_: Texts = (),
+    set: Values = None,
+    mode: str | None = None,
+    window_s: float | None = None,
+    jobs: int | None = None,
+    out: Folder = None,
+    options: Options = None,
+) -> Replay:
+    """The logged commands through the model: predicted against measured.
+
+    ``with_`` adds effects ("cable_spring@arm"), ``set`` sets parameters in their own units. ``mode`` is "free_run",
+    "windows" or "closed_loop". Without ``out`` the files live as long as the result.
+    """
+    job = _job("replay", exp, out)
+    job.arguments += _files(job, logs)
+    for flag, value in (("--with", with_), ("--set", set), ("--mode", mode), ("--window", window_s), ("--jobs", jobs)):
+        _add(job, flag, value)
+    _add_options(job, options)
+    return _finish(Replay, job, None)
+
+
+def tune(
+    exp: Source,
+    logs: Logs,
+    *,
+    hold_out: Logs = (),
+    with_: Texts = (),
+    free: Texts = (),
+    freeze: Texts = (),
+    set: Values = None,
+    starts: int | None = None,
+    budget_s: float | None = None,
+    jobs: int | None = None,
+    seed: int = 0,
+    resume: bool = False,
+    out: Folder = None,
+    progress: ProgressCallback | None = None,
+    options: Options = None,
+) -> Tune:
+    """Parameters fitted until replayed trajectories match the logs, scored on logs not seen.
+
+    Ctrl-C raises Interrupted, whose ``partial`` is the best so far. ``progress`` is called in this thread.
+    """
+    job = _job("tune", exp, out)
+    job.arguments += _files(job, logs)
+    _add(job, "--hold-out", _files(job, hold_out) if _list(hold_out) else None)
+    for flag, value in (("--with", with_), ("--free", free), ("--freeze", freeze), ("--set", set)):
+        _add(job, flag, value)
+    for name, number in (("--starts", starts), ("--budget", budget_s), ("--jobs", jobs), ("--seed", seed)):
+        _add(job, name, number)
+    job.arguments += ["--resume"] if resume else []
+    _add_options(job, options)
+    return _finish(Tune, job, progress)
+
+
+def diagnose(
+    exp: Source,
+    logs: Logs,
+    *,
+    hold_out: Logs = (),
+    with_: Texts = (),
+    freeze: Texts = (),
+    set: Values = None,
+    prior: Values = None,
+    effort: str | None = None,
+    budget_s: float | None = None,
+    jobs: int | None = None,
+    seed: int = 0,
+    resume: bool = False,
+    out: Folder = None,
+    progress: ProgressCallback | None = None,
+    options: Options = None,
+) -> Diagnosis:
+    """Where the gap lies, which unmodelled effects cause it, how far it shrinks. ``effort``: "quick" ... "thorough".
+
+    Ctrl-C raises Interrupted, whose ``partial`` is the best verdict so far. ``progress`` is called in this thread.
+    """
+    job = _job("diagnose", exp, out)
+    job.arguments += _files(job, logs)
+    _add(job, "--hold-out", _files(job, hold_out) if _list(hold_out) else None)
+    for flag, value in (("--with", with_), ("--freeze", freeze), ("--set", set), ("--prior", prior)):
+        _add(job, flag, value)
+    for name, number in (("--effort", effort), ("--budget", budget_s), ("--jobs", jobs), ("--seed", seed)):
+        _add(job, name, number)
+    job.arguments += ["--resume"] if resume else []
+    _add_options(job, options)
+    return _finish(Diagnosis, job, progress)
+
+
+def render(
+    exp: Source,
+    log: OneLog,
+    out: str | os.PathLike[str],
+    *,
+    compare: Sequence[Run | str | os.PathLike[str]] = (),
+    with_: Texts = (),
+    set: Values = None,
+    progress: ProgressCallback | None = None,
+    options: Options = None,
+) -> Video:
+    """The measured mechanism against the simulated one: VIDEO.mp4, MOVING.gif or STILL.png.
+
+    ``compare`` holds results, folders of results, or "nominal"; of four at most. Needs OSMesa or EGL, a video ffmpeg.
+    """
+    job = _job("render", exp, None)
+    job.arguments += [*_files(job, log, "log"), "--json", "--out", os.fspath(out)]
+    _add(job, "--compare", [str(one.out) if isinstance(one, Run) else os.fspath(one) for one in compare])
+    _add(job, "--with", with_)
+    _add(job, "--set", set)
+    _add_options(job, options)
+    finished = _run(job, progress)
+    if finished.interrupted:
+        raise Interrupted
+    said = job.json(finished.stdout)
+    return Video(Path(said["out"]), said["frames"], said["width"], said["height"])

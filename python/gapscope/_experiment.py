@@ -1,0 +1,64 @@
+"""The experiment: a file, or the same keys as a mapping."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gapscope._errors import InputError
+
+
+class Experiment:
+    """What binds a log to a model: the experiment file (docs/experiment.md), or a mapping with the same keys.
+
+    ``base`` is the folder that the mapping's ``model`` is relative to; without it the working folder. ``model`` may be
+    an MjSpec of the mujoco that is installed.
+    """
+
+    def __init__(
+        self, source: str | os.PathLike[str] | Mapping[str, Any], *, base: str | os.PathLike[str] | None = None
+    ) -> None:
+        self.path: Path | None = None
+        self._keys: dict[str, Any] = {}
+        if isinstance(source, Mapping):
+            self._keys = dict(source)
+            model = self._keys.get("model")
+            if model is None:
+                raise InputError("an experiment without a model", "Experiment", cure="model: a path or an MjSpec")
+            if isinstance(model, (str, os.PathLike)):
+                self._keys["model"] = str((Path(base or ".") / model).resolve())
+            return
+        if base is not None:
+            raise InputError("a file says itself where its model is", "base", str(base), "base for a mapping")
+        self.path = Path(source)
+        if not self.path.is_file():
+            raise InputError("no such experiment file", str(self.path), cure="gapscope init MODEL.xml LOG drafts one")
+
+    def file(self, folder: Path) -> Path:
+        """Its file; of a mapping one that is written into ``folder``, as JSON, which YAML contains."""
+        if self.path is not None:
+            return self.path
+        keys = dict(self._keys)
+        if hasattr(keys["model"], "to_xml"):
+            model = folder / "experiment_model.xml"
+            keys["model"].compile()
+            model.write_text(keys["model"].to_xml(), encoding="utf-8")
+            keys["model"] = str(model.resolve())
+        target = folder / "experiment.yaml"
+        try:
+            target.write_text(json.dumps(keys, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        except (TypeError, ValueError) as failure:
+            raise InputError(
+                "an experiment that cannot be written",
+                "Experiment",
+                str(failure),
+                "mappings, lists, texts, finite numbers",
+                "numpy numbers: float(x), x.tolist()",
+            ) from failure
+        return target
+
+    def __repr__(self) -> str:
+        return f"Experiment({str(self.path) if self.path else self._keys['model']!r})"

@@ -1,0 +1,305 @@
+"""Logs from memory: checked, and handed to the program as one NPZ table, without a detour over text."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from gapscope._errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+SCHEMA = "gapscope.log/1"
+_TIMES = {"time_s", "time", "t", "timestamp", "stamp", "__time", "time_ms", "time_us", "time_ns", "timestamp_ns"}
+
+
+class Log:
+    """A hardware log.
+
+    ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), a pandas DataFrame, a
+    structured array, or a mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ...
+    ``NAME[n - 1]``. Values are in the units that the experiment file states; NaN is a missing value.
+
+    ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
+    time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so.
+    Dates become seconds from the first. ``header`` holds numbers and texts of the whole log (``values: {header: kp}``
+    of an experiment). ``name`` is what results call the log.
+
+    Stamps that are missing, repeat or go back are refused here: in memory they are a mistake. In files they are
+    repaired as the experiment says.
+
+    >>> log = Log({"time_s": [0.0, 0.1], "u": [1, 2], "q": [[0, 1], [2, 3]]}, name="step")
+    >>> log.columns
+    ('time_s', 'u', 'q[0]', 'q[1]')
+    """
+
+    def __init__(
+        self,
+        data: Any,
+        *,
+        time: str | None = None,
+        time_unit: str | None = None,
+        header: Mapping[str, float | str] | None = None,
+        name: str = "",
+    ) -> None:
+        self.path: Path | None = None
+        self.name = name
+        self.time = time
+        self._table: dict[str, Floats] = {}
+        self._header = dict(header or {})
+        if isinstance(data, (str, os.PathLike)):
+            if time is not None or time_unit is not None or header:
+                raise InputError(
+                    "a file says itself what its time and header are",
+                    where=os.fspath(data),
+                    allowed="time, time_unit and header for data in memory",
+                    cure="state them in the experiment file: log: {time: {column: NAME, unit: s}}",
+                )
+            self.path = Path(data)
+            if not self.path.exists():
+                raise InputError("no such file", where=str(self.path), cure="name the right log")
+            return
+        if time_unit not in (None, "s", "ms", "us", "ns"):
+            raise InputError("not a unit of time", "time_unit", repr(time_unit), "s, ms, us, ns")
+        self._unit = time_unit or ""
+        self._take(data)
+        self._check()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns. Of a file: only of this package's own, which ``save`` writes."""
+        return tuple(self._load())
+
+    def __getitem__(self, column: str) -> Floats:
+        """A column, shape (rows,)."""
+        table = self._load()
+        if column not in table:
+            raise InputError("no such column", repr(self), repr(column), ", ".join(table))
+        return table[column]
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The table, time as a column."""
+        import pandas as pd
+
+        return pd.DataFrame(self._load())
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Writes the table as NPZ (``gapscope.log/1``), which the program reads to the last bit."""
+        if self.path is not None:
+            raise InputError("the log is a file already", str(self.path), cure="copy it")
+        names = list(self._table)
+        meta: dict[str, Any] = {"schema": SCHEMA, "names": names}
+        meta["units"] = [self._unit if name == self.time else "" for name in names]
+        meta["header"] = self._header
+        if self.time is not None:
+            meta["time"] = self.time
+        text = np.frombuffer(json.dumps(meta, allow_nan=False).encode(), dtype=np.uint8)
+        target = Path(path)
+        with target.open("wb") as file:
+            arrays: dict[str, Any] = {"meta": text, **{f"c{k}": self._table[name] for k, name in enumerate(names)}}
+            np.savez(file, **arrays)
+        return target
+
+    def __repr__(self) -> str:
+        if self.path is not None:
+            return f"Log({str(self.path)!r})"
+        rows = len(next(iter(self._table.values())))
+        return f"Log({self.name + ': ' if self.name else ''}{rows} rows of {', '.join(self._table)})"
+
+    def _load(self) -> dict[str, Floats]:
+        if self.path is None:
+            return self._table
+        if self.path.suffix == ".npz":
+            with np.load(self.path, allow_pickle=False) as archive:
+                if "meta" in archive and "c0" in archive:
+                    names = json.loads(archive["meta"].tobytes())["names"]
+                    return {name: archive[f"c{k}"] for k, name in enumerate(names)}
+        raise InputError(
+            "the columns of this file are read by the program alone",
+            str(self.path),
+            allowed="tables in memory, and files that Log.save wrote",
+            cure="read it yourself, for example with pandas, and give the DataFrame to Log",
+        )
+
+    # How data in memory becomes the table.
+
+    def _take(self, data: Any) -> None:
+        if _is_frame(data):
+            self._take_frame(data)
+        elif isinstance(data, np.ndarray) and data.dtype.names:
+            self._guess_time(data.dtype.names)
+            for name in data.dtype.names:
+                self._add(name, data[name])
+        elif isinstance(data, Mapping):
+            self._guess_time(data)
+            for name, values in data.items():
+                self._add(name, values)
+        else:
+            raise InputError(
+                "not a log",
+                "Log",
+                type(data).__name__,
+                "a path, a pandas DataFrame, a mapping of names to arrays, a structured array",
+                "an array without names: {'time_s': a[:, 0], 'q': a[:, 1]}",
+            )
+
+    def _guess_time(self, names: Iterable[Any]) -> None:
+        if self.time is None:
+            self.time = next((name for name in names if isinstance(name, str) and name.lower() in _TIMES), None)
+
+    def _take_frame(self, frame: Any) -> None:
+        if frame.columns.nlevels > 1:
+            raise InputError(
+                "columns of several levels",
+                "DataFrame.columns",
+                f"a MultiIndex of {frame.columns.nlevels} levels",
+                "one level of names",
+                "df.columns = ['/'.join(map(str, c)) for c in df.columns]",
+            )
+        if frame.index.nlevels > 1:
+            raise InputError(
+                "an index of several levels",
+                "DataFrame.index",
+                f"a MultiIndex of {frame.index.nlevels} levels",
+                "one log: one level",
+                "pick one log, df.xs(KEY), or make the levels columns, df.reset_index()",
+            )
+        if self.time is None and frame.index.dtype.kind in "mM":
+            self.time = str(frame.index.name or "time_s")
+            if self.time in frame.columns:
+                raise InputError(
+                    "index and column of one name", "DataFrame", repr(self.time), "one", "df.index.name = 'time_s'"
+                )
+            self._add(self.time, frame.index)
+        self._guess_time(frame.columns)
+        for position, name in enumerate(frame.columns):
+            self._add(name, frame.iloc[:, position])
+
+    def _add(self, name: Any, values: Any) -> None:
+        if not isinstance(name, str) or not name:
+            raise InputError(
+                "a column whose name is no text", "Log", repr(name), "text", "df.columns = df.columns.map(str)"
+            )
+        if name in self._table:
+            raise InputError(
+                "two columns of one name",
+                "Log",
+                repr(name),
+                "each name once",
+                "df = df.loc[:, ~df.columns.duplicated()]",
+            )
+        numbers = self._numbers(name, values)
+        if numbers.ndim == 1:
+            self._table[name] = numbers
+            return
+        if numbers.ndim != 2 or name == self.time:
+            raise InputError("an array of no column's shape", repr(name), str(numbers.shape), "(rows,), (rows, n)")
+        for k in range(numbers.shape[1]):
+            self._table[f"{name}[{k}]"] = np.ascontiguousarray(numbers[:, k])
+
+    def _numbers(self, name: str, values: Any) -> Floats:
+        kind = getattr(getattr(values, "dtype", None), "kind", "")
+        if hasattr(values, "to_numpy") and kind in "buif":
+            # pandas' own numbers too, whose missing values are not NaN.
+            return np.ascontiguousarray(values.to_numpy(dtype=np.float64, na_value=np.nan))
+        if hasattr(values, "to_numpy") and kind in "mM":
+            # With a time zone numpy would make objects of them.
+            values = values.to_numpy(dtype="datetime64[ns]" if kind == "M" else "timedelta64[ns]")
+        array = np.asarray(values)
+        if array.dtype.kind in "mM":
+            return self._seconds(name, array)
+        if array.dtype.kind not in "buif":
+            raise InputError(
+                "a column that does not hold numbers",
+                repr(name),
+                f"dtype {getattr(values, 'dtype', array.dtype)}",
+                "booleans, integers, floats; dates only as the time",
+                f"df[{name!r}] = pd.to_numeric(df[{name!r}], errors='coerce'), or df = df.drop(columns=[{name!r}])",
+            )
+        return np.ascontiguousarray(array, dtype=np.float64)
+
+    def _seconds(self, name: str, stamps: npt.NDArray[Any]) -> Floats:
+        if self.time is None:
+            self.time = name
+        if name != self.time:
+            raise InputError(
+                "dates in a column that is not the time",
+                repr(name),
+                f"dtype {stamps.dtype}",
+                "numbers",
+                f"time={name!r}, or df = df.drop(columns=[{name!r}])",
+            )
+        if np.isnat(stamps).any():
+            raise self._missing_stamp(name, int(np.flatnonzero(np.isnat(stamps))[0]), "NaT")
+        self._unit = "s"
+        steps = (stamps - stamps[0]).astype("timedelta64[ns]") if len(stamps) else stamps.astype("timedelta64[ns]")
+        return np.asarray(steps.astype(np.int64) * 1e-9, dtype=np.float64)
+
+    # What must hold for all of it.
+
+    def _check(self) -> None:
+        if not self._table:
+            raise InputError("a log without columns", "Log", "nothing", "a time and signals")
+        lengths = {name: len(values) for name, values in self._table.items()}
+        rows = next(iter(lengths.values()))
+        for name, length in lengths.items():
+            if length != rows:
+                raise InputError(
+                    "columns of different lengths",
+                    repr(name),
+                    f"{length} rows, {rows} in {next(iter(lengths))!r}",
+                    "one length",
+                    "was one of them recorded at another rate? Put NaN where there is no value",
+                )
+        if self.time is None:
+            return
+        if self.time not in self._table:
+            raise InputError("no such column for the time", "Log", repr(self.time), ", ".join(self._table))
+        self._check_stamps(self.time, self._table[self.time])
+
+    def _check_stamps(self, name: str, stamps: Floats) -> None:
+        finite = np.isfinite(stamps)
+        if not finite.all():
+            row = int(np.flatnonzero(~finite)[0])
+            raise self._missing_stamp(name, row, str(stamps[row]))
+        steps = np.diff(stamps)
+        if (steps > 0).all():
+            return
+        row = int(np.flatnonzero(~(steps > 0))[0]) + 1
+        repeats = steps[row - 1] == 0
+        raise InputError(
+            "a time stamp that repeats" if repeats else "time goes back",
+            f"column {name!r}, row {row}",
+            f"{float(stamps[row])!r} after {float(stamps[row - 1])!r}",
+            "stamps that grow from row to row",
+            f"df = df.drop_duplicates({name!r})"
+            if repeats
+            else f"df = df.sort_values({name!r}); or were two recordings joined? Give each as a Log of its own",
+        )
+
+    @staticmethod
+    def _missing_stamp(name: str, row: int, actual: str) -> InputError:
+        return InputError(
+            "a row without a time stamp",
+            f"column {name!r}, row {row}",
+            actual,
+            "a time in every row",
+            f"df = df.dropna(subset=[{name!r}])",
+        )
+
+
+def _is_frame(data: Any) -> bool:
+    return hasattr(data, "iloc") and hasattr(data, "columns") and hasattr(data, "index")
+
+
+def read(path: str | os.PathLike[str]) -> Log:
+    """A log in a file that the program reads."""
+    return Log(path)

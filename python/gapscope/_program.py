@@ -1,0 +1,150 @@
+"""The program as a child process: found, started, listened to, interrupted."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from gapscope._errors import Bug, InputError
+
+_DONE, _BELOW_THRESHOLD, _BAD_INPUT = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a long call has come; None: not known."""
+
+    stage: str
+    done: float | None
+    total: float | None
+    best: float | None  #: cost, of a fit
+    elapsed_s: float
+
+
+ProgressCallback = Callable[[Progress], object]
+
+
+def bar(progress: Progress, stream: TextIO | None = None) -> None:
+    """A line that is written over: ``gs.tune(..., progress=gs.bar)``."""
+    text = progress.stage
+    if progress.done is not None and progress.total:
+        share = min(progress.done / progress.total, 1.0)
+        text = f"[{'#' * round(20 * share):<20}] {text}"
+    elif progress.done is not None:
+        text += f" {progress.done:g}"
+    if progress.best is not None:
+        text += f", cost {progress.best:.6g}"
+    print(f"\r\033[K{text}, {progress.elapsed_s:.0f} s", end="", file=stream or sys.stderr, flush=True)
+
+
+@dataclass(frozen=True)
+class Finished:
+    stdout: str
+    messages: tuple[str, ...]  # lines for people on stderr
+    interrupted: bool
+
+
+def home() -> Path:
+    """The package's folder in a wheel; in a checkout its build folder."""
+    package = Path(__file__).resolve().parent
+    return package if (package / "bin").is_dir() else package.parents[1] / "build"
+
+
+def program() -> Path:
+    """The program that is run: $GAPSCOPE_PROGRAM, else the wheel's own, else the checkout's build."""
+    given = os.environ.get("GAPSCOPE_PROGRAM")
+    path = Path(given) if given else home() / "bin" / "gapscope"
+    if not os.access(path, os.X_OK):
+        raise InputError(
+            "the program is not there",
+            where=str(path),
+            allowed="a program of Linux on x86-64",
+            cure="install the wheel, or build the checkout: cmake --build --preset release",
+        )
+    return path
+
+
+def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> Finished:
+    """Runs a command to its end. Ctrl-C goes to the child exactly once, and what it then still writes is kept.
+
+    A second Ctrl-C, or an exception in the callback, kills the child.
+    """
+    command = [str(program()), *arguments, "--progress", "json"]
+    # stdout goes to a file: a pipe would have to be read beside stderr.
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as stdout:
+        # A session of its own: the terminal's Ctrl-C reaches Python alone.
+        with subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,
+        ) as child:
+            try:
+                listener = _Listener(progress)
+                interrupted = _listen(child, listener)
+                status = child.wait()
+            except BaseException:
+                child.kill()
+                raise
+        stdout.seek(0)
+        text = stdout.read()
+    if status in (_DONE, _BELOW_THRESHOLD):
+        return Finished(text, tuple(listener.messages), interrupted)
+    if interrupted:
+        return Finished("", tuple(listener.messages), True)
+    if status == _BAD_INPUT and listener.error is not None:
+        raise listener.error
+    raise Bug(f"gapscope ended with status {status}", command, "\n".join(listener.messages))
+
+
+class _Listener:
+    """Lines of stderr: progress, the error, and messages."""
+
+    def __init__(self, progress: ProgressCallback | None) -> None:
+        self._progress = progress
+        self.messages: list[str] = []
+        self.error: InputError | None = None
+
+    def take(self, line: str) -> None:
+        line = line.rstrip("\n")
+        try:
+            data = json.loads(line) if line.startswith("{") else None
+        except json.JSONDecodeError:
+            data = None
+        if isinstance(data, dict) and "stage" in data:
+            if self._progress:
+                self._progress(
+                    Progress(data["stage"], data["done"], data["total"], data["best"], data["elapsed_s"])
+                )
+        elif isinstance(data, dict) and "error" in data:
+            self.error = InputError(**data["error"])
+        elif line:
+            self.messages.append(line)
+
+
+def _listen(child: subprocess.Popen[str], listener: _Listener) -> bool:
+    """To the end of the child's stderr; whether it was interrupted on the way."""
+    assert child.stderr is not None
+    interrupted = False
+    while True:
+        try:
+            for line in child.stderr:
+                listener.take(line)
+            return interrupted
+        except KeyboardInterrupt:
+            if interrupted:
+                raise
+            interrupted = True
+            child.send_signal(signal.SIGINT)

@@ -1,0 +1,255 @@
+"""The commands through Python: results, errors, interruption."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pickle
+import signal
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import gapscope as gs
+import numpy as np
+import pytest
+from gapscope._results import from_json
+
+EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
+TRUTH = {
+    "cable_spring@arm.stiffness_n_m_per_rad": 0.0012,
+    "cable_spring@arm.rest_rad": -0.4,
+    "coulomb_friction@arm.friction_n_m": 0.0006,
+}
+
+FROZEN = [
+    *("motor.resistance", "motor.kt", "motor.km", "arm.mass", "arm.damping"),
+    *("pendulum.mass", "pendulum.length", "pendulum.damping"),
+]
+
+
+def short_log(demo: str, name: str) -> gs.Log:
+    return gs.Log(np.genfromtxt(demo, delimiter=",", names=True)[:1000], name=name)
+
+
+def holds(result: Any, data: dict[str, Any]) -> None:
+    """Every number and text of the JSON is in the dataclass, under its own name or in `extra`."""
+    for key, value in data.items():
+        ours = result.extra[key] if key in result.extra else getattr(result, key)
+        if isinstance(value, dict) and hasattr(ours, "extra"):
+            holds(ours, value)
+        elif isinstance(value, dict) and value and hasattr(next(iter(ours.values()), None), "extra"):
+            for name, item in value.items():
+                holds(ours[name], item)
+        elif isinstance(value, list) and ours and hasattr(ours[0], "extra"):
+            assert len(value) == len(ours)
+            for one, item in zip(ours, value):
+                holds(one, item)
+        elif value is None:
+            assert ours is None or math.isnan(ours)
+        else:
+            assert ours == value or list(ours) == value
+
+
+def test_replay_mirrors_the_json(experiment: str, demo: str, tmp_path: Path) -> None:
+    result = gs.replay(experiment, demo, with_=EFFECTS, set=TRUTH, out=tmp_path / "out")
+    assert result.error < 0.01
+    holds(result, result.json)
+    assert result.logs[0].signals["arm_rad"].nrmse == result.json["logs"][0]["signals"]["arm_rad"]["nrmse"]
+    trace = result.traces[0]["arm_rad"]
+    rmse = np.sqrt(np.mean((trace.predicted - trace.measured) ** 2))
+    assert rmse == pytest.approx(result.logs[0].signals["arm_rad"].rmse, rel=1e-3)
+    assert set(result.traces[0]) == {"arm_rad", "pendulum_rad"} and "motor" in result.traces[0].commands
+    assert result.model.effects == tuple(EFFECTS)
+    assert "springref" in result.model.xml() and "srcdoc" in result.report()._repr_html_()
+    shown = result._repr_html_()
+    assert "<svg" in shown and "arm_rad" in shown
+    assert pickle.loads(pickle.dumps(result)).error == result.error
+    with pytest.raises(AttributeError):
+        result.error = 0  # type: ignore[misc]
+
+
+def test_a_newer_program_and_unknown_numbers() -> None:
+    score = from_json(gs.SignalScore, {"rmse": None, "mae": 1, "new": {"a": 1}})
+    assert math.isnan(score.rmse) and score.mae == 1 and score.extra == {"new": {"a": 1}}
+
+
+def test_files_of_a_temporary_result_live_as_long(experiment: str, demo: str) -> None:
+    result = gs.replay(experiment, demo)
+    out, model, traces = result.out, result.model, result.traces
+    del result
+    assert model.xml() and len(traces[0]["arm_rad"].time_s) == 5001
+    del model, traces
+    assert not out.exists()
+
+
+def test_errors_are_fields(experiment: str, demo: str, tmp_path: Path) -> None:
+    with pytest.raises(gs.InputError) as raised:
+        gs.replay(experiment, demo, with_="cable_sprin@arm")
+    assert "cable_sprin" in str(raised.value) and "cable_spring" in str(raised.value)
+    still = [0, 0, 0]
+    log = gs.Log({"time_s": [0, 0.1, 0.2], "voltage": [0, 1, 2], "arm_rad": still, "pendulum_rad": still}, name="run")
+    with pytest.raises(gs.InputError) as raised:
+        gs.replay(experiment, log)
+    error = raised.value
+    assert error.where == "run" and "voltage_v" in error.what and error.cure == "did you mean 'voltage'?"
+    assert pickle.loads(pickle.dumps(error)).cure == error.cure
+    with pytest.raises(gs.InputError, match="no such experiment"):
+        gs.replay("gone.yaml", demo)
+    with pytest.raises(gs.InputError, match="names that differ"):
+        gs.replay(experiment, gs.Log({"t": [0, 1]}, name="a/b"))
+    bad = tmp_path / "run.yaml"
+    bad.write_text("model: 1\n")
+    with pytest.raises(gs.InputError, match="run.yaml"):
+        gs.inspect(bad, demo)
+
+
+def test_a_crash_of_the_program_is_a_bug_not_the_end(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho it fell >&2\nkill -SEGV $$\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", str(broken))
+    with pytest.raises(gs.Bug, match="it fell") as raised:
+        gs.replay(experiment, demo)
+    assert "replay" in raised.value.command
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", str(tmp_path / "gone"))
+    with pytest.raises(gs.InputError, match="the program is not there"):
+        gs.replay(experiment, demo)
+
+
+def test_inspect(experiment: str, demo: str) -> None:
+    (found,) = gs.inspect(experiment, [demo])
+    assert found.fit and found.channels[0].name == "motor" and found.time["rows"] == 5001
+    assert "fit for use" in found._repr_html_()
+
+
+def test_an_experiment_from_memory(experiment: str, demo: str) -> None:
+    keys = {
+        "model": "qube.xml",
+        "commands": [{"actuator": "motor", "column": "voltage_v", "unit": "V"}],
+        "measured": [{"signal": name, "column": f"{name}_rad", "joint": name} for name in ("arm", "pendulum")],
+    }
+    result = gs.replay(gs.Experiment(keys, base=Path(experiment).parent), demo)
+    assert result.error == pytest.approx(gs.replay(experiment, demo).error, rel=0.01)
+    assert json.loads((result.out / "experiment.yaml").read_text())["commands"] == keys["commands"]
+    with pytest.raises(gs.InputError, match="tolist"):
+        gs.replay({**keys, "doc": np.zeros(3)}, demo)
+
+
+def test_tune_with_progress_and_files_in_out(experiment: str, demo: str, tmp_path: Path) -> None:
+    seen: list[gs.Progress] = []
+    result = gs.tune(
+        experiment,
+        short_log(demo, "half"),
+        with_="cable_spring@arm",
+        freeze=FROZEN,
+        starts=1,
+        out=tmp_path,
+        progress=seen.append,
+    )
+    holds(result, _named(result))
+    stiffness = result["cable_spring@arm.stiffness_n_m_per_rad"]
+    assert stiffness.low < 0.0012 < stiffness.high or abs(stiffness.value - 0.0012) < 4e-4
+    assert result.termination == "converged" and result.error.held_out < 0.7 * result.error.nominal
+    assert seen and seen[-1].stage == "fit" and seen[-1].best is not None and seen[-1].total is None
+    assert (tmp_path / "logs" / "half.npz").is_file() and (tmp_path / "report.html").is_file()
+    assert "cable_spring@arm" in result._repr_html_()
+    with pytest.raises(KeyError, match="cable_spring@arm.rest_rad"):
+        result["motor.k"]
+
+
+def _named(result: gs.Tune) -> dict[str, Any]:
+    text = json.dumps(result.json).replace(str(result.out / "logs" / "half.npz"), "half")
+    data: dict[str, Any] = json.loads(text)
+    return data
+
+
+def interrupt_after(seconds: float) -> threading.Thread:
+    """Ctrl-C in a notebook: SIGINT for this process."""
+
+    def kill() -> None:
+        time.sleep(seconds)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=kill, daemon=True)
+    thread.start()
+    return thread
+
+
+def test_ctrl_c_gives_the_best_so_far(experiment: str, demo: str) -> None:
+    started = threading.Event()
+
+    def first(_: gs.Progress) -> None:
+        if not started.is_set():
+            started.set()
+            interrupt_after(0.2)
+
+    with pytest.raises(KeyboardInterrupt) as raised:
+        gs.tune(experiment, short_log(demo, "half"), with_=EFFECTS, freeze=FROZEN, starts=1000, progress=first)
+    partial = raised.value.partial  # type: ignore[attr-defined]
+    assert isinstance(raised.value, gs.Interrupted) and isinstance(partial, gs.Tune)
+    assert partial.termination == "interrupted" and math.isfinite(partial.error.held_out)
+    assert (partial.out / "model.xml").is_file()
+
+
+def test_an_exception_in_the_callback_ends_the_program(experiment: str, demo: str) -> None:
+    class Enough(Exception):
+        pass
+
+    def refuse(_: gs.Progress) -> None:
+        raise Enough
+
+    begin = time.monotonic()
+    with pytest.raises(Enough):
+        gs.tune(experiment, demo, with_=EFFECTS, starts=1000, progress=refuse)
+    assert time.monotonic() - begin < 30
+
+
+def test_threads(experiment: str, demo: str) -> None:
+    errors: list[float] = []
+    threads = [threading.Thread(target=lambda: errors.append(gs.replay(experiment, demo).error)) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(errors) == 3 and len(set(errors)) == 1
+
+
+def test_overhead(experiment: str, demo: str) -> None:
+    """What Python adds to the program's own time; the bound is loose, since the machine is shared."""
+    import subprocess
+
+    from gapscope._program import program
+
+    def least(call: Any) -> float:
+        times = []
+        for _ in range(3):
+            begin = time.perf_counter()
+            call()
+            times.append(time.perf_counter() - begin)
+        return min(times)
+
+    def bare() -> None:
+        import tempfile
+
+        with tempfile.TemporaryDirectory() as folder:
+            command = [program(), "replay", experiment, demo, "--json", "--out", folder]
+            subprocess.run(command, check=True, capture_output=True)
+
+    assert least(lambda: gs.replay(experiment, demo)) - least(bare) < 0.3
+
+
+def test_the_model_steps_in_the_users_mujoco(experiment: str, demo: str) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    spring = {name: value for name, value in TRUTH.items() if name.startswith("cable_spring")}
+    model, data = gs.replay(experiment, demo, with_=[EFFECTS[0], "dead_zone@motor"], set=spring).model.mujoco()
+    assert model.nplugin > 0
+    gs.load_plugins()
+    while data.time < 0.5:
+        mujoco.mj_step(model, data)
+    assert float(data.joint("arm").qpos[0]) < -0.1  # on its way to where the cable rests
+    assert gs.plugin_library().is_file()

@@ -14,8 +14,9 @@ bool StartsAtRest(const Sampled& samples) {
   constexpr double kBegin_s = 0.01, kEnd_s = 0.05, kFarther = 8;
   const auto t = samples.time_s, values = samples.values;
   const auto next = [&](std::size_t k) {
-    while (++k < t.size() && !std::isfinite(values[k])) {
-    }
+    do {
+      ++k;
+    } while (k < t.size() && !std::isfinite(values[k]));
     return k;
   };
   std::size_t k = next(0);

@@ -156,7 +156,7 @@ Status ReadHeader(const std::string& where, std::string_view text, NpyArray* arr
 }
 
 template <class T>
-double NumberAt(const char* at) {
+double Widened(const char* at) {
   T value{};
   std::memcpy(&value, at, sizeof value);
   return static_cast<double>(value);
@@ -164,7 +164,7 @@ double NumberAt(const char* at) {
 
 // IEEE 754 binary16.
 double HalfAt(const char* at) {
-  const auto bits = static_cast<unsigned>(NumberAt<std::uint16_t>(at));
+  const auto bits = static_cast<unsigned>(Widened<std::uint16_t>(at));
   const int exponent = static_cast<int>(bits >> 10 & 31);
   const double fraction = bits & 1023;
   const double size = exponent == 31  ? (fraction > 0 ? std::nan("") : HUGE_VAL)
@@ -179,17 +179,17 @@ ToDouble ConverterOf(NpyKind kind, std::size_t size) {
     case NpyKind::kBool:
       return [](const char* at) { return *at ? 1.0 : 0.0; };
     case NpyKind::kSigned:
-      return size == 1   ? NumberAt<std::int8_t>
-             : size == 2 ? NumberAt<std::int16_t>
-             : size == 4 ? NumberAt<std::int32_t>
-                         : NumberAt<std::int64_t>;
+      return size == 1   ? Widened<std::int8_t>
+             : size == 2 ? Widened<std::int16_t>
+             : size == 4 ? Widened<std::int32_t>
+                         : Widened<std::int64_t>;
     case NpyKind::kUnsigned:
-      return size == 1   ? NumberAt<std::uint8_t>
-             : size == 2 ? NumberAt<std::uint16_t>
-             : size == 4 ? NumberAt<std::uint32_t>
-                         : NumberAt<std::uint64_t>;
+      return size == 1   ? Widened<std::uint8_t>
+             : size == 2 ? Widened<std::uint16_t>
+             : size == 4 ? Widened<std::uint32_t>
+                         : Widened<std::uint64_t>;
     case NpyKind::kFloat:
-      return size == 2 ? HalfAt : size == 4 ? NumberAt<float> : NumberAt<double>;
+      return size == 2 ? HalfAt : size == 4 ? Widened<float> : Widened<double>;
     case NpyKind::kUnicode:
     case NpyKind::kBytes:
       break;

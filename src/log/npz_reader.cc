@@ -24,7 +24,7 @@ using Json = nlohmann::json;
 using namespace std::string_view_literals;
 
 constexpr const char* kSchema = "gapscope.log/1";
-constexpr std::size_t kMostColumns = 10'000;
+constexpr std::size_t kMostNpzColumns = 10'000;
 // Unpacked bytes of all arrays together. Deflate packs a constant a thousandfold, a log of sensors two- to tenfold.
 constexpr std::size_t kAlwaysAllowed = std::size_t{1} << 28, kMostPacking = 100, kMostBytes = std::size_t{8} << 30;
 constexpr std::size_t kLongestMeta = std::size_t{1} << 24;
@@ -160,7 +160,7 @@ class OwnArrays {
       const NpyArray* found = archive_.Find(list);
       if (!found || !found->is_text()) continue;
       if (auto names = found->Texts(); names.size() == named.array.columns()) {
-        for (std::string& name : names) name = named.name + "/" + name;
+        for (std::string& name : names) name.insert(0, named.name + "/");
         return names;
       }
     }
@@ -171,11 +171,11 @@ class OwnArrays {
 
   Status Take(const NamedArray& named) {
     const NpyArray& array = named.array;
-    if (log_->columns.size() + array.columns() > kMostColumns)
+    if (log_->columns.size() + array.columns() > kMostNpzColumns)
       return Error{.what = "too many columns",
                    .where = ArrayAt(path_, named.name),
                    .actual = fmt::format("shape ({})", fmt::join(array.shape, ", ")),
-                   .allowed = fmt::format("at most {} in all", kMostColumns),
+                   .allowed = fmt::format("at most {} in all", kMostNpzColumns),
                    .cure = "are rows and columns exchanged? Save x.T"};
     if (array.shape.size() == 1) {
       std::string name, unit;
@@ -208,7 +208,8 @@ class OwnSchema {
     if (json.value("schema", Json()) != kSchema)
       return Broken("schema " + Quoted(json.value("schema", Json()).dump(-1, ' ', true), 60));
     const Json names = json.value("names", Json()), units = json.value("units", Json::array());
-    if (!IsTexts(names) || names.empty() || names.size() > kMostColumns) return Broken("'names' is no list of names");
+    if (!IsTexts(names) || names.empty() || names.size() > kMostNpzColumns)
+      return Broken("'names' is no list of names");
     if (!IsTexts(units) || (!units.empty() && units.size() != names.size()))
       return Broken("'units' is no list of as many units as names");
     for (std::size_t c = 0; c < names.size(); ++c) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "src/core/collect.h"
 #include "src/core/mujoco_handles.h"
 #include "src/core/names.h"
 #include "src/model/element_names.h"
@@ -108,8 +109,7 @@ std::array<int, 3> ElementsOf(const Experiment& experiment, const std::string& s
 // Why a signal that is asked to give a start gives none.
 Error NoStart(const mjModel& m, const std::vector<int>& bodies, const MeasuredSpec& spec, int sensor) {
   const bool pose = SaysPlace(m, spec, sensor) || SaysTurn(m, spec, sensor);
-  std::vector<std::string> free;
-  for (const int body : bodies) free.push_back(NameOf(m, mjOBJ_BODY, body));
+  std::vector<std::string> free = Collect(bodies, [&](int body) { return NameOf(m, mjOBJ_BODY, body); });
   Error error{.what = "no window can start from the signal '" + spec.signal + "'", .where = spec.where};
   if (!pose) {
     error.actual = "the sensor '" + spec.on + "' measures no pose";

@@ -39,6 +39,7 @@
 namespace gapscope {
 
 struct CairoLibrary {
+// NOLINTNEXTLINE(bugprone-macro-parentheses): a declared name takes none.
 #define GAPSCOPE_MEMBER(name) decltype(&::name) name = nullptr;
   GAPSCOPE_CAIRO_FUNCTIONS(GAPSCOPE_MEMBER)
 #undef GAPSCOPE_MEMBER

@@ -196,6 +196,27 @@ def test_ctrl_c_gives_the_best_so_far(experiment: str, demo: str) -> None:
     assert (partial.out / "model.xml").is_file()
 
 
+def test_an_interrupted_diagnosis_goes_on(experiment: str, demo: str, tmp_path: Path) -> None:
+    """Ctrl-C at the first stage of the search: a verdict so far, and a journal to go on from."""
+    stages: list[str] = []
+
+    def first(progress: gs.Progress) -> None:
+        stages.append(progress.stage)
+        if len(stages) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    quick: dict[str, Any] = {"effort": "quick", "out": tmp_path, "options": {"no-next-experiment": True}}
+    log = short_log(demo, "half")
+    with pytest.raises(gs.Interrupted) as raised:
+        gs.diagnose(experiment, log, progress=first, **quick)
+    partial = raised.value.partial
+    assert isinstance(partial, gs.Diagnosis) and partial.termination == "interrupted"
+    assert math.isfinite(partial.gap.refit) and "interrupted" in partial._repr_html_()
+    assert (tmp_path / "diagnosis.journal").is_dir()
+    whole = gs.diagnose(experiment, log, resume=True, **quick)
+    assert whole.termination != "interrupted" and not (tmp_path / "diagnosis.journal").exists()
+
+
 def test_an_exception_in_the_callback_ends_the_program(experiment: str, demo: str) -> None:
     class Enough(Exception):
         pass

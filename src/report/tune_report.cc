@@ -96,7 +96,7 @@ std::string ParameterLines(const TuneRun& run, const Console& console) {
   std::vector<std::string> notes;
   for (const auto& flat : FlatTexts(run)) notes.push_back("flat: " + flat);
   for (const auto& pair : run.correlated) notes.push_back(CorrelatedText(pair));
-  for (std::size_t i = 0; i < std::min(notes.size(), kMostNotes); ++i) text += notes[i] + "\n";
+  for (std::size_t i = 0; i < std::min(notes.size(), kMostNotes); ++i) text += Wrapped(notes[i], 120, "  ") + "\n";
   if (notes.size() > kMostNotes)
     text += fmt::format("{} more directions and pairs (--json: all)\n", notes.size() - kMostNotes);
   return text;

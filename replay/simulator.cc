@@ -114,13 +114,15 @@ bool Simulator::SetParameters(std::span<const double> values, const Recording& r
 
 void Simulator::SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s) {
   const auto& actuators = model_.command_actuators();
-  for (std::size_t c = 0; c < actuators.size(); ++c) {
-    const auto& values = recording.commands[c].values;
-    const double delay_s = delays_s_[c];
+  for (std::size_t c = 0; c < actuators.size(); ++c)
     data_->ctrl[actuators[c]] =
-        delay_s == 0 ? values[row]
-                     : MeanHeld(recording.time_s, values, earlier_[c], from_s - delay_s, to_s - delay_s, held_[c]);
-  }
+        delays_s_[c] == 0 ? recording.commands[c].values[row] : MeanCommand(recording, c, from_s, to_s);
+}
+
+double Simulator::MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s) {
+  const double delay_s = delays_s_[command];
+  return MeanHeld(recording.time_s, recording.commands[command].values, earlier_[command], from_s - delay_s,
+                  to_s - delay_s, held_[command]);
 }
 
 double Simulator::Read(const SignalSource& source) const {
@@ -181,8 +183,7 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
   const std::size_t before = row > 0 ? row - 1 : 0;
   const double from = recording.time_s[before] + stamps_.forces_s, to = d->time + stamps_.forces_s;
   for (std::size_t c = 0; c < delays_s_.size(); ++c)
-    d->ctrl[model_.command_actuators()[c]] = MeanHeld(recording.time_s, recording.commands[c].values, earlier_[c],
-                                                      from - delays_s_[c], to - delays_s_[c], held_[c]);
+    d->ctrl[model_.command_actuators()[c]] = MeanCommand(recording, c, from, to);
   if (reads_ == SignalStage::kSensors) {
     m->opt.disableflags &= ~mjDSBL_SENSOR;
     mj_forward(m, d);

@@ -9,6 +9,8 @@
 #include <unordered_set>
 #include <vector>
 
+#include "src/core/rotation.h"
+
 namespace gapscope {
 namespace {
 
@@ -46,12 +48,11 @@ std::vector<int> JoinVertices(float* vertices, int count, double cell_m) {
   return stands_for;
 }
 
-using Point = std::array<double, 3>;
-Point PointAt(const float* from, int index) {
+Vector3 PointAt(const float* from, int index) {
   return {from[3 * static_cast<std::ptrdiff_t>(index)], from[3 * static_cast<std::ptrdiff_t>(index) + 1],
           from[3 * static_cast<std::ptrdiff_t>(index) + 2]};
 }
-double Along(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double Along(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // A triangle's corners as numbers of vertices, of normals and of texture points.
 struct Triangle {
@@ -61,10 +62,9 @@ struct Triangle {
 // Triangles that joining has turned over are turned back: a renderer leaves out what shows its back. A corner whose
 // normal lies far off the triangle takes the best of the three, else it would glint.
 void Straighten(const float* vertices, const float* normals, Triangle* t) {
-  const Point a = PointAt(vertices, t->vertex[0]), b = PointAt(vertices, t->vertex[1]),
-              c = PointAt(vertices, t->vertex[2]);
-  const Point u = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-  const Point face = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  const Vector3 a = PointAt(vertices, t->vertex[0]), b = PointAt(vertices, t->vertex[1]),
+                c = PointAt(vertices, t->vertex[2]);
+  const Vector3 face = Cross({b[0] - a[0], b[1] - a[1], b[2] - a[2]}, {c[0] - a[0], c[1] - a[1], c[2] - a[2]});
   const double size = std::sqrt(Along(face, face));
   if (size == 0) return;
   std::array<double, 3> along{};

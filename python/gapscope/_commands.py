@@ -88,6 +88,14 @@ def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
     return files
 
 
+def _search(command: str, exp: Source, out: Folder, logs: Logs, hold_out: Logs) -> _Job:
+    """A job with logs, some of them held out by name."""
+    job = _job(command, exp, out)
+    job.arguments += _files(job, logs)
+    _add(job, "--hold-out", _files(job, hold_out) if _list(hold_out) else None)
+    return job
+
+
 def _add(job: _Job, flag: str, values: Texts | Values | float | None) -> None:
     """A flag for each of the values; none where there is no value."""
     if values is None:
@@ -190,15 +198,12 @@ def tune(
 
     Ctrl-C raises Interrupted, whose ``partial`` is the best so far. ``progress`` is called in this thread.
     """
-    job = _job("tune", exp, out)
-    job.arguments += _files(job, logs)
-    _add(job, "--hold-out", _files(job, hold_out) if _list(hold_out) else None)
+    job = _search("tune", exp, out, logs, hold_out)
     for flag, value in (("--with", with_), ("--free", free), ("--freeze", freeze), ("--set", set)):
         _add(job, flag, value)
     for name, number in (("--starts", starts), ("--budget", budget_s), ("--jobs", jobs), ("--seed", seed)):
         _add(job, name, number)
-    job.arguments += ["--resume"] if resume else []
-    _add_options(job, options)
+    _add_options(job, {"resume": resume, **(options or {})})
     return _finish(Tune, job, progress)
 
 
@@ -224,15 +229,12 @@ def diagnose(
 
     Ctrl-C raises Interrupted, whose ``partial`` is the best verdict so far. ``progress`` is called in this thread.
     """
-    job = _job("diagnose", exp, out)
-    job.arguments += _files(job, logs)
-    _add(job, "--hold-out", _files(job, hold_out) if _list(hold_out) else None)
+    job = _search("diagnose", exp, out, logs, hold_out)
     for flag, value in (("--with", with_), ("--freeze", freeze), ("--set", set), ("--prior", prior)):
         _add(job, flag, value)
     for name, number in (("--effort", effort), ("--budget", budget_s), ("--jobs", jobs), ("--seed", seed)):
         _add(job, name, number)
-    job.arguments += ["--resume"] if resume else []
-    _add_options(job, options)
+    _add_options(job, {"resume": resume, **(options or {})})
     return _finish(Diagnosis, job, progress)
 
 

@@ -23,14 +23,20 @@ from gapscope._plugins import load_plugins
 T = TypeVar("T")
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Open:
+    """What every result has: what it does not know by name."""
+
+    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+
 @dataclass(frozen=True)
-class Interval:
+class Interval(_Open):
     """A value and its 95 % interval, in the parameter's own unit."""
 
     value: float = math.nan
     low: float = math.nan
     high: float = math.nan
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -38,7 +44,7 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class SignalScore:
+class SignalScore(_Open):
     """Measured against predicted, SI.
 
     ``nrmse``: over the signal's standard deviation; ``lag_s`` > 0: measured is later than predicted.
@@ -50,11 +56,10 @@ class SignalScore:
     max: float = math.nan
     lag_s: float = math.nan
     correlation: float = math.nan
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class Where:
+class Where(_Open):
     """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share."""
 
     signal: str = ""
@@ -63,11 +68,10 @@ class Where:
     share_of_time: float = math.nan
     low: float = math.nan
     high: float = math.nan
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class LogResult:
+class LogResult(_Open):
     """One log of a replay or a tune."""
 
     log: str
@@ -76,7 +80,6 @@ class LogResult:
     samples: int = 0
     signals: Mapping[str, SignalScore] = field(default_factory=dict)
     where: tuple[Where, ...] = ()
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
@@ -166,7 +169,7 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(_Open):
     """What results have in common: the folder that the program wrote, and what it said on the way."""
 
     out: Path
@@ -227,14 +230,13 @@ class Replay(_WithTraces):
     time_step_s: float = math.nan
     time_step_error: float = math.nan
     parameters: Mapping[str, float] = field(default_factory=dict)
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def _repr_html_(self) -> str:
         return _html.replay(self)
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(_Open):
     """A fitted parameter in its own unit, with its 95 % interval. Not ``identifiable``: the logs do not say."""
 
     name: str
@@ -245,7 +247,6 @@ class Parameter:
     high: float
     at_bound: bool
     identifiable: bool
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -253,22 +254,20 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class TuneError:
+class TuneError(_Open):
     """Normalised errors: before, on what was fitted, on what was not."""
 
     nominal: float
     train: float
     held_out: float
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class Flat:
+class Flat(_Open):
     """A direction of parameters that the logs leave open."""
 
     direction: Mapping[str, float]
     text: str
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
@@ -286,7 +285,6 @@ class Tune(_WithTraces):
     evaluations: int = 0
     wall_s: float = math.nan
     flat: tuple[Flat, ...] = ()
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __getitem__(self, parameter: str) -> Parameter:
         return _by_name(self.parameters, parameter)
@@ -301,7 +299,7 @@ class Tune(_WithTraces):
 
 
 @dataclass(frozen=True)
-class FoundEffect:
+class FoundEffect(_Open):
     """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes."""
 
     name: str
@@ -311,11 +309,10 @@ class FoundEffect:
     error_before: float = math.nan
     error_after: float = math.nan
     share_of_gap: float = math.nan
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class Statement:
+class Statement(_Open):
     """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen"."""
 
     name: str
@@ -326,11 +323,10 @@ class Statement:
     bound: Mapping[str, float] = field(default_factory=dict)
     share_of_gap: Interval = Interval()
     rule: str = ""
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class Gap:
+class Gap(_Open):
     """Held-out normalised errors, and which share of what can close did."""
 
     nominal: float
@@ -338,15 +334,13 @@ class Gap:
     final: float
     floor: float
     closed: float
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class NextExperiment:
+class NextExperiment(_Open):
     """The command that writes the input which would settle most."""
 
     command: str = ""
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
@@ -365,14 +359,13 @@ class Diagnosis(_WithModel):
     next_experiment: NextExperiment = NextExperiment()
     termination: str = ""
     wall_s: float = math.nan
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def _repr_html_(self) -> str:
         return _html.diagnosis(self)
 
 
 @dataclass(frozen=True)
-class Channel:
+class Channel(_Open):
     """A command or measured signal as it stands in the log, in its own unit."""
 
     name: str
@@ -386,22 +379,20 @@ class Channel:
     noise: float = math.nan
     saturation_share: float = math.nan
     missing_share: float = math.nan
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(_Open):
     """Something noticed or repaired while reading."""
 
     kind: str = ""
     column: str = ""
     count: int = 0
     text: str = ""
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
 
 @dataclass(frozen=True)
-class Inspection:
+class Inspection(_Open):
     """Whether a log is ``fit`` for use, and what it cannot show (``verdict``)."""
 
     log: str
@@ -411,7 +402,6 @@ class Inspection:
     channels: tuple[Channel, ...]
     findings: tuple[Finding, ...] = ()
     time: Mapping[str, Any] = field(default_factory=dict)
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def _repr_html_(self) -> str:
         return _html.inspection(self)

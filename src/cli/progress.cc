@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "src/report/json.h"
+
 namespace gapscope {
 
 template <>
@@ -26,11 +28,10 @@ using nlohmann::ordered_json;
 std::atomic<bool> interrupted = false;
 void Interrupt(int) { interrupted = true; }
 
-// NaN is null; a count has no decimal point.
+// A count has no decimal point.
 ordered_json NumberOrNull(double value) {
-  if (!std::isfinite(value)) return nullptr;
   if (value == std::floor(value) && std::abs(value) < 9e15) return static_cast<long long>(value);
-  return value;
+  return JsonNumber(value);
 }
 
 // Paths may hold any bytes.
@@ -64,7 +65,7 @@ void ProgressLine::Show(const ProgressPoint& point, const std::string& text) {
              Dumped({{"stage", point.stage},
                      {"done", NumberOrNull(point.done)},
                      {"total", NumberOrNull(point.total)},
-                     {"best", std::isfinite(point.best) ? ordered_json(point.best) : ordered_json()},
+                     {"best", JsonNumber(point.best)},
                      {"elapsed_s", elapsed_s()}}));
 }
 

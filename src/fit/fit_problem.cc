@@ -77,16 +77,14 @@ FitProblem::FitProblem(const Model& model, const std::vector<Recording>& recordi
       space_(parameters_, options_.free, std::move(values), options_.logarithmic_effects, options_.linear_terms),
       layout_(MakeLayout(model, recordings, options_, space_)),
       windows_(MakeFitWindows(model, recordings, options_, layout_, space_.start())),
+      residuals_(CountResiduals(recordings_, layout_, windows_)),
       parameters_together_(MovedByParameters(model, options_, space_)),
-      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_),
-                       CountResiduals(recordings_, layout_, windows_), model.parameters())),
+      prior_(MakePrior(space_, layout_, options_, StartY(space_, layout_), residuals_, model.parameters())),
       workers_(static_cast<std::size_t>(pool.workers())) {
   for (std::size_t l = 0; l < recordings.size(); ++l)
     states_together_.emplace_back(
         MovedByStates(recordings[l], layout_.signals[l], layout_.state_priors[l].size(), options_));
 }
-
-std::size_t FitProblem::residuals() const { return CountResiduals(recordings_, layout_, windows_); }
 
 FitPoint FitProblem::Start() const {
   FitPoint point{.y = StartY(space_, layout_), .states = {}};
@@ -312,16 +310,7 @@ FitPoint CarryOver(const FitProblem& from, const FitPoint& at, const FitProblem&
     }
   }
   point.y.head(to.space().size()) = to.space().ToSearch(mine);
-  const FitLayout &a = from.layout(), &b = to.layout();
-  for (std::size_t l = 0; l < b.signals.size(); ++l) {
-    for (std::size_t s = 0; s < b.signals[l].size(); ++s) {
-      if (b.signals[l][s].offset >= 0 && a.signals[l][s].offset >= 0)
-        point.y[b.signals[l][s].offset] = at.y[a.signals[l][s].offset];
-    }
-  }
-  for (const auto shift : {&FitLayout::command_shift, &FitLayout::force_shift}) {
-    if (a.*shift >= 0 && b.*shift >= 0) point.y[b.*shift] = at.y[a.*shift];
-  }
+  for (const auto& [theirs, ours] : SharedNuisances(from.layout(), to.layout())) point.y[ours] = at.y[theirs];
   GS_CHECK(point.states.size() == at.states.size());
   // A motor side that only one of the two has is where the pre-roll leaves it.
   for (std::size_t w = 0; w < point.states.size(); ++w) {

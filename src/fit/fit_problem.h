@@ -77,7 +77,7 @@ class FitProblem {
   const Prior& prior() const { return prior_; }
   const Huber& huber() const { return huber_; }
   ThreadPool& pool() const { return pool_; }
-  std::size_t residuals() const;  // scored rows x signals
+  std::size_t residuals() const { return residuals_; }  // scored rows x signals, those without a value left out
 
   FitPoint Start() const;
   // The point with these parameters' values, its offsets, shifts and states as they are.
@@ -151,6 +151,7 @@ class FitProblem {
   SearchSpace space_;
   FitLayout layout_;
   std::vector<FitWindow> windows_;
+  std::size_t residuals_;
   Together parameters_together_;
   std::vector<Together> states_together_;  // per log
   Huber huber_;

@@ -17,17 +17,8 @@ std::vector<Eigen::Index> SharedColumns(const FitProblem& from, const FitProblem
         shared[i] = static_cast<Eigen::Index>(k);
     }
   }
-  const FitLayout &a = from.layout(), &b = to.layout();
-  for (std::size_t l = 0; l < b.signals.size(); ++l) {
-    for (std::size_t s = 0; s < b.signals[l].size(); ++s) {
-      if (b.signals[l][s].offset >= 0 && a.signals[l][s].offset >= 0)
-        shared[static_cast<std::size_t>(b.signals[l][s].offset)] = a.signals[l][s].offset;
-    }
-  }
-  for (const auto shift : {&FitLayout::command_shift, &FitLayout::force_shift}) {
-    if (a.*shift >= 0 && b.*shift >= 0 && a.shift_scale_s == b.shift_scale_s)
-      shared[static_cast<std::size_t>(b.*shift)] = a.*shift;
-  }
+  for (const auto& [at_from, at_to] : SharedNuisances(from.layout(), to.layout()))
+    shared[static_cast<std::size_t>(at_to)] = at_from;
   return shared;
 }
 

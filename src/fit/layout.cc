@@ -162,6 +162,20 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
   return layout;
 }
 
+std::vector<std::pair<Eigen::Index, Eigen::Index>> SharedNuisances(const FitLayout& from, const FitLayout& to) {
+  std::vector<std::pair<Eigen::Index, Eigen::Index>> shared;
+  const auto add = [&](Eigen::Index a, Eigen::Index b) {
+    if (a >= 0 && b >= 0) shared.emplace_back(a, b);
+  };
+  for (std::size_t l = 0; l < to.signals.size(); ++l) {
+    for (std::size_t s = 0; s < to.signals[l].size(); ++s) add(from.signals[l][s].offset, to.signals[l][s].offset);
+  }
+  if (from.shift_scale_s != to.shift_scale_s) return shared;
+  add(from.command_shift, to.command_shift);
+  add(from.force_shift, to.force_shift);
+  return shared;
+}
+
 double FitLayout::Offset(const Eigen::VectorXd& y, std::size_t log, std::size_t signal) const {
   const SignalLayout& layout = signals[log][signal];
   return layout.offset < 0 ? 0 : y[layout.offset] * layout.deviation;

@@ -6,6 +6,7 @@
 #define GAPSCOPE_FIT_LAYOUT_H_
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "src/experiment/recording.h"
@@ -50,6 +51,10 @@ struct FitLayout {
   // Largest weight that a deviation of any signal has, squared: what one residual counts for.
   double UnitCost() const;
 };
+
+// Offsets and shifts that two layouts of the same logs both have, in the same units: indices in `from`'s y and in
+// `to`'s.
+std::vector<std::pair<Eigen::Index, Eigen::Index>> SharedNuisances(const FitLayout& from, const FitLayout& to);
 
 FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recordings, const FitOptions& options,
                      const SearchSpace& space);

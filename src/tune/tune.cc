@@ -94,7 +94,7 @@ struct Fit {
   const DataSplit& data;
   const std::vector<double>& start;
   const TuneOptions& options;
-  const std::vector<int>& free;
+  std::vector<int> free;
   ThreadPool& pool;
   Journal* journal;
 
@@ -261,7 +261,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - when).count();
   };
   TuneOptions options = asked;
-  std::vector<int> free = options.free.empty() ? model.FreeParameters() : options.free;
+  const std::vector<int> free = options.free.empty() ? model.FreeParameters() : options.free;
   if (free.empty() && options.if_known.empty())
     return Error{.what = "no parameter is free", .where = model.experiment().path, .cure = "use --free NAME"};
   TuneSummary summary{.optimizer = options.solve.optimizer, .values = start, .split = data.how};
@@ -275,15 +275,15 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
     GS_ASSIGN(journal, Journal::Open(options.journal, JobKey(model, data, start, options), options.resume));
   }
   const auto solve_begin = std::chrono::steady_clock::now();
-  const Fit fit{.model = model,
-                .data = data,
-                .start = start,
-                .options = options,
-                .free = free,
-                .pool = pool,
-                .journal = journal.get()};
-  free = ChooseFree(fit, &summary);
-  if (free.empty())
+  Fit fit{.model = model,
+          .data = data,
+          .start = start,
+          .options = options,
+          .free = free,
+          .pool = pool,
+          .journal = journal.get()};
+  fit.free = ChooseFree(fit, &summary);
+  if (fit.free.empty())
     return Error{.what = "these logs know none of the numbers that may be tuned",
                  .where = model.experiment().path,
                  .cure = "use --free NAME, or logs that move the bodies under 'inertia'"};

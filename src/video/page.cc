@@ -6,17 +6,13 @@
 #include <cmath>
 
 #include "src/compare/decimate.h"
-#include "src/core/file.h"
 #include "src/core/statistics.h"
-#include "src/video/cairo_library.h"
+#include "src/video/canvas.h"
 
 namespace gapscope {
 namespace {
 
-struct Colour {
-  double r, g, b;
-};
-constexpr Colour kInk = {0.11, 0.14, 0.18}, kFaint = {0.42, 0.46, 0.52}, kGrid = {0.89, 0.91, 0.93}, kPaper = {1, 1, 1},
+constexpr Colour kInk = {0.11, 0.14, 0.18}, kFaint = {0.42, 0.46, 0.52}, kGrid = {0.89, 0.91, 0.93},
                  kError = {0.86, 0.20, 0.18};
 // Blue against orange: told apart by every eye.
 constexpr Colour kMeasured = {0.0, 0.50, 0.86};
@@ -66,65 +62,6 @@ double NiceStep(double range, double count) {
 }
 
 }  // namespace
-
-// A cairo surface over a picture's pixels.
-struct Page::Canvas {
-  explicit Canvas(Picture& picture)
-      : surface(Cairo().cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(picture.pixels.data()),
-                                                            CAIRO_FORMAT_RGB24, picture.width, picture.height,
-                                                            4 * picture.width)),
-        cr(Cairo().cairo_create(surface)) {
-    Cairo().cairo_set_line_join(cr, CAIRO_LINE_JOIN_ROUND);
-  }
-  ~Canvas() {
-    Cairo().cairo_destroy(cr);
-    Cairo().cairo_surface_destroy(surface);
-  }
-  Canvas(const Canvas&) = delete;
-  Canvas& operator=(const Canvas&) = delete;
-
-  void Ink(const Colour& c, double alpha = 1) { Cairo().cairo_set_source_rgba(cr, c.r, c.g, c.b, alpha); }
-  void Font(double size, bool bold = false) {
-    Cairo().cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
-                                   bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    Cairo().cairo_set_font_size(cr, size);
-  }
-  double Width(const std::string& text) {
-    cairo_text_extents_t extents;
-    Cairo().cairo_text_extents(cr, text.c_str(), &extents);
-    return extents.x_advance;
-  }
-  // Text whose anchor (0 left, 0.5 middle, 1 right) is at x, on the base line y.
-  void Text(const std::string& text, double x, double y, double anchor = 0) {
-    Cairo().cairo_move_to(cr, x - anchor * Width(text), y);
-    Cairo().cairo_show_text(cr, text.c_str());
-  }
-  // As much of the text as fits.
-  std::string Fit(std::string text, double width) {
-    if (Width(text) <= width) return text;
-    while (!text.empty() && Width(text + "\u2026") > width) {
-      do {
-        text.pop_back();
-      } while (!text.empty() && (text.back() & 0xC0) == 0x80);
-    }
-    return text + "\u2026";
-  }
-  void Box(double x, double y, double w, double h, double radius) {
-    Cairo().cairo_new_sub_path(cr);
-    Cairo().cairo_arc(cr, x + w - radius, y + radius, radius, -M_PI / 2, 0);
-    Cairo().cairo_arc(cr, x + w - radius, y + h - radius, radius, 0, M_PI / 2);
-    Cairo().cairo_arc(cr, x + radius, y + h - radius, radius, M_PI / 2, M_PI);
-    Cairo().cairo_arc(cr, x + radius, y + radius, radius, M_PI, 3 * M_PI / 2);
-    Cairo().cairo_close_path(cr);
-  }
-  void Card(double x, double y, double w, double h, double radius) {
-    Box(x, y, w, h, radius);
-    Ink(kPaper, 0.86);
-    Cairo().cairo_fill(cr);
-  }
-  cairo_surface_t* surface;
-  cairo_t* cr;
-};
 
 std::array<float, 3> MeasuredColour() {
   return {static_cast<float>(kMeasured.r), static_cast<float>(kMeasured.g), static_cast<float>(kMeasured.b)};
@@ -525,22 +462,6 @@ void Page::Compose(std::span<const Picture> scenes, double time_s, Picture& fram
   DrawClock(canvas, time_s);
   DrawCursor(canvas, time_s);
   if (beside_) DrawErrors(canvas, time_s);
-}
-
-Status WritePng(const std::string& path, const Picture& picture) {
-  std::string bytes;
-  cairo_surface_t* surface = Cairo().cairo_image_surface_create_for_data(
-      reinterpret_cast<unsigned char*>(const_cast<std::uint32_t*>(picture.pixels.data())), CAIRO_FORMAT_RGB24,
-      picture.width, picture.height, 4 * picture.width);
-  const auto append = [](void* to, const unsigned char* data, unsigned int size) {
-    static_cast<std::string*>(to)->append(reinterpret_cast<const char*>(data), size);
-    return CAIRO_STATUS_SUCCESS;
-  };
-  const cairo_status_t status = Cairo().cairo_surface_write_to_png_stream(surface, append, &bytes);
-  Cairo().cairo_surface_destroy(surface);
-  if (status != CAIRO_STATUS_SUCCESS)
-    return Error{.what = "cannot make the PNG", .where = path, .actual = Cairo().cairo_status_to_string(status)};
-  return WriteFile(path, bytes);
 }
 
 }  // namespace gapscope

@@ -14,6 +14,8 @@
 
 namespace gapscope {
 
+class Canvas;
+
 struct PageTraces {
   struct Signal {
     std::string name, unit;
@@ -65,7 +67,6 @@ class Page {
   void Compose(std::span<const Picture> scenes, double time_s, Picture& frame) const;
 
  private:
-  struct Canvas;
   struct Row {
     double top, height, low, high;  // in pixels of the traces' part; in the signal's unit
   };
@@ -102,9 +103,6 @@ class Page {
   Picture paper_;          // names, units and limits
   Picture future_, past_;  // the plots over the whole time, pale and full
 };
-
-// Writes a picture as PNG, to a temporary name first. Error: cannot write.
-Status WritePng(const std::string& path, const Picture& picture);
 
 }  // namespace gapscope
 

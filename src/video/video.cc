@@ -16,6 +16,7 @@
 #include "src/compare/score.h"
 #include "src/core/statistics.h"
 #include "src/video/cairo_library.h"
+#include "src/video/canvas.h"
 #include "src/video/encoder.h"
 
 namespace gapscope {

@@ -87,7 +87,9 @@ TEST(CouplingTest, AJacobianMadeTogetherIsTheOneMadeColumnByColumn) {
             << linked << w << " " << i;
     }
     // Residuals, and what is differenced: the same by quick steps, gains, dampings, angles, speeds and the shift.
-    if (!linked) EXPECT_EQ(b.work.replays, 7u);
+    if (!linked) {
+      EXPECT_EQ(b.work.replays, 7u);
+    }
     EXPECT_LT(b.work.replays, a.work.replays);
     EXPECT_LT(b.work.steps, a.work.steps);
     // What sizes and intervals rest on is never made together.

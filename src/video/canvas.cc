@@ -24,7 +24,9 @@ Canvas::~Canvas() {
   Cairo().cairo_surface_destroy(surface_);
 }
 
-void Canvas::Ink(const Colour& colour, double alpha) { Cairo().cairo_set_source_rgba(cr, colour.r, colour.g, colour.b, alpha); }
+void Canvas::Ink(const Colour& colour, double alpha) {
+  Cairo().cairo_set_source_rgba(cr, colour.r, colour.g, colour.b, alpha);
+}
 
 void Canvas::Font(double size, bool bold) {
   Cairo().cairo_select_font_face(cr, "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-collect_ignore = ["try_wheel.py"]  # of the installed wheel: scripts/wheel runs it
+collect_ignore = ["try_wheel.py", "bench.py"]  # scripts/wheel and scripts/bench_python run them
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 

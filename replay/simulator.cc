@@ -64,6 +64,13 @@ double MeanHeld(const std::vector<double>& time, const std::vector<double>& valu
   return sum / (to - from);
 }
 
+// The row of a stamp.
+std::size_t RowAt(const std::vector<double>& time_s, double stamp_s) {
+  constexpr double kSame = 1e-9;
+  const auto at = std::lower_bound(time_s.begin(), time_s.end() - 1, stamp_s - kSame);
+  return static_cast<std::size_t>(at - time_s.begin());
+}
+
 }  // namespace
 
 Simulator::Simulator(const Model& model, double max_step_s)
@@ -116,13 +123,14 @@ void Simulator::SetCommands(const Recording& recording, std::size_t row, double 
   const auto& actuators = model_.command_actuators();
   for (std::size_t c = 0; c < actuators.size(); ++c)
     data_->ctrl[actuators[c]] =
-        delays_s_[c] == 0 ? recording.commands[c].values[row] : MeanCommand(recording, c, from_s, to_s);
+        delays_s_[c] == 0 ? recording.commands[c].values[row] : MeanCommand(recording, c, from_s, to_s, held_[c]);
 }
 
-double Simulator::MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s) {
+double Simulator::MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s,
+                              std::size_t& row) const {
   const double delay_s = delays_s_[command];
   return MeanHeld(recording.time_s, recording.commands[command].values, earlier_[command], from_s - delay_s,
-                  to_s - delay_s, held_[command]);
+                  to_s - delay_s, row);
 }
 
 double Simulator::Read(const SignalSource& source) const {
@@ -180,10 +188,14 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
   if (reads_ == SignalStage::kState) return;
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  const std::size_t before = row > 0 ? row - 1 : 0;
-  const double from = recording.time_s[before] + stamps_.forces_s, to = d->time + stamps_.forces_s;
-  for (std::size_t c = 0; c < delays_s_.size(); ++c)
-    d->ctrl[model_.command_actuators()[c]] = MeanCommand(recording, c, from, to);
+  const Recording& logged = recording.finer ? *recording.finer : recording;
+  const double stamp = recording.time_s[row] + recording.start_s - logged.start_s;
+  const std::size_t at = RowAt(logged.time_s, stamp);
+  const double from = logged.time_s[at > 0 ? at - 1 : 0] + stamps_.forces_s, to = stamp + stamps_.forces_s;
+  for (std::size_t c = 0; c < delays_s_.size(); ++c) {
+    std::size_t near = at;
+    d->ctrl[model_.command_actuators()[c]] = MeanCommand(logged, c, from, to, near);
+  }
   if (reads_ == SignalStage::kSensors) {
     m->opt.disableflags &= ~mjDSBL_SENSOR;
     mj_forward(m, d);

@@ -85,8 +85,9 @@ class Simulator {
   void StandAt(const Recording& recording, std::size_t row);
   void FindEarlierCommands(const Recording& recording);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
-  // Mean of what acts of a command over a time.
-  double MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s);
+  // Mean of what acts of a command over a time. `row` is a hint that moves with it.
+  double MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s,
+                     std::size_t& row) const;
   double Read(const SignalSource& source) const;
   // What signals beside the state are at a stamp: forces jump where commands do, and no stamp says on which side of a
   // jump they were read. They are those of the mean command over the sample that ends there.

@@ -40,15 +40,11 @@ std::vector<double> Sharpened(const std::vector<double>& means, const std::vecto
 }  // namespace
 
 Recording Coarsen(const Recording& recording, double least_step_s) {
-  // A drive's torque follows its command at once: under the mean of a few commands it would seem to be late.
-  const bool torque = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
-    return m.spec.scored && TraitsOf(m.spec.kind).stage != SignalStage::kState;
-  });
   // Where a sensor is slower than the log, the rows picked would miss its values.
   const bool kept_gaps = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
     return std::any_of(m.values.begin(), m.values.end(), [](double value) { return !std::isfinite(value); });
   });
-  if (torque || kept_gaps) return recording;
+  if (kept_gaps) return recording;
   constexpr double kSlack = 0.95;  // of the step: stamps jitter
   std::vector<std::size_t> kept;
   for (std::size_t row = 0; row < recording.rows(); ++row) {
@@ -69,6 +65,11 @@ Recording Coarsen(const Recording& recording, double least_step_s) {
   std::vector<double> steps;
   for (std::size_t k = 0; k + 1 < kept.size(); ++k) steps.push_back(coarse.time_s[k + 1] - coarse.time_s[k]);
   coarse.timeline.median_step_s = Median(std::move(steps));
+  // A drive's torque follows its command at once: under the mean of a few commands it would seem to be late.
+  const bool forces = std::any_of(recording.measured.begin(), recording.measured.end(), [](const auto& m) {
+    return m.spec.scored && TraitsOf(m.spec.kind).stage != SignalStage::kState;
+  });
+  if (forces) coarse.finer = std::make_shared<const Recording>(recording);
   return coarse;
 }
 

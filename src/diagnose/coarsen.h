@@ -9,7 +9,7 @@ namespace gapscope {
 
 // Keeps stamps at least `least_step_s` apart. Measured values are those of the kept stamps; a command becomes its mean
 // over the time until the next kept stamp, which keeps its impulse, sharpened by what means and their holding flatten.
-// Of the timeline only the median step follows. A log with a scored torque is left as it is.
+// Of the timeline only the median step follows. Scored forces at the kept stamps follow the recording's own commands.
 Recording Coarsen(const Recording& recording, double least_step_s);
 
 }  // namespace gapscope

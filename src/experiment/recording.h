@@ -3,6 +3,7 @@
 #define GAPSCOPE_EXPERIMENT_RECORDING_H_
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,9 @@ struct Recording {
   Timeline timeline;
   std::vector<Finding> findings;  // of reading, timeline and binding
   std::size_t rows_in_log = 0;    // before repairs
+  // What this one's rows were picked of (src/diagnose/coarsen.h), if forces at its stamps follow commands that it has
+  // means of alone.
+  std::shared_ptr<const Recording> finer;
 
   std::size_t rows() const { return time_s.size(); }
   double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }

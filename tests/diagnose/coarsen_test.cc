@@ -87,13 +87,16 @@ TEST(CoarsenTest, LeavesASlowLogAlone) {
   EXPECT_EQ(same.commands[0].values, slow.commands[0].values);
 }
 
-TEST(CoarsenTest, LeavesALogWithTorqueAlone) {
+TEST(CoarsenTest, ScoredForcesFollowTheLogsOwnCommands) {
   Recording log = MakeRecording({0, 0.001, 0.002, 0.003, 0.004}, {1, 2, 3, 4, 5}, {0, 1, 2, 3, 4});
   log.measured.push_back(log.measured[0]);
   log.measured[1].spec.kind = SignalKind::kTorque;
-  EXPECT_EQ(Coarsen(log, 0.004).rows(), log.rows());
+  const Recording coarse = Coarsen(log, 0.004);
+  EXPECT_EQ(coarse.measured[1].values, (std::vector<double>{0, 4}));
+  ASSERT_TRUE(coarse.finer);
+  EXPECT_EQ(coarse.finer->commands[0].values, log.commands[0].values);
   log.measured[1].spec.scored = false;
-  EXPECT_LT(Coarsen(log, 0.004).rows(), log.rows());
+  EXPECT_FALSE(Coarsen(log, 0.004).finer);
 }
 
 }  // namespace

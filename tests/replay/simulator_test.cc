@@ -404,6 +404,49 @@ TEST_F(DelayTest, ALateSensorShowsThePast) {
   for (std::size_t k = 5; k < 399; ++k) ASSERT_NEAR(late[0][k], fine[0][10 * k - 26], 2e-6) << k;
 }
 
+// A servo on every fourth stamp: its torque is that of the log's own target there, not of a mean over four.
+TEST_F(SimulatorTest, ForcesFollowFinerCommands) {
+  const Scratch scratch;
+  const std::string yaml = R"(commands:
+  - {actuator: motor, column: u, unit: rad}
+measured:
+  - {signal: q, column: q, joint: hinge, unit: rad}
+  - {signal: w, column: w, kind: velocity, joint: hinge}
+  - {signal: tau, column: tau, kind: torque, actuator: motor}
+)";
+  const Experiment experiment = MakeExperiment(
+      scratch, Mjcf("damping=\"0.05\"", "<position name=\"motor\" joint=\"hinge\" kp=\"3\" kv=\"0.2\"/>"), yaml);
+  const auto model = MakeModel(experiment);
+  const Recording fine =
+      MakeRecording(experiment, 801, 0.001, [](int, double t) { return 0.4 * std::sin(2 * M_PI * (1 + 9 * t) * t); });
+  Recording coarse = fine;
+  coarse.time_s.clear(), coarse.commands[0].values.clear();
+  for (std::size_t k = 0; k < fine.rows(); k += 4) {
+    coarse.time_s.push_back(fine.time_s[k]);
+    double mean = 0;
+    for (std::size_t i = k; i < std::min(k + 4, fine.rows()); ++i) mean += fine.commands[0].values[i] / 4;
+    coarse.commands[0].values.push_back(mean);
+  }
+  for (auto& measured : coarse.measured) measured.values.assign(coarse.rows(), 0);
+  coarse.finer = std::make_shared<const Recording>(fine);
+  const auto exact = Predict(*model, fine), picked = Predict(*model, coarse);
+  for (std::size_t k = 0; k + 1 < coarse.rows(); ++k) {
+    const double target = fine.commands[0].values[k > 0 ? 4 * k - 1 : 0];
+    ASSERT_NEAR(picked[2][k], 3 * (target - picked[0][k]) - 0.2 * picked[1][k], 1e-12) << k;
+    ASSERT_NEAR(picked[2][k], exact[2][4 * k], 0.005 * Largest(exact[2])) << k;
+  }
+  // A part of the log finds its place in it.
+  Recording part = coarse;
+  part.start_s = 0.4;
+  part.time_s.erase(part.time_s.begin() + 101, part.time_s.end());
+  for (auto* values : {&part.commands[0].values, &part.measured[0].values, &part.measured[1].values,
+                       &part.measured[2].values})
+    values->erase(values->begin(), values->begin() + 100);
+  const auto later = Predict(*model, part);
+  for (std::size_t k = 1; k < part.rows(); ++k)
+    ASSERT_NEAR(later[2][k], 3 * (fine.commands[0].values[400 + 4 * k - 1] - later[0][k]) - 0.2 * later[1][k], 1e-12);
+}
+
 TEST_F(SimulatorTest, ATorqueIsTheOneBeforeTheStampsCommandActs) {
   const Scratch scratch;
   const std::string yaml = R"(commands:

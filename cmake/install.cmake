@@ -18,7 +18,8 @@ set_target_properties(gapscope PROPERTIES INSTALL_RPATH "$ORIGIN/${_bin_to_libra
 install(TARGETS gapscope RUNTIME COMPONENT program)
 
 # Every folder's library that this build has, with its headers.
-foreach(name core log experiment model replay compare fit tune identify design diagnose video report plugins warnings)
+foreach(name core log experiment model replay compare fit tune identify design diagnose export video report plugins
+             warnings)
   if(TARGET gapscope_${name})
     set_target_properties(gapscope_${name} PROPERTIES EXPORT_NAME ${name})
     install(TARGETS gapscope_${name} EXPORT gapscope LIBRARY DESTINATION ${_libraries}
@@ -26,7 +27,7 @@ foreach(name core log experiment model replay compare fit tune identify design d
   endif()
 endforeach()
 foreach(folder src/core src/log src/experiment src/model src/compare src/fit src/tune src/identify
-        src/design src/diagnose src/video src/report replay)
+        src/design src/diagnose src/export src/video src/report replay)
   if(EXISTS ${CMAKE_SOURCE_DIR}/${folder})
     get_filename_component(_parent ${folder} DIRECTORY)
     install(DIRECTORY ${folder} DESTINATION ${_headers}/${_parent} FILES_MATCHING PATTERN "*.h" PATTERN effects EXCLUDE)

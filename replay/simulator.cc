@@ -96,8 +96,15 @@ Simulator::Simulator(const Model& model, double max_step_s)
   }
   apart_.resize(model.mirrored_joints().size());
   orientations_.reserve(model.sources().size());
-  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + mujoco_->nactuator,
+  const int actuators = static_cast<int>(mujoco_->nactuator);
+  remembers_ = mujoco_->na > 0 || std::any_of(mujoco_->actuator_plugin, mujoco_->actuator_plugin + actuators,
                                               [](int plugin) { return plugin >= 0; });
+  for (int i = 0; i < actuators; ++i) {
+    if (mujoco_->actuator_ctrlnum[i] == 0 && mujoco_->actuator_trntype[i] == mjTRN_JOINT) passive_.push_back(i);
+    if (mujoco_->actuator_historyadr[i] < 0) continue;
+    remembers_ = true;
+    native_delay_s_ = std::max(native_delay_s_, mujoco_->actuator_delay[i]);
+  }
 }
 
 void Simulator::set_steps(StepKind steps) {
@@ -147,7 +154,14 @@ double Simulator::Read(const SignalSource& source) const {
       break;
   }
   if (source.estimate >= 0) return data_->plugin_state[source.estimate];
-  if (source.dof >= 0) return data_->qfrc_actuator[source.dof];
+  if (source.dof >= 0) {
+    double torque = data_->qfrc_actuator[source.dof];
+    for (const int i : passive_) {
+      if (mujoco_->jnt_dofadr[mujoco_->actuator_trnid[2 * i]] == source.dof)
+        torque -= mujoco_->actuator_gear[6 * i] * data_->actuator_force[mujoco_->actuator_outadr[i]];
+    }
+    return torque;
+  }
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
@@ -196,15 +210,18 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
     std::size_t near = at;
     d->ctrl[model_.command_actuators()[c]] = MeanCommand(logged, c, from, to, near);
   }
+  // An actuator's own delay reads what was sent, by the time.
+  if (native_delay_s_ > 0) d->time -= 0.5 * (to - from);
   if (reads_ == SignalStage::kSensors) {
     m->opt.disableflags &= ~mjDSBL_SENSOR;
     mj_forward(m, d);
     m->opt.disableflags |= mjDSBL_SENSOR;
-    return;
+  } else {
+    mj_fwdPosition(m, d);
+    mj_fwdVelocity(m, d);
+    mj_fwdActuation(m, d);
   }
-  mj_fwdPosition(m, d);
-  mj_fwdVelocity(m, d);
-  mj_fwdActuation(m, d);
+  d->time = recording.time_s[row];
 }
 
 int Simulator::StepToNext(const Recording& recording, std::size_t row) {
@@ -338,7 +355,7 @@ double Simulator::Past() const {
   if (!apart_.empty()) past_s = std::max(past_s, kPast.transmission_s);
   for (const int i : model_.memories())
     past_s = std::max(past_s, std::min(kPast.time_constants * values_[i], kPast.longest_s));
-  return std::max(past_s, latest_s_);
+  return std::max({past_s, latest_s_, native_delay_s_ + kPast.delays_s});
 }
 
 void Simulator::Follow(const Recording& recording, std::size_t row) {

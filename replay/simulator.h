@@ -109,6 +109,8 @@ class Simulator {
   std::vector<double> delays_s_;  // per command: how late it acts
   bool late_ = false;             // one of them does not act at its stamp
   double latest_s_ = 0;
+  double native_delay_s_ = 0;  // the MJCF's own, of any actuator
+  std::vector<int> passive_;   // actuators on joints that no control drives: what they give is no drive's torque
   std::vector<ProbeTorque> probes_;
   SignalStage reads_ = SignalStage::kState;  // the latest stage of any signal of the log
   std::vector<std::size_t> orientations_;    // the log's orientations: the first signal of each

@@ -1,19 +1,13 @@
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
-#include "src/core/names.h"
 #include "src/report/apply_report.h"
-#include "src/report/diagnose_report.h"
 #include "src/report/read_run.h"
-#include "src/report/replay_report.h"
-#include "src/report/tune_report.h"
 
 namespace gapscope::cli {
 namespace {
@@ -23,42 +17,10 @@ struct ApplyFlags {
   std::string result, experiment;
 };
 
-Status CheckSchema(const nlohmann::ordered_json& json, const std::string& where) {
-  const std::vector<std::string> schemas = {kDiagnosisSchema, kTuneSchema, kReplaySchema};
-  const std::string schema = json.is_object() && json.contains("schema") ? json["schema"].dump() : "none";
-  const bool known =
-      std::any_of(schemas.begin(), schemas.end(), [&](const std::string& one) { return schema == '"' + one + '"'; });
-  if (known) return Ok();
-  return Error{.what = "not a result that an MJCF can be changed by",
-               .where = where,
-               .actual = "schema " + schema,
-               .allowed = "a result of diagnose, tune or replay: " + Join(schemas)};
-}
-
-// What is given, else what the result names itself.
-Result<Experiment> ExperimentOf(const ApplyFlags& flags, const RunModel& held) {
-  if (!flags.experiment.empty()) return LoadExperiment(flags.experiment);
-  constexpr char kCure[] = "give it: --experiment FILE";
-  if (held.experiment.empty())
-    return Error{.what = "the result does not name its experiment", .where = flags.result, .cure = kCure};
-  std::error_code failed;
-  if (!std::filesystem::exists(held.experiment, failed)) {
-    return Error{.what = "the result's experiment is not there",
-                 .where = flags.result,
-                 .actual = held.experiment,
-                 .cure = "go to the folder where the result was made, or " + std::string(kCure)};
-  }
-  return LoadExperiment(held.experiment);
-}
-
 Result<int> RunApply(const ApplyFlags& flags) {
   GS_ASSIGN(const nlohmann::ordered_json json, ReadJson(flags.result));
-  GS_RETURN_IF_ERROR(CheckSchema(json, flags.result));
-  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.result));
-  GS_ASSIGN(const Experiment experiment, ExperimentOf(flags, held));
-  GS_ASSIGN(std::shared_ptr<const Rig> rig, Rig::Load(experiment));
-  // Scales bound effects; they do not make their values.
-  GS_ASSIGN(const ResultModel result, BuildRunModel(rig, held, flags.result, {}));
+  GS_ASSIGN(const ResultModel result, LoadWholeResult(json, {.path = flags.result, .experiment = flags.experiment}));
+  const Experiment& experiment = result.model->experiment();
   const ApplyOptions options{.out = flags.common.out, .notes = NotesOf(json, *result.model, result.values)};
   GS_ASSIGN(const AppliedMjcf applied, ApplyToMjcf(*result.model, result.values, options));
   GS_RETURN_IF_ERROR(WriteFile(flags.common.out, applied.text));
@@ -70,7 +32,7 @@ Result<int> RunApply(const ApplyFlags& flags) {
                .left_out = applied.left_out};
   run.needs_plugins = applied.text.find("plugin=\"gapscope.") != std::string::npos;
   for (const auto& use : result.model->effects()) {
-    if (EffectOf(use, *rig).place == EffectPlace::kSignal) run.of_signals.push_back(use);
+    if (EffectOf(use, *result.model->rig()).place == EffectPlace::kSignal) run.of_signals.push_back(use);
   }
   fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;

@@ -34,6 +34,7 @@ std::vector<Command> FeedbackCommands();  // lqr, poles
 Command OptimalCommand();
 Command RenderCommand();
 Command ApplyCommand();
+Command ExportCommand();
 Command PlanCommand();  // plan, run and merge: many logs, shared out
 Command RunCommand();
 Command MergeCommand();

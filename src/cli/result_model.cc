@@ -1,15 +1,62 @@
 #include "src/cli/result_model.h"
 
+#include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/core/names.h"
+#include "src/report/diagnose_report.h"
 #include "src/report/read_run.h"
+#include "src/report/replay_report.h"
+#include "src/report/tune_report.h"
 
 namespace gapscope::cli {
+namespace {
+
+Status CheckSchema(const nlohmann::ordered_json& json, const std::string& where) {
+  const std::vector<std::string> schemas = {kDiagnosisSchema, kTuneSchema, kReplaySchema};
+  const std::string schema = json.is_object() && json.contains("schema") ? json["schema"].dump() : "none";
+  const bool known =
+      std::any_of(schemas.begin(), schemas.end(), [&](const std::string& one) { return schema == '"' + one + '"'; });
+  if (known) return Ok();
+  return Error{.what = "not a result that holds a model",
+               .where = where,
+               .actual = "schema " + schema,
+               .allowed = "a result of diagnose, tune or replay: " + Join(schemas)};
+}
+
+// What is given, else what the result names itself.
+Result<Experiment> ExperimentOf(const ResultSource& source, const RunModel& held) {
+  if (!source.experiment.empty()) return LoadExperiment(source.experiment);
+  constexpr char kCure[] = "give it: --experiment FILE";
+  if (held.experiment.empty())
+    return Error{.what = "the result does not name its experiment", .where = source.path, .cure = kCure};
+  std::error_code failed;
+  if (!std::filesystem::exists(held.experiment, failed)) {
+    return Error{.what = "the result's experiment is not there",
+                 .where = source.path,
+                 .actual = held.experiment,
+                 .cure = "go to the folder where the result was made, or " + std::string(kCure)};
+  }
+  return LoadExperiment(held.experiment);
+}
+
+}  // namespace
 
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales) {
   GS_ASSIGN(const auto json, ReadJson(path));
   GS_ASSIGN(const RunModel named, ReadRunModel(json, path));
   return BuildRunModel(std::move(rig), named, path, scales);
+}
+
+Result<ResultModel> LoadWholeResult(const nlohmann::ordered_json& json, const ResultSource& source) {
+  GS_RETURN_IF_ERROR(CheckSchema(json, source.path));
+  GS_ASSIGN(const RunModel held, ReadRunModel(json, source.path));
+  GS_ASSIGN(Experiment experiment, ExperimentOf(source, held));
+  if (!source.while_column.empty()) experiment.replay.while_column = source.while_column;
+  GS_ASSIGN(std::shared_ptr<const Rig> rig, Rig::Load(experiment));
+  // Scales bound effects; they do not make their values.
+  return BuildRunModel(std::move(rig), held, source.path, {});
 }
 
 }  // namespace gapscope::cli

@@ -3,6 +3,7 @@
 #define GAPSCOPE_CLI_RESULT_MODEL_H_
 
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,16 @@ namespace gapscope::cli {
 
 // `path`: the folder or its result.json. Errors: not such a file; as BuildRunModel.
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales);
+
+// A result that stands alone: its model on the experiment that it names, or that is given.
+struct ResultSource {
+  std::string path;          // the folder or its result.json
+  std::string experiment;    // empty: the one that the result names
+  std::string while_column;  // over the experiment's own
+};
+// `json`: what source.path holds. Errors: not a result of diagnose, tune or replay; its experiment is not there; as
+// Rig::Load and BuildRunModel.
+Result<ResultModel> LoadWholeResult(const nlohmann::ordered_json& json, const ResultSource& source);
 
 }  // namespace gapscope::cli
 

@@ -91,7 +91,8 @@ bool IsOfTorque(ScaleKind kind) {
 }
 
 std::string ScaleName(const std::string& on, RigSize size) {
-  return "scale@" + on + (size == RigSize::kTorque ? ".torque_n_m" : ".inertia_kg_m2");
+  const char* of = size == RigSize::kTorque ? ".torque_n_m" : size == RigSize::kPeak ? ".peak_n_m" : ".inertia_kg_m2";
+  return "scale@" + on + of;
 }
 
 namespace {
@@ -383,11 +384,21 @@ std::optional<EffectUse> UseWithParameter(const std::string& name, const Rig& ri
 
 namespace {
 
+// The peak torque that the experiment states of an actuator; nothing: none.
+std::optional<double> StatedPeak(const Rig& rig, const std::string& actuator) {
+  for (const Limit& limit : rig.experiment().limits) {
+    if (limit.actuator == actuator && limit.torque > 0) return limit.torque;
+  }
+  return std::nullopt;
+}
+
 // The rig's own size at a place, once.
 void AddScales(Structure& structure, const Effect& effect, const std::string& on, const ScaleTable& table) {
   const Scales scales = ScalesAt(effect, on, structure.rig(), table);
-  for (const auto& [size, value, unit] : {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"},
-                                          std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {
+  const double peak = StatedPeak(structure.rig(), on).value_or(scales.torque_n_m);
+  for (const auto& [size, value, unit] :
+       {std::tuple{RigSize::kTorque, scales.torque_n_m, "N m"}, std::tuple{RigSize::kPeak, peak, "N m"},
+        std::tuple{RigSize::kInertia, scales.inertia_kg_m2, "kg m^2"}}) {
     const std::string name = ScaleName(on, size);
     const auto known = std::find_if(structure.parameters.begin(), structure.parameters.end(),
                                     [&](const Parameter& q) { return q.name == name; });
@@ -424,10 +435,12 @@ Status ApplyEffect(Structure& structure, const EffectUse& use, const ScaleTable&
                             .owner = Parameter::Owner::kEffect,
                             .of_torque = entry.of_torque || IsOfTorque(p.scale)});
   }
+  structure.entering = &use;
   for (const std::string& place : PlacesOf(use, structure.rig())) {
     AddScales(structure, effect, place, table);
     GS_RETURN_IF_ERROR(effect.apply(structure, place, names));
   }
+  structure.entering = nullptr;
   return Ok();
 }
 

@@ -127,7 +127,11 @@ std::vector<std::string> EffectNames();  // each once
 std::string EffectTitle(const std::string& name);
 
 // The rig's own size at a place, a parameter that expressions of effects there may use.
-enum class RigSize { kTorque, kInertia };  // Scales::torque_n_m, Scales::inertia_kg_m2
+enum class RigSize {
+  kTorque,   // Scales::torque_n_m
+  kPeak,     // the drive's peak torque as the experiment's limits state it; else kTorque
+  kInertia,  // Scales::inertia_kg_m2
+};
 std::string ScaleName(const std::string& on, RigSize size);
 
 // `on` of an effect that all its places share with one size: every drive, or every measured signal. A place of the rig

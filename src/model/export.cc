@@ -7,6 +7,8 @@
 #include <numeric>
 
 #include "src/core/collect.h"
+#include "src/core/statistics.h"
+#include "src/experiment/expression.h"
 #include "src/model/model.h"
 #include "src/model/parameter_writer.h"
 #include "src/model/structure.h"
@@ -92,6 +94,17 @@ void AddSky(mjSpec* spec) {
   }
 }
 
+// What no term tells of is elements of any MJCF, or the log's own.
+std::vector<NativeEffect> WhatBecame(const Model& model, const std::vector<NativeEffect>& told) {
+  return Collect(model.effects(), [&](const EffectUse& use) -> NativeEffect {
+    const auto of = std::ranges::find_if(told, [&](const NativeEffect& effect) { return effect.use == use; });
+    if (of != told.end()) return *of;
+    if (EffectOf(use, *model.rig()).place == EffectPlace::kSignal)
+      return {use, Fidelity::kHost, "delay what the sensor says"};
+    return {use, Fidelity::kExact, "elements of the MJCF"};
+  });
+}
+
 }  // namespace
 
 Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
@@ -112,9 +125,33 @@ Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
 
 Result<ExportedModel> Model::Export(std::span<const double> values, const std::map<std::string, double>* log_values,
                                     const ScaleTable& scales) const {
-  // Built anew: what the host does itself during a replay must stand in the exported model.
   Structure structure(*rig_);
-  structure.for_export = true;
+  structure.form = Structure::Form::kPlugins;
+  return ExportFrom(structure, values, log_values, scales);
+}
+
+Result<ExportedModel> Model::ExportNative(std::span<const double> values,
+                                          const std::map<std::string, double>* log_values,
+                                          const NativeFeatures& features) const {
+  Structure structure(*rig_);
+  structure.form = Structure::Form::kNative;
+  structure.features = features;
+  if (features.time_step_s > 0) structure.spec->option.timestep = features.time_step_s;
+  std::map<std::string, double> numbers;
+  for (const auto& value : experiment().values) numbers[value.name] = value.fallback.value_or(1);
+  for (const auto& [name, value] : log_values ? *log_values : std::map<std::string, double>{}) numbers[name] = value;
+  for (std::size_t i = 0; i < parameters_.size(); ++i) numbers[parameters_[i].name] = values[i];
+  structure.value_of = [numbers](const std::string& expression) {
+    const auto value = EvaluateOnce(expression, numbers, "export");
+    return value.ok() ? value.value() : kNaN;
+  };
+  return ExportFrom(structure, values, log_values, {});
+}
+
+// Built anew: what the host does itself during a replay must stand in the exported model.
+Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const double> values,
+                                        const std::map<std::string, double>* log_values,
+                                        const ScaleTable& scales) const {
   for (const auto& use : effects_) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
   ExportedModel result;
@@ -143,6 +180,7 @@ Result<ExportedModel> Model::Export(std::span<const double> values, const std::m
     for (const std::string& joint : {split.joint, structure.motor_joint.at(split.joint)})
       result.origins.push_back({"joint/" + joint + "/armature", Read({split.share}, names)});
   }
+  result.native = WhatBecame(*this, structure.told);
   result.spec = std::move(structure.spec);
   result.compiled = std::move(exported.compiled_);
   return result;

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -36,6 +37,18 @@ bool MayConstrain(const mjModel& m) {
          any(m.tendon_limited, m.ntendon) || any(m.tendon_frictionloss, m.ntendon);
 }
 
+// A replay takes shorter steps than the MJCF says where stamps lie closer: an actuator that is late must remember as
+// far back all the same.
+void GiveRoomToDelays(mjSpec* spec) {
+  constexpr double kShorter = 16;
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_ACTUATOR); e; e = mjs_nextElement(spec, e)) {
+    mjsActuator* actuator = mjs_asActuator(e);
+    if (!(actuator->delay > 0) || !(spec->option.timestep > 0)) continue;
+    const double samples = std::ceil(kShorter * actuator->delay / spec->option.timestep) + 1;
+    actuator->nsample = std::max(actuator->nsample, static_cast<int>(std::min(samples, 1e5)));
+  }
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const Model>> Model::Load(const Experiment& experiment) {
@@ -52,9 +65,10 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   GS_RETURN_IF_ERROR(CheckTogether(effects, *model->rig_));
   for (const auto& use : effects) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
+  GiveRoomToDelays(structure.spec.get());
   structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step
   GS_RETURN_IF_ERROR(model->Compile(&structure));
-  for (const auto& split : model->splits_) model->mirrored_.emplace_back(split.motor_joint, split.load_joint);
+  model->FindMirrored();
   GS_RETURN_IF_ERROR(model->CheckInertias());
   GS_RETURN_IF_ERROR(model->ResolveNames());
   model->FindDelays(structure);
@@ -200,6 +214,20 @@ Status Model::ResolveNames() {
   GS_ASSIGN(const std::vector<FreeStart> starts, FindFreeStarts(m, experiment()));
   for (const FreeStart& start : starts) (start.qpos >= 0 ? free_starts_ : held_starts_).push_back(start);
   return Ok();
+}
+
+void Model::FindMirrored() {
+  for (const auto& split : splits_) mirrored_.emplace_back(split.motor_joint, split.load_joint);
+  // A file that `apply` or `export` wrote has the two sides already.
+  for (int load = 0; load < compiled_->njnt; ++load) {
+    const char* text = mj_id2name(compiled_.get(), mjOBJ_JOINT, load);
+    if (!text) continue;
+    const std::string name = text;
+    const int motor = mj_name2id(compiled_.get(), mjOBJ_JOINT, (name + Structure::kMotorSide).c_str());
+    const bool linked = mj_name2id(compiled_.get(), mjOBJ_TENDON, (name + Structure::kLink).c_str()) >= 0;
+    const bool known = std::ranges::any_of(mirrored_, [&](const auto& pair) { return pair.second == load; });
+    if (motor >= 0 && linked && !known) mirrored_.emplace_back(motor, load);
+  }
 }
 
 void Model::FindDelays(const Structure& structure) {

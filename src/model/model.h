@@ -14,6 +14,7 @@
 #include "src/model/effect.h"
 #include "src/model/fields.h"
 #include "src/model/free_starts.h"
+#include "src/model/native.h"
 #include "src/model/rig.h"
 
 namespace gapscope {
@@ -41,6 +42,7 @@ struct ExportedModel {
   };
   std::vector<Origin> origins;
   std::vector<std::string> left_out;  // fields that each log sets anew, where none was given
+  std::vector<NativeEffect> native;   // what became of each effect
 };
 
 class Model {
@@ -94,6 +96,9 @@ class Model {
   // parameter that is not finite; as Build.
   Result<ExportedModel> Export(std::span<const double> values, const std::map<std::string, double>* log_values,
                                const ScaleTable& scales) const;
+  // The same without our plugins, of what an engine has. Errors: the rig's own MJCF has plugins; as Export.
+  Result<ExportedModel> ExportNative(std::span<const double> values, const std::map<std::string, double>* log_values,
+                                     const NativeFeatures& features) const;
 
   // The same structure with everything that is only drawn, which compiled() leaves out; bodies stand where `values` put
   // them. qpos means the same in both. Error: the MJCF does not compile with its pictures (a missing texture, say).
@@ -102,6 +107,8 @@ class Model {
 
  private:
   friend class ParameterWriter;
+  Result<ExportedModel> ExportFrom(Structure& structure, std::span<const double> values,
+                                   const std::map<std::string, double>* log_values, const ScaleTable& scales) const;
   struct Setting {
     std::string name, where;  // "joint/arm/damping"; file and line
     std::vector<std::string> expressions;
@@ -120,6 +127,7 @@ class Model {
   Status ResolveNames();
   void FindDelays(const Structure& structure);
   void FindMemories();
+  void FindMirrored();
 
   std::shared_ptr<const Rig> rig_;
   std::vector<EffectUse> effects_;

@@ -4,6 +4,7 @@
 #ifndef GAPSCOPE_MODEL_STRUCTURE_H_
 #define GAPSCOPE_MODEL_STRUCTURE_H_
 
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "src/core/mujoco_handles.h"
 #include "src/model/effect.h"
+#include "src/model/native.h"
 #include "src/model/rig.h"
 #include "src/plugins/common/parameters.h"
 
@@ -41,6 +43,8 @@ class Structure {
   Status AddMotorTerm(const std::string& actuator, const std::string& key, const std::string& expression);
   Status AddFrictionTerm(const std::string& joint, const std::string& key, const std::string& expression);
   Status AddSpringTerm(const std::string& joint, const std::string& key, const std::string& expression);
+  // Names of the motor's side and of what links it to the load, behind the joint's.
+  static constexpr const char *kMotorSide = ".motor", *kLink = ".transmission";
   // Splits the joint's driven inertia into a motor side (`share` of it) and a load side: on a spring with `stiffness`
   // and `damping`, or with a `gap` whose flanks have `damping` as their ratio.
   struct Split {
@@ -63,11 +67,23 @@ class Structure {
   void Set(const std::string& field, std::vector<std::string> expressions);
   void AddParameter(Parameter parameter) { parameters.push_back(std::move(parameter)); }
 
-  // Turns the terms into elements of the spec. Call once, after all effects.
+  // What the terms become.
+  enum class Form {
+    kReplay,   // a model whose delays of logged columns the host does
+    kPlugins,  // a model of its own
+    kNative,   // one without our plugins
+  };
+  // Turns the terms into elements of the spec. Call once, after all effects. Error of kNative: the rig's own MJCF has
+  // plugins.
   Status Finish();
 
   SpecPtr spec;
-  bool for_export = false;  // what the host does itself must enter the model too
+  Form form = Form::kReplay;
+  const EffectUse* entering = nullptr;  // whose terms are being added
+  // Of kNative: what the engine has, numbers of expressions, and what became of the effects that added terms.
+  NativeFeatures features;
+  std::function<double(const std::string&)> value_of;
+  std::vector<NativeEffect> told;
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
   std::map<std::string, std::string> command_delay;  // drive -> parameter
@@ -91,6 +107,22 @@ class Structure {
   Status FinishFriction(const std::string& name, Terms terms);
   void FinishSpring(const std::string& joint, const Terms& terms);
   void FinishOwnTorque(const OwnTorque& torque);
+  // The same without plugins.
+  Status FinishNative();
+  void Enter(const std::string& group, const std::string& place, const std::string& key);
+  void Tell(const std::string& group, const std::string& place, const std::string& key, Fidelity fidelity,
+            const std::string& how);
+  void TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how);
+  bool AddPassive(const std::string& joint, double amplitude, double per_rad, double phase);
+  void NativeSpring(const std::string& joint, const Terms& terms);
+  void NativeElastic(const std::string& joint, const Terms& terms);
+  Status NativeFriction(const std::string& joint, const Terms& terms);
+  void NativeDelay(const std::string& joint, const std::string& key, double delay_s,
+                   const std::vector<mjsActuator*>& inputs);
+  void NativeMotor(const std::string& joint, const Terms& terms);
+  // A number in the place of what the experiment or the MJCF says of a field.
+  void Put(const std::string& field, double number);
+  void MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs);
   // A passive plugin acts from a body of its own, without mass, since a body carries one plugin.
   void HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance);
   void AddNumeric(const std::string& name, double value);
@@ -101,7 +133,8 @@ class Structure {
   const Rig& rig_;
   std::map<std::string, Terms> motor_, friction_, spring_;  // by joint
   std::vector<OwnTorque> own_torques_;
-  std::vector<std::string> replaced_;  // fields
+  std::vector<std::string> replaced_;                     // fields
+  std::map<std::string, std::vector<EffectUse>> owners_;  // of terms, by group/place/key
 };
 
 }  // namespace gapscope

@@ -81,6 +81,7 @@ void Structure::AddLive(const std::string& instance, const Terms& terms) {
 }
 
 Status Structure::Finish() {
+  if (form == Form::kNative) return FinishNative();
   for (const Split& split : splits) FinishSplit(split);
   for (const auto& [joint, terms] : motor_) GS_RETURN_IF_ERROR(FinishMotor(joint, terms));
   for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(FinishFriction(joint, terms));
@@ -91,7 +92,7 @@ Status Structure::Finish() {
 
 // The spring or the gap between the two sides.
 void Structure::Link(const Split& split, const std::string& motor) {
-  const std::string tendon = split.joint + ".transmission";
+  const std::string tendon = split.joint + kLink;
   mjsTendon* link = mjs_addTendon(spec.get(), nullptr);
   mjs_setName(link->element, tendon.c_str());
   mjs_wrapJoint(link, motor.c_str(), 1);
@@ -119,7 +120,7 @@ void Structure::Link(const Split& split, const std::string& motor) {
 void Structure::FinishSplit(const Split& split) {
   mjsJoint* joint = FindJoint(split.joint);
   mjsBody* body = mjs_getParent(joint->element);
-  const std::string motor = split.joint + ".motor";
+  const std::string motor = split.joint + kMotorSide;
   mjsBody* side = mjs_addBody(mjs_getParent(body->element), nullptr);
   mjs_setName(side->element, motor.c_str());
   std::copy_n(body->pos, 3, side->pos);

@@ -439,8 +439,8 @@ measured:
   Recording part = coarse;
   part.start_s = 0.4;
   part.time_s.erase(part.time_s.begin() + 101, part.time_s.end());
-  for (auto* values : {&part.commands[0].values, &part.measured[0].values, &part.measured[1].values,
-                       &part.measured[2].values})
+  for (auto* values :
+       {&part.commands[0].values, &part.measured[0].values, &part.measured[1].values, &part.measured[2].values})
     values->erase(values->begin(), values->begin() + 100);
   const auto later = Predict(*model, part);
   for (std::size_t k = 1; k < part.rows(); ++k)

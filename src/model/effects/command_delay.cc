@@ -27,7 +27,7 @@ Effect Effect_command_delay() {
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         // A late command is a shift of the log, which the host does exactly; an exported model needs the motor's own
         // delay.
-        if (structure.for_export) return structure.AddMotorTerm(on, "command_delay_s", names[0]);
+        if (structure.form != Structure::Form::kReplay) return structure.AddMotorTerm(on, "command_delay_s", names[0]);
         structure.command_delay[on] = names[0];
         return Ok();
       },

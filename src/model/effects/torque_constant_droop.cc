@@ -13,7 +13,7 @@ Effect Effect_torque_constant_droop() {
                .scale = ScaleKind::kOne,
                .neutral = 0,
                .low = 0,
-               .high = 2,  // the rig's largest torque is a guess from the nominal model: late, it reaches half of it
+               .high = 2,  // logs may reach a part of the peak; without a stated one it is a guess, late by half
                .trials = {0.1, 0.3, 0.5},
                .start = 0.1},
               {.key = "exponent",
@@ -32,7 +32,7 @@ Effect Effect_torque_constant_droop() {
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_at_peak", names[0]));
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "droop_exponent", names[1]));
-        return structure.AddMotorTerm(on, "droop_reference_n_m", ScaleName(on, RigSize::kTorque));
+        return structure.AddMotorTerm(on, "droop_reference_n_m", ScaleName(on, RigSize::kPeak));
       },
   };
 }

@@ -1,0 +1,122 @@
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "src/cli/commands.h"
+#include "src/cli/result_model.h"
+#include "src/cli/session.h"
+#include "src/core/file.h"
+#include "src/export/target.h"
+#include "src/report/export_report.h"
+#include "src/report/read_run.h"
+#include "src/report/write_run.h"
+
+namespace gapscope::cli {
+namespace {
+
+struct ExportFlags {
+  CommonFlags common;
+  ResultSource source;
+  TargetName target = TargetName::kMujoco;
+  double time_step_s = 0;
+};
+
+// The logs that the result was judged by; of a replay all of its logs.
+std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json) {
+  std::vector<std::string> paths;
+  const auto add = [&](const nlohmann::ordered_json& logs) {
+    if (!logs.is_array()) return;
+    for (const auto& log : logs) {
+      if (log.is_string()) paths.push_back(log.get<std::string>());
+      if (log.is_object() && log.contains("path")) paths.push_back(log["path"].get<std::string>());
+      if (log.is_object() && log.contains("log")) paths.push_back(log["log"].get<std::string>());
+    }
+  };
+  if (json.contains("logs") && json["logs"].is_object()) add(json["logs"].value("held_out", nlohmann::ordered_json()));
+  if (json.contains("held_out")) add(json["held_out"]);
+  if (paths.empty() && json.contains("logs")) add(json["logs"]);
+  return paths;
+}
+
+Status Measure(const Model& model, const std::vector<double>& values, ExportRun* run, ThreadPool& pool) {
+  std::error_code failed;
+  for (const std::string& log : run->logs) {
+    if (!std::filesystem::exists(log, failed)) {
+      run->unmeasured = "the log " + log + " is not there";
+      return Ok();
+    }
+  }
+  if (run->logs.empty()) {
+    run->unmeasured = "the result names no logs";
+    return Ok();
+  }
+  GS_ASSIGN(const auto recordings, LoadRecordings(model.experiment(), run->logs, pool));
+  ExportedFile file{.path = run->out, .host = {}};
+  for (const NativeEffect& effect : run->effects) {
+    if (effect.fidelity == Fidelity::kHost) file.host.push_back(effect.use);
+  }
+  GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
+  return Ok();
+}
+
+Result<int> RunExport(const ExportFlags& flags) {
+  GS_ASSIGN(const nlohmann::ordered_json json, ReadJson(flags.source.path));
+  GS_ASSIGN(const ResultModel loaded, LoadWholeResult(json, flags.source));
+  const Model& model = *loaded.model;
+  const ExportTarget& target = TargetOf(flags.target);
+  NativeFeatures features = target.has;
+  features.time_step_s = flags.time_step_s;
+  GS_ASSIGN(const ExportedModel exported, target.plugins ? model.Export(loaded.values, nullptr, {})
+                                                         : model.ExportNative(loaded.values, nullptr, features));
+  if (target.plugins && flags.time_step_s > 0) exported.spec->option.timestep = flags.time_step_s;
+  GS_ASSIGN(const std::string xml, SpecToXml(*exported.spec, model.experiment().model_path));
+  ExportRun run{.result = flags.source.path,
+                .target = NameOf(flags.target),
+                .what = target.what,
+                .out = (std::filesystem::path(flags.common.out) / "model.xml").string(),
+                .time_step_s = exported.spec->option.timestep,
+                .effects = exported.native,
+                .left_out = exported.left_out,
+                .logs = JudgedBy(json)};
+  GS_RETURN_IF_ERROR(WriteFile(run.out, xml));
+  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+  GS_RETURN_IF_ERROR(Measure(model, loaded.values, &run, pool));
+  const std::string text = ToJson(run).dump(2) + "\n";
+  GS_RETURN_IF_ERROR(WriteFile((std::filesystem::path(flags.common.out) / "fidelity.json").string(), text));
+  fmt::print("{}", flags.common.json ? text : ToTable(run));
+  return kDone;
+}
+
+}  // namespace
+
+Command ExportCommand() {
+  auto flags = std::make_shared<ExportFlags>();
+  const std::vector<Option> own = {
+      {.flag = "result",
+       .value = &flags->source.path,
+       .required = true,
+       .help = "Folder that diagnose, tune or replay wrote with --out, or its result.json"},
+      {.flag = "--to", .value = ChoiceOf(flags->target), .help = "The engine that is to run it"},
+      {.flag = "--out",
+       .value = &flags->common.out,
+       .required = true,
+       .help = "Folder for model.xml and fidelity.json"},
+      {.flag = "--timestep",
+       .value = &flags->time_step_s,
+       .range = Above(0, 0),
+       .unset = "the MJCF's",
+       .help = "Time step of the written MJCF, s"},
+      WhileOption(flags->source.while_column),
+      {.flag = "--experiment",
+       .value = &flags->source.experiment,
+       .unset = "the one that the result names",
+       .help = "Experiment file whose MJCF it is"}};
+  return {.name = "export",
+          .what = "Write a result as an MJCF for another engine, and measure what that loses",
+          .options = Join({own, CommonOptions(flags->common)}),
+          .example = "gapscope export out/demo --to mjx --out out/mjx",
+          .run = [flags] { return RunExport(*flags); }};
+}
+
+}  // namespace gapscope::cli

@@ -1,0 +1,36 @@
+// How well an exported MJCF moves: measured, on logs, beside the model that it stands for.
+#ifndef GAPSCOPE_EXPORT_FIDELITY_H_
+#define GAPSCOPE_EXPORT_FIDELITY_H_
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/core/statistics.h"
+#include "src/core/thread_pool.h"
+#include "src/experiment/recording.h"
+#include "src/model/model.h"
+
+namespace gapscope {
+
+// Normalised errors (ReplayError) in windows, nuisances fitted; NaN: not measured.
+struct FidelityErrors {
+  double nominal = kNaN, model = kNaN, exported = kNaN;
+  // Share of what the model closes of the gap that the exported MJCF lets open again.
+  double Lost() const;
+};
+
+// An exported file, and the effects that the host does beside it.
+struct ExportedFile {
+  std::string path;
+  std::vector<EffectUse> host;
+};
+
+// The file is read back as any program would, and driven by the experiment's commands. Errors: it does not load; a
+// signal or a command of the experiment is not in it.
+Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const double> values, const ExportedFile& file,
+                                       const std::vector<Recording>& logs, ThreadPool& pool);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_EXPORT_FIDELITY_H_

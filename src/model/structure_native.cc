@@ -1,0 +1,275 @@
+// The second half of a Structure that must do without our plugins: terms become what MuJoCo has itself, exactly, nearly
+// or not at all, and what became of each effect is told.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "src/experiment/expression.h"
+#include "src/model/structure.h"
+
+namespace gapscope {
+namespace {
+
+constexpr char kMotor[] = "motor", kFriction[] = "friction", kSpring[] = "spring";
+
+// `field` of a joint, by the settings or by the MJCF itself.
+double ValueOf(const std::vector<FieldSetting>& settings, const std::string& field, double own,
+               const std::function<double(const std::string&)>& value_of) {
+  const auto set = std::find_if(settings.begin(), settings.end(), [&](const auto& s) { return s.field == field; });
+  return set == settings.end() ? own : value_of(set->expressions.front());
+}
+
+}  // namespace
+
+std::string FidelityName(Fidelity fidelity) {
+  switch (fidelity) {
+    case Fidelity::kExact:
+      return "exact";
+    case Fidelity::kApproximated:
+      return "approximated";
+    case Fidelity::kHost:
+      return "host";
+    case Fidelity::kDropped:
+      return "dropped";
+  }
+  return "";
+}
+
+void Structure::Enter(const std::string& group, const std::string& place, const std::string& key) {
+  if (entering) owners_[group + "/" + place + "/" + key].push_back(*entering);
+}
+
+// The worst of what becomes of an effect's terms is what becomes of it.
+void Structure::Tell(const std::string& group, const std::string& place, const std::string& key, Fidelity fidelity,
+                     const std::string& how) {
+  std::string entered = place;  // before its joint was split
+  for (const auto& [joint, motor] : motor_joint) {
+    if (motor == place) entered = joint;
+  }
+  for (const EffectUse& use : owners_[group + "/" + entered + "/" + key]) TellOf(use, fidelity, how);
+}
+
+void Structure::TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how) {
+  auto of = std::find_if(told.begin(), told.end(), [&](const NativeEffect& effect) { return effect.use == use; });
+  if (of == told.end()) of = told.insert(told.end(), NativeEffect{.use = use});
+  if (of->how.empty() || fidelity > of->fidelity) *of = {use, fidelity, how};
+}
+
+Status Structure::FinishNative() {
+  if (mjs_firstElement(spec.get(), mjOBJ_PLUGIN)) {
+    return Error{.what = "the MJCF itself has plugins: it has no form without them",
+                 .where = rig_.experiment().model_path,
+                 .allowed = "native elements",
+                 .cure = "export it with them: --to mujoco"};
+  }
+  for (const Split& split : splits) FinishSplit(split);
+  for (const auto& [joint, terms] : motor_) NativeMotor(joint, terms);
+  for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(NativeFriction(joint, terms));
+  for (const auto& [joint, terms] : spring_) NativeSpring(joint, terms);
+  for (const OwnTorque& torque : own_torques_)
+    TellOf({torque.name, torque.joint}, Fidelity::kDropped, "a formula of the experiment's own has no native form");
+  return Ok();
+}
+
+// amplitude sin(per_rad q + phase) on a joint, by a motor without an input; false: the engine has none.
+bool Structure::AddPassive(const std::string& joint, double amplitude, double per_rad, double phase) {
+  if (amplitude == 0) return true;
+  mjsActuator* actuator = nullptr;
+  if (features.passive_motors) {
+    actuator = mjs_addActuator(spec.get(), nullptr);
+    double none[2] = {0, 0}, ripple[3] = {amplitude, per_rad, phase};
+    mjs_setToDCMotor(actuator, none, 1, nullptr, nullptr, nullptr, ripple, nullptr, nullptr, nullptr, mjINPUT_NONE);
+  } else if (per_rad == 0) {
+    actuator = mjs_addActuator(spec.get(), nullptr);
+    actuator->gainprm[0] = 0;
+    actuator->biastype = mjBIAS_AFFINE;
+    actuator->biasprm[0] = amplitude * std::sin(phase);
+  } else {
+    return false;
+  }
+  int count = 0;
+  std::string name;
+  do name = fmt::format("{}.passive{}", joint, count++ ? fmt::format("_{}", count) : "");
+  while (mjs_findElement(spec.get(), mjOBJ_ACTUATOR, name.c_str()));
+  mjs_setName(actuator->element, name.c_str());
+  actuator->trntype = mjTRN_JOINT;
+  mjs_setString(actuator->target, joint.c_str());
+  return true;
+}
+
+void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
+  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
+    if (terms.contains(key)) Tell(kSpring, joint, key, fidelity, how);
+  };
+  const auto passive = [&](const char* key, double amplitude, double per_rad, double phase) {
+    const bool done = AddPassive(joint, amplitude, per_rad, phase);
+    tell(key, done ? Fidelity::kExact : Fidelity::kDropped,
+         done ? "a motor without an input, its torque a sine of the angle" : "no torque of an angle but a spring's");
+  };
+  NativeElastic(joint, terms);
+  passive("gravity_n_m", value("gravity_n_m"), 1, std::numbers::pi - value("gravity_rest_rad"));
+  passive("bias_n_m", value("bias_n_m"), 0, 0.5 * std::numbers::pi);
+  passive("cogging_n_m", value("cogging_n_m"), value("cogging_periods_per_rev"), value("cogging_phase_rad"));
+  if (const double stiffness = value("stop_n_m_per_rad"); stiffness > 0) {
+    constexpr double kFar = 1e6;  // the other end of the free way
+    const mjsJoint* element = FindJoint(joint);
+    const double stop = value("stop_rad"), middle = 0.5 * (element->range[0] + element->range[1]);
+    mjsTendon* tendon = mjs_addTendon(spec.get(), nullptr);
+    mjs_setName(tendon->element, (joint + ".stop").c_str());
+    mjs_wrapJoint(tendon, joint.c_str(), 1);
+    tendon->stiffness[0] = stiffness;
+    tendon->springlength[0] = stop > middle ? -kFar : stop;
+    tendon->springlength[1] = stop > middle ? stop : kFar;
+    tell("stop_n_m_per_rad", Fidelity::kExact, "a tendon whose spring is slack before the stop");
+  }
+}
+
+// Springs add up to one: k1 (q - r1) + k2 (q - r2) = (k1 + k2) (q - r).
+void Structure::NativeElastic(const std::string& joint, const Terms& terms) {
+  const char *keys[] = {"stiffness_n_m_per_rad", "rest_rad", "cubic_n_m_per_rad3"};
+  if (std::none_of(std::begin(keys), std::end(keys), [&](const char* key) { return terms.contains(key); })) return;
+  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  mjsJoint* element = FindJoint(joint);
+  const std::string field = "joint/" + joint + "/";
+  const double own = ValueOf(settings, field + "stiffness", element->stiffness[0], value_of);
+  const double own_rest = ValueOf(settings, field + "springref", element->springref, value_of);
+  const double own_cubic = ValueOf(settings, field + "stiffness_cubic", element->stiffness[2], value_of);
+  const double added = value(keys[0]), rest = value(keys[1]), cubic = value(keys[2]);
+  const double sum = own + added;
+  const double common = sum != 0 ? (own * own_rest + added * rest) / sum : rest;
+  const bool one_rest = own == 0 || std::abs(own_rest - rest) < 1e-12;
+  Put(field + "stiffness", sum);
+  Put(field + "springref", common);
+  for (const char* key : keys) {
+    if (terms.contains(key)) Tell(kSpring, joint, key, Fidelity::kExact, "the joint's own spring");
+  }
+  if (cubic == 0 && own_cubic == 0) return;
+  const bool kept = features.polynomials && one_rest && (own_cubic == 0 || own_rest == rest);
+  if (kept) Put(field + "stiffness_cubic", own_cubic + cubic);
+  if (!kept && cubic != 0)
+    Tell(kSpring, joint, keys[2], added != 0 ? Fidelity::kApproximated : Fidelity::kDropped,
+         features.polynomials ? "without its cubic term: the joint's own spring rests elsewhere"
+                              : "without its cubic term: springs are linear there");
+}
+
+Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
+  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
+    if (terms.contains(key)) Tell(kFriction, joint, key, fidelity, how);
+  };
+  const std::string on = MotorSide(joint);
+  const double positive = value("friction_positive_n_m"), negative = value("friction_negative_n_m");
+  const double level = value("friction_n_m") + 0.5 * (positive + negative);
+  tell("friction_n_m", Fidelity::kExact, "the joint's own dry friction");
+  if (terms.contains("friction_n_m") || level > 0)
+    GS_RETURN_IF_ERROR(FinishFriction(joint, {{"friction_n_m", ExactText(level)}}));
+  // While it slides, friction by direction is constant friction and a constant torque.
+  AddPassive(on, -0.5 * (positive - negative), 0, 0.5 * std::numbers::pi);
+  for (const char* key : {"friction_positive_n_m", "friction_negative_n_m"})
+    tell(key, Fidelity::kExact, "dry friction of the mean, and a constant torque");
+  tell("breakaway_n_m", Fidelity::kApproximated, "dry friction of its level at speed: it breaks away at that");
+  tell("load_coefficient", Fidelity::kDropped, "friction in proportion to a load has no native form");
+  if (terms.contains("quadratic_n_m_s2_per_rad2")) {
+    const std::string field = "joint/" + on + "/damping_quadratic";
+    const double own = ValueOf(settings, field, FindJoint(on)->damping[1], value_of);
+    if (features.polynomials) Put(field, own + value("quadratic_n_m_s2_per_rad2"));
+    tell("quadratic_n_m_s2_per_rad2", features.polynomials ? Fidelity::kExact : Fidelity::kDropped,
+         features.polynomials ? "the joint's own quadratic damping" : "damping is linear there");
+  }
+  return Ok();
+}
+
+void Structure::NativeDelay(const std::string& joint, const std::string& key, double delay_s,
+                            const std::vector<mjsActuator*>& inputs) {
+  const double step_s = spec->option.timestep, steps = delay_s / step_s;
+  if (delay_s <= 0) return;
+  const std::string in_steps = fmt::format("{:.4g} ms, {:.3g} steps of {:.4g} ms", 1e3 * delay_s, steps, 1e3 * step_s);
+  if (!features.delays || steps < 1) {
+    Tell(kMotor, joint, key, Fidelity::kHost,
+         fmt::format("send commands {} later: {}", in_steps,
+                     features.delays ? "less than a step is none" : "actuators have no delay there"));
+    return;
+  }
+  const bool whole = std::abs(steps - std::round(steps)) < 1e-6;
+  bool feeds_back = false;
+  for (mjsActuator* input : inputs) {
+    input->delay += delay_s;
+    input->nsample = std::max(input->nsample, static_cast<int>(std::ceil(input->delay / step_s - 1e-6)) + 1);
+    input->interp = whole ? 0 : 1;
+    feeds_back = feeds_back || input->biasprm[1] != 0 || input->biasprm[2] != 0;
+  }
+  const bool late_feedback = feeds_back && key == "torque_delay_s";
+  if (late_feedback) MakeFeedbackLate(joint, delay_s, inputs);
+  const bool early = spec->option.integrator == mjINT_RK4;  // whose last stage is at the end of a step
+  Tell(kMotor, joint, key, late_feedback || early ? Fidelity::kApproximated : Fidelity::kExact,
+       "the actuator's own delay of " + in_steps + (early ? ", by RK4 up to a step less" : "") +
+           (late_feedback ? "; that of its feedback by less damping and other inertia" : ""));
+}
+
+void Structure::Put(const std::string& field, double number) {
+  std::erase_if(settings, [&](const FieldSetting& setting) { return setting.field == field; });
+  Set(field, {ExactText(number)});
+}
+
+// kp q(t - D) + kv q'(t - D), to second order in D: kp q + (kv - kp D) q' + (kp D^2 / 2 - kv D) q''.
+void Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs) {
+  double inertia = ValueOf(settings, "joint/" + joint + "/armature", FindJoint(joint)->armature, value_of);
+  for (const mjsActuator* input : inputs) {
+    const std::string field = std::string("actuator/") + mjs_getString(mjs_getName(input->element)) + "/";
+    const double kp = ValueOf(settings, field + "kp", -input->biasprm[1], value_of);
+    const double kv = ValueOf(settings, field + "kv", -input->biasprm[2], value_of);
+    if (kp == 0 && kv == 0) continue;
+    Put(field + "kv", kv - kp * delay_s);
+    inertia += 0.5 * kp * delay_s * delay_s - kv * delay_s;
+  }
+  Put("joint/" + joint + "/armature", std::max(0.0, inertia));
+}
+
+void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
+  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
+    if (terms.contains(key)) Tell(kMotor, joint, key, fidelity, how);
+  };
+  const std::vector<mjsActuator*> inputs = ActuatorsOn(joint);
+  const bool feeds_back = std::any_of(inputs.begin(), inputs.end(), [](const mjsActuator* input) {
+    return input->biasprm[1] != 0 || input->biasprm[2] != 0;
+  });
+  for (const char* key : {"command_delay_s", "torque_delay_s"}) NativeDelay(joint, key, value(key), inputs);
+  if (const double limit = value("torque_limit_n_m"); limit > 0 && std::isfinite(limit)) {
+    const double most = limit * (inputs.size() == 1 ? std::abs(inputs.front()->gear[0]) : 1);
+    mjsJoint* element = FindJoint(joint);
+    const bool limited = element->actfrclimited == mjLIMITED_TRUE;
+    element->actfrcrange[0] = limited ? std::max(element->actfrcrange[0], -most) : -most;
+    element->actfrcrange[1] = limited ? std::min(element->actfrcrange[1], most) : most;
+    element->actfrclimited = mjLIMITED_TRUE;
+    const double softness = value("limit_softness");
+    tell("torque_limit_n_m", softness > 0.02 ? Fidelity::kApproximated : Fidelity::kExact,
+         "the joint's own limit of actuator forces" +
+             (softness > 0.02 ? fmt::format(", its corner sharp where {:.2g} of it is round", softness) : ""));
+  }
+  if (const double lag = value("time_constant_s"); lag > 0) {
+    for (mjsActuator* input : inputs) {
+      input->dyntype = mjDYN_FILTEREXACT;
+      input->dynprm[0] = lag + value("second_time_constant_s");
+      input->actdim = 1;
+    }
+    const bool exact = !feeds_back && value("second_time_constant_s") == 0;
+    tell("time_constant_s", exact ? Fidelity::kExact : Fidelity::kApproximated,
+         exact ? "an activation of one pole" : "one pole of the command: feedback does not pass it");
+  }
+  tell("dead_zone", Fidelity::kHost,
+       fmt::format("take {:.4g} off the command's size, down to zero, before it is sent", value("dead_zone")));
+  const double of_command = value("command_asymmetry"), of_torque = value("asymmetry");
+  const bool by_host = !feeds_back || of_torque == 0;
+  const double share = feeds_back ? of_command : of_command + of_torque;
+  for (const char* key : {"command_asymmetry", "asymmetry"})
+    tell(key, by_host ? Fidelity::kHost : Fidelity::kDropped,
+         by_host ? fmt::format("send commands (1 + {0:.4g} sign u) u", share) : "gain by the torque's sign: no form");
+  for (const char* key : {"droop_at_peak", "sag_fraction", "power_w"})
+    tell(key, Fidelity::kDropped, "the drive's law has no native form");
+}
+
+}  // namespace gapscope

@@ -1,0 +1,54 @@
+#include "src/report/export_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "src/core/names.h"
+#include "src/report/json.h"
+
+namespace gapscope {
+
+using nlohmann::ordered_json;
+
+ordered_json ToJson(const ExportRun& run) {
+  ordered_json json = {{"schema", "gapscope.fidelity/1"},
+                       {"result", run.result},
+                       {"target", run.target},
+                       {"model", run.out},
+                       {"time_step_s", run.time_step_s},
+                       {"effects", ordered_json::array()},
+                       {"of_each_log", run.left_out},
+                       {"held_out_error",
+                        {{"nominal", JsonNumber(run.errors.nominal)},
+                         {"model", JsonNumber(run.errors.model)},
+                         {"exported", JsonNumber(run.errors.exported)},
+                         {"lost", JsonNumber(run.errors.Lost())}}},
+                       {"logs", run.logs},
+                       {"unmeasured", run.unmeasured},
+                       {"versions", JsonVersions(run.info)}};
+  for (const NativeEffect& effect : run.effects) {
+    json["effects"].push_back({{"name", effect.use.effect},
+                               {"on", effect.use.on},
+                               {"form", FidelityName(effect.fidelity)},
+                               {"how", effect.how}});
+  }
+  return json;
+}
+
+std::string ToTable(const ExportRun& run) {
+  constexpr double kMuch = 0.1;
+  std::string text;
+  if (const double lost = run.errors.Lost(); lost > kMuch)
+    text += fmt::format("{:.0f} % of what the model closes is open again in {}\n", 100 * lost, run.out);
+  text += fmt::format("{}: {} for {}, steps of {:.4g} ms\n", run.out, run.result, run.what, 1e3 * run.time_step_s);
+  for (const NativeEffect& effect : run.effects)
+    text += fmt::format("  {:<36} {:<13} {}\n", effect.use.Text(), FidelityName(effect.fidelity), effect.how);
+  if (!run.left_out.empty()) text += fmt::format("  as it was, since each log sets it anew: {}\n", Join(run.left_out));
+  if (!run.unmeasured.empty()) return text + "  not measured: " + run.unmeasured + "\n";
+  return text + fmt::format("  held-out error: nominal {:.4g}, the model {:.4g}, exported {:.4g}\n", run.errors.nominal,
+                            run.errors.model, run.errors.exported);
+}
+
+}  // namespace gapscope

@@ -1,0 +1,31 @@
+// What `export` wrote and what it loses, for people and programs: console lines, and JSON (gapscope.fidelity/1).
+#ifndef GAPSCOPE_REPORT_EXPORT_REPORT_H_
+#define GAPSCOPE_REPORT_EXPORT_REPORT_H_
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "src/export/fidelity.h"
+#include "src/model/native.h"
+#include "src/report/run.h"
+
+namespace gapscope {
+
+struct ExportRun {
+  RunInfo info;
+  std::string result, target, what, out;  // what: the target in words; out: the written MJCF
+  double time_step_s = 0;
+  std::vector<NativeEffect> effects;
+  std::vector<std::string> left_out;  // fields that each log sets anew
+  std::vector<std::string> logs;      // that the errors are of; empty: none could be read
+  std::string unmeasured;             // why there are no errors; empty: there are
+  FidelityErrors errors;
+};
+
+nlohmann::ordered_json ToJson(const ExportRun& run);
+std::string ToTable(const ExportRun& run);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_REPORT_EXPORT_REPORT_H_

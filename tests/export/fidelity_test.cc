@@ -1,0 +1,110 @@
+// Each effect's native form against its plugin: logs of the plugin model, driven through the written file.
+#include "src/export/fidelity.h"
+
+#include <gtest/gtest.h>
+
+#include "src/core/file.h"
+#include "src/export/target.h"
+#include "tests/model/synthetic.h"
+
+namespace gapscope::testing {
+namespace {
+
+struct Case {
+  std::string rig, effect;
+  std::map<std::string, double> values;  // of the effect, by key
+  Fidelity fidelity;
+  double most;  // normalised error of the exported file; XML keeps six digits
+  TargetName target = TargetName::kMujocoNative;
+};
+
+std::ostream& operator<<(std::ostream& out, const Case& c) {
+  return out << c.rig << " " << c.effect << " to " << NameOf(c.target);
+}
+
+// A log of two seconds of the model's own motion.
+Recording OwnLog(const Model& model, const std::map<std::string, double>& set) {
+  const bool volts = model.rig()->KindOfCommand("motor") == CommandKind::kVoltage;
+  Recording log = MakeRecording(model.experiment(), 1001, 0.002,
+                                [&](int c, double t) { return c == 0 ? Exciting(t, volts ? 4 : 0.6) : 0; });
+  log.log_path = "own.csv";
+  log.timeline.median_step_s = 0.002;
+  const auto predicted = Predict(model, log, set);
+  for (std::size_t s = 0; s < log.measured.size(); ++s) log.measured[s].values = predicted[s];
+  return log;
+}
+
+class NativeFormTest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(NativeFormTest, MovesAsItsFidelitySays) {
+  const Case& c = GetParam();
+  const Scratch scratch;
+  const Experiment experiment = ShippedExperiment(c.rig);
+  const auto base = MakeModel(experiment);
+  const ScaleTable scales = EstimateScales(*base, {OwnLog(*base, {})});
+  const auto uses = ParseEffects({c.effect}, *base->rig());
+  ASSERT_TRUE(uses.ok()) << uses.error().Text();
+  const auto model = MakeModel(experiment, uses.value(), scales);
+  std::map<std::string, double> set;
+  for (const auto& [key, value] : c.values) set[uses.value()[0].Text() + "." + key] = value;
+  const std::vector<double> values = ValuesWith(*model, set);
+  const auto exported = model->ExportNative(values, nullptr, TargetOf(c.target).has);
+  ASSERT_TRUE(exported.ok()) << exported.error().Text();
+  Fidelity fidelity = Fidelity::kExact;
+  for (const NativeEffect& effect : exported.value().native) fidelity = effect.fidelity;
+  EXPECT_EQ(fidelity, c.fidelity) << FidelityName(fidelity);
+  ExportedFile file{.path = scratch.Path("model.xml"), .host = {}};
+  if (fidelity == Fidelity::kHost) file.host = uses.value();
+  const auto xml = SpecToXml(*exported.value().spec, "model.xml");
+  ASSERT_TRUE(xml.ok() && WriteFile(file.path, xml.value()).ok());
+  EXPECT_EQ(xml.value().find("plugin"), std::string::npos);
+  ThreadPool pool(1);
+  const auto errors = MeasureFidelity(*model, values, file, {OwnLog(*model, set)}, pool);
+  ASSERT_TRUE(errors.ok()) << errors.error().Text();
+  // A file that lacks the effect would not pass.
+  if (fidelity != Fidelity::kDropped) {
+    EXPECT_GT(errors.value().nominal, (fidelity == Fidelity::kApproximated ? 1.5 : 20) * c.most);
+  }
+  EXPECT_LT(errors.value().exported, errors.value().model + c.most) << "nominal " << errors.value().nominal;
+}
+
+constexpr Fidelity kExact = Fidelity::kExact, kNearly = Fidelity::kApproximated, kHost = Fidelity::kHost,
+                   kDropped = Fidelity::kDropped;
+constexpr TargetName kNative = TargetName::kMujocoNative, kMjx = TargetName::kMjx;
+
+INSTANTIATE_TEST_SUITE_P(
+    Effects, NativeFormTest,
+    ::testing::Values(
+        Case{"qube", "cable_spring@arm", {{"stiffness_n_m_per_rad", 0.002}, {"rest_rad", 0.4}}, kExact, 1e-5},
+        Case{"qube", "cable_spring@arm", {{"stiffness_n_m_per_rad", 0.002}, {"stiffness_cubic_n_m_per_rad3", 0.002}},
+             kExact, 1e-5},
+        Case{"flexjoint", "cable_spring@base", {{"stiffness_n_m_per_rad", 0.2}, {"rest_rad", 0.4}}, kExact, 1e-5},
+        Case{"flexjoint", "spring_hardening@link", {{"cubic_n_m_per_rad3", 200}}, kExact, 1e-5},
+        Case{"qube", "coulomb_friction@arm", {{"friction_n_m", 0.001}}, kExact, 1e-4},
+        Case{"joint", "direction_asymmetry@joint",
+             {{"friction_positive_n_m", 6}, {"friction_negative_n_m", 2}}, kExact, 1e-4},
+        Case{"joint", "stribeck_friction@joint",
+             {{"friction_n_m", 4}, {"breakaway_n_m", 8}, {"stribeck_speed_rad_per_s", 0.3}}, kNearly, 0.02},
+        Case{"joint", "load_friction@joint", {{"coefficient", 0.2}}, kDropped, 1},
+        Case{"joint", "quadratic_drag@joint", {{"drag_n_m_s2_per_rad2", 1}}, kExact, 1e-3},
+        Case{"qube", "gravity_offset@arm", {{"torque_n_m", 0.004}, {"rest_rad", 1}}, kExact, 1e-5},
+        Case{"qube", "torque_bias@arm", {{"torque_n_m", 0.002}}, kExact, 1e-5},
+        Case{"qube", "cogging@arm", {{"amplitude_n_m", 0.002}, {"periods_per_rev", 7}, {"phase_rad", 1}}, kExact, 1e-5},
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kNearly, 0.03},
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.0213}}, kNearly, 0.03},
+        Case{"joint", "torque_delay@motor", {{"delay_s", 0.008}}, kNearly, 0.15},
+        Case{"joint", "torque_limit@motor", {{"limit_n_m", 40}}, kExact, 1e-4},
+        Case{"qube", "dead_zone@motor", {{"half_width_v", 0.4}}, kHost, 1e-5},
+        Case{"qube", "actuator_lag@motor", {{"time_constant_s", 0.02}}, kNearly, 0.015},
+        Case{"joint", "torque_constant_droop@motor", {{"loss_at_peak", 0.4}}, kDropped, 1},
+        Case{"joint", "sensor_delay@position_rad", {{"delay_s", 0.01}}, kHost, 1e-5},
+        Case{"joint", "joint_compliance@joint", {{"stiffness_n_m_per_rad", 2000}}, kExact, 1e-3},
+        Case{"joint", "backlash@joint", {{"gap_rad", 0.05}}, kExact, 1e-3},
+        Case{"qube", "cable_spring@arm", {{"stiffness_n_m_per_rad", 0.002}, {"rest_rad", 0.4}}, kExact, 1e-5, kMjx},
+        Case{"qube", "torque_bias@arm", {{"torque_n_m", 0.002}}, kExact, 1e-5, kMjx},
+        Case{"qube", "gravity_offset@arm", {{"torque_n_m", 0.004}, {"rest_rad", 1}}, kDropped, 1, kMjx},
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kHost, 1e-5, kMjx}),
+    [](const auto& at) { return "case" + std::to_string(at.index); });
+
+}  // namespace
+}  // namespace gapscope::testing

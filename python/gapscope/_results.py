@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ import numpy as np
 from gapscope import _html
 from gapscope._log import Floats
 from gapscope._plugins import load_plugins
+from gapscope._program import run
 
 T = TypeVar("T")
 
@@ -191,7 +193,51 @@ class Run(_Open):
 
 
 @dataclass(frozen=True)
+class ExportedEffect(_Open):
+    """What became of an effect: ``form`` is "exact", "approximated", "host" or "dropped"."""
+
+    name: str
+    on: str
+    form: str
+    how: str = ""
+
+
+@dataclass(frozen=True)
+class ExportError(_Open):
+    """Normalised errors on the logs that the result was judged by; ``lost``: share of what closed that opened again."""
+
+    nominal: float = math.nan
+    model: float = math.nan
+    exported: float = math.nan
+    lost: float = math.nan
+
+
+@dataclass(frozen=True)
+class Exported(_Open):
+    """A model for another engine: ``model`` is the MJCF's path. ``unmeasured``: why there are no errors."""
+
+    target: str
+    model: str
+    time_step_s: float
+    effects: tuple[ExportedEffect, ...]
+    held_out_error: ExportError
+    unmeasured: str = ""
+
+
+@dataclass(frozen=True)
 class _WithModel(Run):
+    def export(
+        self, target: str, out: str | os.PathLike[str], *, timestep: float | None = None, experiment: str | None = None
+    ) -> Exported:
+        """Writes OUT/model.xml and OUT/fidelity.json: "mujoco", "mujoco_native", "mujoco_warp" or "mjx".
+
+        ``timestep``, s: of the written MJCF. ``experiment``: where its file has moved since.
+        """
+        command = ["export", str(self.out), "--to", target, "--out", os.fspath(out), "--json"]
+        command += [] if timestep is None else ["--timestep", repr(float(timestep))]
+        command += [] if experiment is None else ["--experiment", experiment]
+        return from_json(Exported, json.loads(run(command).stdout))
+
     @property
     def model(self) -> Model:
         stated = self.json["model"]

@@ -14,7 +14,10 @@ const ExportTarget kTargets[] = {
     {TargetName::kMujoco, "MuJoCo 4 with the plugin library", true, {}},
     {TargetName::kMujocoNative, "MuJoCo 4 without plugins", false, {}},
     {TargetName::kMujocoWarp, "MuJoCo Warp 4 (float32)", false, {}},
-    {TargetName::kMjx, "MJX 3.17 and Playground", false, {.passive_motors = false, .delays = false, .polynomials = false}},
+    {TargetName::kMjx,
+     "MJX 3.17 and Playground",
+     false,
+     {.passive_motors = false, .delays = false, .polynomials = false}},
 };
 
 }  // namespace

@@ -129,7 +129,7 @@ void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
 
 // Springs add up to one: k1 (q - r1) + k2 (q - r2) = (k1 + k2) (q - r).
 void Structure::NativeElastic(const std::string& joint, const Terms& terms) {
-  const char *keys[] = {"stiffness_n_m_per_rad", "rest_rad", "cubic_n_m_per_rad3"};
+  const char* keys[] = {"stiffness_n_m_per_rad", "rest_rad", "cubic_n_m_per_rad3"};
   if (std::none_of(std::begin(keys), std::end(keys), [&](const char* key) { return terms.contains(key); })) return;
   const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
   mjsJoint* element = FindJoint(joint);

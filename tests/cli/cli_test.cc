@@ -341,6 +341,40 @@ TEST_F(CliTest, ApplyWritesAResultIntoTheMjcf) {
   EXPECT_EQ(json["changes"][0]["element"], "joint joint");
 }
 
+TEST_F(CliTest, ExportTellsAndMeasuresWhatAnotherEngineLoses) {
+  const std::string log = JointLog(), out = scratch_.Path("out"), to = scratch_.Path("mjx");
+  ASSERT_EQ(
+      Run("replay " + Joint() + " '" + log + "' --with coulomb_friction --with torque_bias --with command_delay " +
+          "--set coulomb_friction@joint.friction_n_m=2 --set torque_bias@joint.torque_n_m=1 " +
+          "--set command_delay@motor.delay_s=0.01 --out '" + out + "'")
+          .status,
+      0);
+  const Answer answer = Run("export '" + out + "' --to mjx --out '" + to + "' --json");
+  EXPECT_EQ(answer.status, 0) << answer.err;
+  EXPECT_EQ(answer.out, ReadAll(to + "/fidelity.json"));
+  const auto json = nlohmann::json::parse(answer.out);
+  EXPECT_EQ(json["schema"], "gapscope.fidelity/1");
+  std::map<std::string, std::string> forms;
+  for (const auto& effect : json["effects"]) forms[effect["name"]] = effect["form"];
+  EXPECT_EQ(forms, (std::map<std::string, std::string>{
+                       {"coulomb_friction", "exact"}, {"torque_bias", "exact"}, {"command_delay", "host"}}));
+  // With what the host does the file moves as the model does.
+  EXPECT_NEAR(json["held_out_error"]["exported"], json["held_out_error"]["model"], 1e-4);
+  EXPECT_EQ(ReadAll(to + "/model.xml").find("plugin"), std::string::npos);
+  std::filesystem::remove(log);
+  EXPECT_NE(Run("export '" + out + "' --to mjx --out '" + to + "'").out.find("not measured"), std::string::npos);
+}
+
+TEST_F(CliTest, ExportRefusesWhatItCannotWrite) {
+  const std::string log = JointLog(), out = scratch_.Path("out"), to = scratch_.Path("to");
+  ASSERT_EQ(Run("replay " + Joint() + " '" + log + "' --out '" + out + "'").status, 0);
+  ExpectRefused("export '" + out + "' --to mjx", {"--out"});
+  ExpectRefused("export '" + out + "' --to gazebo --out '" + to + "'", {"--to", "gazebo", "mjx"});
+  ExpectRefused("export '" + out + "' --to mjx --timestep 0 --out '" + to + "'", {"--timestep"});
+  ExpectRefused("export '" + scratch_.Write("list.json", "[1]") + "' --to mjx --out '" + to + "'", {"schema none"});
+  EXPECT_FALSE(std::filesystem::exists(to));
+}
+
 TEST_F(CliTest, ApplyRefusesWhatIsNoResultOfThisModel) {
   const std::string log = JointLog(), out = scratch_.Path("out");
   ASSERT_EQ(Run("replay " + Joint() + " '" + log + "' --with coulomb_friction --out '" + out + "'").status, 0);

@@ -238,6 +238,21 @@ def test_threads(experiment: str, demo: str) -> None:
     assert len(errors) == 3 and len(set(errors)) == 1
 
 
+def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -> None:
+    values = {"coulomb_friction@arm.friction_n_m": 0.0006, "dead_zone@motor.half_width_v": 0.1}
+    result = gs.replay(experiment, demo, with_=["coulomb_friction@arm", "dead_zone@motor"], set=values)
+    lost = result.export("mujoco_native", tmp_path / "native", timestep=0.001)
+    assert [(e.name, e.form) for e in lost.effects] == [("coulomb_friction", "exact"), ("dead_zone", "host")]
+    assert lost.time_step_s == 0.001
+    assert lost.held_out_error.exported == pytest.approx(lost.held_out_error.model, rel=0.01)
+    assert "gapscope." not in Path(lost.model).read_text()
+    holds(lost, json.loads((tmp_path / "native" / "fidelity.json").read_text()))
+    mujoco = pytest.importorskip("mujoco")
+    assert mujoco.MjModel.from_xml_path(lost.model).opt.timestep == 0.001
+    with pytest.raises(gs.InputError, match="--to"):
+        result.export("mjy", tmp_path / "other")
+
+
 def test_the_model_steps_in_the_users_mujoco(experiment: str, demo: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     spring = {name: value for name, value in TRUTH.items() if name.startswith("cable_spring")}

@@ -7,7 +7,7 @@ The program does the work, as a child process: no call of this package can take 
 Ctrl-C gives what a search has found so far. docs/python.md tells more.
 """
 
-from gapscope._commands import diagnose, inspect, render, replay, tune
+from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune
 from gapscope._errors import Bug, InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._log import Log, read
@@ -64,7 +64,9 @@ __all__ = [
     "Video",
     "Where",
     "bar",
+    "design",
     "diagnose",
+    "identify",
     "inspect",
     "load_plugins",
     "plugin_library",

@@ -264,3 +264,33 @@ def render(
         raise Interrupted
     said = job.json(finished.stdout)
     return Video(Path(said["out"]), said["frames"], said["width"], said["height"])
+
+
+def identify(method: str, exp: Source, logs: Logs, *, out: Folder = None, options: Options = None) -> dict[str, Any]:
+    """Parameters straight from logs: ``method`` is "pd", "friction", "inertia" ... (docs/identify.md).
+
+    The result as the program writes it: values with 95 % intervals, SI.
+    """
+    job = _job("identify", exp, out)
+    job.arguments.insert(1, method)
+    job.arguments += _files(job, logs)
+    return _plain(job, out, options)
+
+
+def design(what: str, exp: Source, *, out: Folder = None, options: Options = None) -> dict[str, Any]:
+    """An input for the next experiment ("sweep", "steps", "optimal" ...), or a controller ("lqr", "poles").
+
+    ``out`` is the input's CSV file; a controller has none. The result as the program writes it.
+    """
+    job = _job("design", exp, None)
+    job.arguments.insert(1, what)
+    return _plain(job, out, options)
+
+
+def _plain(job: _Job, out: Folder, options: Options) -> dict[str, Any]:
+    job.arguments += ["--json", *([] if out is None else ["--out", os.fspath(out)])]
+    _add_options(job, options)
+    finished = _run(job, None)
+    if finished.interrupted:
+        raise Interrupted
+    return job.json(finished.stdout)

@@ -238,6 +238,12 @@ class _WithModel(Run):
         command += [] if experiment is None else ["--experiment", experiment]
         return from_json(Exported, json.loads(run(command).stdout))
 
+    def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> dict[str, Any]:
+        """Writes the result into the text of the experiment's own MJCF (docs/apply.md); what changed there."""
+        command = ["apply", str(self.out), "--out", os.fspath(out), "--json"]
+        command += [] if experiment is None else ["--experiment", experiment]
+        return typing.cast(dict[str, Any], json.loads(run(command).stdout))
+
     @property
     def model(self) -> Model:
         stated = self.json["model"]
@@ -405,6 +411,10 @@ class Diagnosis(_WithModel):
     next_experiment: NextExperiment = NextExperiment()
     termination: str = ""
     wall_s: float = math.nan
+
+    def explain(self, statement: str) -> dict[str, Any]:
+        """The evidence of one statement ("coulomb_friction@arm") in full: terms, blocks of time, rivals."""
+        return typing.cast(dict[str, Any], json.loads(run(["explain", str(self.out), statement, "--json"]).stdout))
 
     def _repr_html_(self) -> str:
         return _html.diagnosis(self)

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <list>
 
+#include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/core/names.h"
 #include "src/report/version.h"
@@ -67,6 +68,11 @@ void AddCommand(CLI::App& above, const Command& command, std::list<AddedCommand>
 // What CLI11 has to say, and before it the nearest command where there is none of that name.
 int Say(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
   if (error.get_exit_code() == 0) return program.exit(error), kDone;  // --help, --version
+  if (AsksForJsonProgress(argc, argv)) {
+    const Error refused{.what = error.what(), .where = "the command line", .cure = "run it with --help"};
+    fmt::print(stderr, "{}", ErrorLine(refused));
+    return kBadInput;
+  }
   std::vector<std::string> names;
   for (const CLI::App* command : program.get_subcommands({})) names.push_back(command->get_name());
   if (argc > 1 && argv[1][0] != '-' && std::find(names.begin(), names.end(), argv[1]) == names.end()) {

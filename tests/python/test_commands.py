@@ -253,6 +253,18 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
         result.export("mjy", tmp_path / "other")
 
 
+def test_identify_design_and_apply(experiment: str, demo: str, tmp_path: Path) -> None:
+    pull = gs.identify("cable", experiment, demo)
+    assert pull["schema"] == "gapscope.identify.cable/1" and "stiffness" in pull["values"]
+    with pytest.raises(gs.InputError, match="--signal"):
+        gs.identify("cable", experiment, demo, options={"signal": "pendulum_rad"})
+    sweep = gs.design("sweep", experiment, out=tmp_path / "sweep.csv", options={"duration": 2})
+    assert (tmp_path / "sweep.csv").is_file() and sweep["schema"].startswith("gapscope.design")
+    result = gs.replay(experiment, demo, with_="coulomb_friction@arm", set={"coulomb_friction@arm.friction_n_m": 6e-4})
+    changed = result.apply(tmp_path / "robot.xml")
+    assert changed["changes"] and "frictionloss" in (tmp_path / "robot.xml").read_text()
+
+
 def test_the_model_steps_in_the_users_mujoco(experiment: str, demo: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     spring = {name: value for name, value in TRUTH.items() if name.startswith("cable_spring")}

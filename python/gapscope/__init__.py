@@ -10,7 +10,7 @@ Ctrl-C gives what a search has found so far. docs/python.md tells more.
 from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune
 from gapscope._errors import Bug, InputError, Interrupted
 from gapscope._experiment import Experiment
-from gapscope._log import Log, read
+from gapscope._log import Log, read, read_all
 from gapscope._plugins import load_plugins, plugin_library
 from gapscope._program import Progress, bar
 from gapscope._results import (
@@ -71,6 +71,7 @@ __all__ = [
     "load_plugins",
     "plugin_library",
     "read",
+    "read_all",
     "render",
     "replay",
     "tune",

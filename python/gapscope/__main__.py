@@ -12,6 +12,9 @@ def main() -> None:
         path = str(program())
     except InputError as error:
         sys.exit(f"gapscope: {error}")
+    beside = os.path.join(os.path.dirname(os.path.abspath(sys.argv[0])), "gapscope-convert")
+    if os.path.exists(beside):
+        os.environ.setdefault("GAPSCOPE_CONVERT", beside)
     os.execv(path, [path, *sys.argv[1:]])
 
 

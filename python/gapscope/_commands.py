@@ -14,6 +14,7 @@ from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._log import Log
 from gapscope._program import Finished, ProgressCallback, run
+from gapscope.formats import format_of
 from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video, from_json
 
 Source: TypeAlias = Experiment | str | os.PathLike[str] | Mapping[str, Any]
@@ -68,11 +69,12 @@ def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
     """The logs' files; those in memory are written beside the result."""
     files = []
     for log in _list(logs):
-        if not isinstance(log, (Log, str, os.PathLike)):
-            log = Log(log)
-        if not isinstance(log, Log):
+        if isinstance(log, (str, os.PathLike)) and format_of(log) is None:
             files.append(os.fspath(log))
-        elif log.path is not None:
+            continue
+        if not isinstance(log, Log):
+            log = Log(log)
+        if log.path is not None:
             files.append(str(log.path))
         else:
             name = log.name or f"log_{len(job.names)}"

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gapscope._errors import InputError
+from gapscope.formats import Source, Table, format_of, read_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,9 +25,10 @@ _TIMES = {"time_s", "time", "t", "timestamp", "stamp", "__time", "time_ms", "tim
 class Log:
     """A hardware log.
 
-    ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), a pandas DataFrame, a
-    structured array, or a mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ...
-    ``NAME[n - 1]``. Values are in the units that the experiment file states; NaN is a missing value.
+    ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), or one of another tool's
+    format (docs/formats.md: MAT, HDF5, Parquet, ROS bags, LeRobot), a pandas DataFrame, a structured array, or a
+    mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ... ``NAME[n - 1]``. Values are
+    in the units that the experiment file states; NaN is a missing value.
 
     ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
     time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so.
@@ -35,6 +37,9 @@ class Log:
 
     Stamps that are missing, repeat or go back are refused here: in memory they are a mistake. In files they are
     repaired as the experiment says.
+
+    ``findings`` is what reading found; ``clock`` says of each column of a foreign format what its stamps are: "header"
+    (the message's own), "receive", "sampled" or "synthetic".
 
     >>> log = Log({"time_s": [0.0, 0.1], "u": [1, 2], "q": [[0, 1], [2, 3]]}, name="step")
     >>> log.columns
@@ -55,6 +60,16 @@ class Log:
         self.time = time
         self._table: dict[str, Floats] = {}
         self._header = dict(header or {})
+        self.findings: tuple[str, ...] = ()
+        self.clock: dict[str, str] = {}
+        if isinstance(data, (str, os.PathLike)) and format_of(data) is not None:
+            if time_unit is not None or header:
+                raise InputError("a file says itself what its header is", os.fspath(data), cure="leave them out")
+            tables = read_tables(data, Source(time=time or ""))
+            if len(tables) != 1:
+                raise InputError("several recordings", os.fspath(data), str(len(tables)), "one", f"{data}#0")
+            self._take_table(tables[0])
+            return
         if isinstance(data, (str, os.PathLike)):
             if time is not None or time_unit is not None or header:
                 raise InputError(
@@ -128,6 +143,20 @@ class Log:
             allowed="tables in memory, and files that Log.save wrote",
             cure="read it yourself, for example with pandas, and give the DataFrame to Log",
         )
+
+    @classmethod
+    def of_table(cls, table: Table) -> Log:
+        """A log of what a reader gave."""
+        log = cls.__new__(cls)
+        log.path, log.name, log._header = None, "", {}
+        log._take_table(table)
+        return log
+
+    def _take_table(self, table: Table) -> None:
+        self._table, self.time, self._unit = dict(table.columns), table.time, ""
+        self.name = self.name or table.name
+        self._header = dict(table.header)
+        self.findings, self.clock = table.findings, dict(table.clock)
 
     # How data in memory becomes the table.
 
@@ -300,6 +329,24 @@ def _is_frame(data: Any) -> bool:
     return hasattr(data, "iloc") and hasattr(data, "columns") and hasattr(data, "index")
 
 
-def read(path: str | os.PathLike[str]) -> Log:
-    """A log in a file that the program reads."""
-    return Log(path)
+def read(
+    path: str | os.PathLike[str], *, topics: Iterable[str] = (), variable: str = "", time: str = ""
+) -> Log:
+    """A log in a file of any format that is known (docs/formats.md).
+
+    ``topics`` of a bag, else all; ``variable``: of a MAT file, or a group of an HDF5 file; ``time`` names the column of
+    stamps where its name does not say it. Of a dataset of several episodes: "dataset#3".
+    """
+    logs = read_all(path, topics=topics, variable=variable, time=time)
+    if len(logs) != 1:
+        raise InputError("several recordings", os.fspath(path), str(len(logs)), "one", f"{path}#0, or gs.read_all")
+    return logs[0]
+
+
+def read_all(
+    path: str | os.PathLike[str], *, topics: Iterable[str] = (), variable: str = "", time: str = ""
+) -> tuple[Log, ...]:
+    """Every recording of a file or folder, as `read`: of a LeRobot dataset its episodes ("dataset#0:20": some)."""
+    if format_of(path) is None:
+        return (Log(path),)
+    return tuple(Log.of_table(table) for table in read_tables(path, Source(tuple(topics), variable, time)))

@@ -10,6 +10,7 @@
 #include "src/core/file.h"
 #include "src/log/bam_reader.h"
 #include "src/log/csv_reader.h"
+#include "src/log/foreign.h"
 #include "src/log/list_reader.h"
 #include "src/log/npz_reader.h"
 #include "src/log/text.h"
@@ -131,6 +132,8 @@ std::string Log::Where(std::size_t row) const {
 std::string Log::WhereHeader() const { return header_line == 0 ? path : At(path, header_line); }
 
 Result<Log> ReadLog(const std::string& given, const ReadOptions& options) {
+  const ForeignFormat* foreign = options.format ? nullptr : ForeignFormatOf(given);
+  if (foreign) return ReadForeign(given, *foreign);
   const std::string path = StateFileOf(given);
   GS_ASSIGN(Log log, ReadOne(path, options.format));
   if (options.companions.empty() && log.format == std::string_view("csv_lists")) GS_RETURN_IF_ERROR(JoinControl(&log));

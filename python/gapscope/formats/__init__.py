@@ -1,0 +1,42 @@
+"""Logs in the formats of other tools, each read into one table (docs/formats.md)."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from gapscope._errors import InputError
+from gapscope.formats import _arrow, _hdf5, _lerobot, _mat, _ros
+from gapscope.formats._table import Format, Source, Table
+
+__all__ = ["FORMATS", "Format", "Source", "Table", "format_of", "read_tables"]
+
+# The first that knows a path reads it.
+FORMATS: tuple[Format, ...] = (_lerobot.FORMAT, _ros.FORMAT, _mat.FORMAT, _arrow.FORMAT, _hdf5.FORMAT)
+
+
+def format_of(path: str | os.PathLike[str]) -> Format | None:
+    """The format of a file or folder; None: one that the program reads itself, or none that is known."""
+    place = Path(_without_episodes(os.fspath(path))[0])
+    return next((form for form in FORMATS if form.knows(place)), None)
+
+
+def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tuple[Table, ...]:
+    """One table for each recording in a file or folder: of a LeRobot dataset its episodes, else one."""
+    text, episodes = _without_episodes(os.fspath(path))
+    place, form = Path(text), format_of(path)
+    if not place.exists():
+        raise InputError("no such file", where=text, cure="name the right log")
+    if form is None:
+        raise InputError("not a known format", text, place.suffix or "no suffix", ", ".join(f.name for f in FORMATS))
+    if episodes is not None and form is not _lerobot.FORMAT:
+        raise InputError("episodes of what has none", text, f"#{episodes}", "a LeRobot dataset")
+    return form.read(place, source if episodes is None else source.of_episodes(episodes))
+
+
+def _without_episodes(text: str) -> tuple[str, str | None]:
+    """"dataset#3" and "dataset#0:20": where a file of that very name is there, it is that."""
+    head, mark, tail = text.rpartition("#")
+    if not mark or os.path.exists(text) or not tail.replace(":", "").isdigit():
+        return text, None
+    return head, tail

@@ -1,0 +1,24 @@
+// Formats of other tools, which the Python package reads (docs/formats.md): its converter writes one NPZ table.
+#ifndef GAPSCOPE_LOG_FOREIGN_H_
+#define GAPSCOPE_LOG_FOREIGN_H_
+
+#include <string>
+
+#include "src/log/log.h"
+
+namespace gapscope {
+
+struct ForeignFormat {
+  std::string name, extra;  // "Parquet"; of pip install 'gapscope[EXTRA]'
+};
+
+// By the name of a file, or by what a folder holds; null: none of them, or nothing is there.
+const ForeignFormat* ForeignFormatOf(const std::string& path);
+
+// Starts the converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH; no shell. Errors: there
+// is none (says what to install); what the converter refuses, in its own words; it fails.
+Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_LOG_FOREIGN_H_

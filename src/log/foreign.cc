@@ -116,7 +116,8 @@ const ForeignFormat* ForeignFormatOf(const std::string& path) {
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format) {
   const ScratchFolder scratch;
   if (!scratch.made())
-    return Error{.what = "no room to convert the log", .where = path, .actual = std::strerror(errno), .cure = "$TMPDIR"};
+    return Error{
+        .what = "no room to convert the log", .where = path, .actual = std::strerror(errno), .cure = "$TMPDIR"};
   const std::string table = scratch.Path("table.npz"), said = scratch.Path("said"), converter = Converter();
   const int status = Run({converter, path, "--out", table}, said);
   if (status == -ENOENT || status == -EACCES || status == 127) {

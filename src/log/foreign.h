@@ -15,8 +15,8 @@ struct ForeignFormat {
 // By the name of a file, or by what a folder holds; null: none of them, or nothing is there.
 const ForeignFormat* ForeignFormatOf(const std::string& path);
 
-// Starts the converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH; no shell. Errors: there
-// is none (says what to install); what the converter refuses, in its own words; it fails.
+// Starts the converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH; no shell. Errors:
+// there is none (says what to install); what the converter refuses, in its own words; it fails.
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format);
 
 }  // namespace gapscope

@@ -57,7 +57,8 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
     for file in sorted((path / "data").glob("**/*.parquet")):
         table = _arrow.load(file)
         if "episode_index" not in table.column_names or "timestamp" not in table.column_names:
-            raise InputError("a data file without episode_index and timestamp", str(file), ", ".join(table.column_names))
+            there = ", ".join(table.column_names)
+            raise InputError("a data file without episode_index and timestamp", str(file), there)
         arrays = _arrow.columns_of(file, table, labels)
         for episode in np.unique(arrays["episode_index"]).astype(int):
             if episode < low or (high is not None and episode >= high):

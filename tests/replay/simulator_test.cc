@@ -404,6 +404,32 @@ TEST_F(DelayTest, ALateSensorShowsThePast) {
   for (std::size_t k = 5; k < 399; ++k) ASSERT_NEAR(late[0][k], fine[0][10 * k - 26], 2e-6) << k;
 }
 
+// An MJCF's own delay, in the middle of a log and at steps shorter than its own: what was commanded before the window.
+TEST_F(SimulatorTest, AWindowRemembersWhatTheMjcfDelays) {
+  const auto model_of = [&](const Scratch& scratch, const std::string& delay) {
+    std::string mjcf = Mjcf("damping=\"0.05\"", "<motor name=\"motor\" joint=\"hinge\"" + delay + "/>");
+    mjcf.replace(mjcf.find("RK4"), 3, "Euler");
+    mjcf.replace(mjcf.find("timestep=\"0.001\""), 16, "timestep=\"0.002\"");
+    return MakeModel(MakeExperiment(scratch, mjcf, kYaml));
+  };
+  const Scratch late_folder, on_time_folder;
+  const auto late = model_of(late_folder, " delay=\"0.01\" nsample=\"6\""), on_time = model_of(on_time_folder, "");
+  Recording log =
+      MakeRecording(late->experiment(), 200, 0.002, [](int, double t) { return std::sin(40 * t) > 0 ? 0.3 : -0.2; });
+  Recording shifted = log;
+  for (std::size_t k = 0; k < 200; ++k) shifted.commands[0].values[k] = k < 5 ? 0 : log.commands[0].values[k - 5];
+  const Window window{100, 180};
+  const auto run = [&](const Model& model, const Recording& recording) {
+    Simulator simulator(model, 0.0005);
+    EXPECT_TRUE(simulator.SetParameters(model.Nominal(), recording));
+    std::vector<double> predicted(2 * window.rows());
+    EXPECT_EQ(simulator.Run(recording, window, {.qpos = {0.1}, .qvel = {0.2}}, predicted).outcome, Outcome::kCompleted);
+    return predicted;
+  };
+  EXPECT_LT(LargestDifference(run(*late, log), run(*on_time, shifted)), 1e-9);
+  EXPECT_GT(LargestDifference(run(*late, log), run(*on_time, log)), 1e-3);
+}
+
 // A servo on every fourth stamp: its torque is that of the log's own target there, not of a mean over four.
 TEST_F(SimulatorTest, ForcesFollowFinerCommands) {
   const Scratch scratch;

@@ -34,8 +34,25 @@ InspectReport InspectRecording(const Recording& recording, const Experiment& exp
   return Inspect(recording.timeline, channels, recording.findings, recording.rows_in_log);
 }
 
-Result<int> RunInspect(const InspectFlags& flags) {
-  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+// A log that no experiment says anything of: all of its columns, in the log's own units.
+Result<InspectReport> InspectAlone(const std::string& path) {
+  GS_ASSIGN(const Log log, ReadLog(path, {}));
+  GS_ASSIGN(const Timeline timeline, BuildTimeline(log, {}));
+  std::vector<InspectChannel> channels;
+  for (const Column& column : log.columns) {
+    if (column.name == timeline.time_column) continue;
+    InspectChannel channel{.name = column.name, .unit = column.unit, .role = ChannelRole::kMeasured, .values = {}};
+    for (const std::size_t row : timeline.rows) channel.values.push_back(column.values[row]);
+    channels.push_back(std::move(channel));
+  }
+  std::vector<Finding> findings = log.findings;
+  findings.insert(findings.end(), timeline.findings.begin(), timeline.findings.end());
+  InspectReport report = Inspect(timeline, channels, findings, log.rows());
+  report.verdict = {"an experiment file says which columns are commands: `gapscope init MODEL.xml LOG` drafts one"};
+  return report;
+}
+
+Result<InspectRun> InspectBound(const InspectFlags& flags, ThreadPool& pool) {
   GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
   GS_ASSIGN(const auto recordings, LoadRecordings(experiment, flags.model.logs, pool));
@@ -43,6 +60,28 @@ Result<int> RunInspect(const InspectFlags& flags) {
   pool.ForEach(recordings.size(), [&](std::size_t i, int) {
     run.logs[i] = {.log = recordings[i].log_path, .report = InspectRecording(recordings[i], experiment)};
   });
+  return run;
+}
+
+Result<InspectRun> InspectUnbound(std::vector<std::string> logs) {
+  InspectRun run;
+  for (const std::string& log : logs) {
+    GS_ASSIGN(InspectReport report, InspectAlone(log));
+    run.logs.push_back({.log = log, .report = std::move(report)});
+  }
+  return run;
+}
+
+bool IsExperiment(const std::string& path) { return path.ends_with(".yaml") || path.ends_with(".yml"); }
+
+Result<int> RunInspect(const InspectFlags& flags) {
+  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+  std::vector<std::string> all = {flags.model.experiment};
+  all.insert(all.end(), flags.model.logs.begin(), flags.model.logs.end());
+  const bool bound = IsExperiment(flags.model.experiment);
+  if (bound && flags.model.logs.empty())
+    return Error{.what = "no log", .where = flags.model.experiment, .cure = "name the logs behind the experiment"};
+  GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags, pool) : InspectUnbound(std::move(all)));
   const nlohmann::ordered_json json = ToJson(run);
   if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteRun(flags.common.out, json));
   fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));
@@ -53,10 +92,13 @@ Result<int> RunInspect(const InspectFlags& flags) {
 
 Command InspectCommand() {
   auto flags = std::make_shared<InspectFlags>();
+  std::vector<Option> files = LogOptions(flags->model);
+  files[0].help = "Experiment file (.yaml), or a log";
+  files[0].more = "Without an experiment every column is looked at, in the log's own units";
+  files[1].required = false;
   return {.name = "inspect",
           .what = "Is this log fit for use: timing, gaps, repairs, saturation, excitation",
-          .options = Join(
-              {LogOptions(flags->model), {FolderOption(flags->common, "result.json")}, CommonOptions(flags->common)}),
+          .options = Join({files, {FolderOption(flags->common, "result.json")}, CommonOptions(flags->common)}),
           .example = "gapscope inspect models/qube/experiment.yaml log.csv",
           .run = [flags] { return RunInspect(*flags); }};
 }

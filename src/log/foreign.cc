@@ -66,6 +66,7 @@ std::string Converter() {
 // Exit status; negative: it could not be started (an errno), or did not end by itself.
 int Run(const std::vector<std::string>& words, const std::string& out) {
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions;

@@ -21,6 +21,10 @@ double ValueOf(const std::vector<FieldSetting>& settings, const std::string& fie
   return set == settings.end() ? own : value_of(set->expressions.front());
 }
 
+std::string Term(const std::string& group, const std::string& place, const std::string& key) {
+  return fmt::format("{}/{}/{}", group, place, key);
+}
+
 }  // namespace
 
 std::string FidelityName(Fidelity fidelity) {
@@ -38,7 +42,7 @@ std::string FidelityName(Fidelity fidelity) {
 }
 
 void Structure::Enter(const std::string& group, const std::string& place, const std::string& key) {
-  if (entering) owners_[group + "/" + place + "/" + key].push_back(*entering);
+  if (entering) owners_[Term(group, place, key)].push_back(*entering);
 }
 
 // The worst of what becomes of an effect's terms is what becomes of it.
@@ -48,7 +52,7 @@ void Structure::Tell(const std::string& group, const std::string& place, const s
   for (const auto& [joint, motor] : motor_joint) {
     if (motor == place) entered = joint;
   }
-  for (const EffectUse& use : owners_[group + "/" + entered + "/" + key]) TellOf(use, fidelity, how);
+  for (const EffectUse& use : owners_[Term(group, entered, key)]) TellOf(use, fidelity, how);
 }
 
 void Structure::TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how) {

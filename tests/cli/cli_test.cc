@@ -341,6 +341,18 @@ TEST_F(CliTest, ApplyWritesAResultIntoTheMjcf) {
   EXPECT_EQ(json["changes"][0]["element"], "joint joint");
 }
 
+TEST_F(CliTest, InspectNeedsNoExperiment) {
+  const std::string log = JointLog();
+  const auto json = nlohmann::json::parse(Run("inspect '" + log + "' --json").out);
+  EXPECT_EQ(json["logs"][0]["log"], log);
+  std::vector<std::string> names;
+  for (const auto& channel : json["logs"][0]["channels"]) names.push_back(channel["name"]);
+  EXPECT_NE(std::find(names.begin(), names.end(), "target_rad"), names.end());
+  EXPECT_EQ(std::find(names.begin(), names.end(), "time_s"), names.end());
+  ExpectRefused("inspect " + Joint(), {"no log"});
+  ExpectRefused("inspect '" + scratch_.Path("gone.csv") + "'", {"gone.csv"});
+}
+
 TEST_F(CliTest, ExportTellsAndMeasuresWhatAnotherEngineLoses) {
   const std::string log = JointLog(), out = scratch_.Path("out"), to = scratch_.Path("mjx");
   ASSERT_EQ(

@@ -63,7 +63,7 @@ Result<InspectRun> InspectBound(const InspectFlags& flags, ThreadPool& pool) {
   return run;
 }
 
-Result<InspectRun> InspectUnbound(std::vector<std::string> logs) {
+Result<InspectRun> InspectUnbound(const std::vector<std::string>& logs) {
   InspectRun run;
   for (const std::string& log : logs) {
     GS_ASSIGN(InspectReport report, InspectAlone(log));
@@ -81,7 +81,7 @@ Result<int> RunInspect(const InspectFlags& flags) {
   const bool bound = IsExperiment(flags.model.experiment);
   if (bound && flags.model.logs.empty())
     return Error{.what = "no log", .where = flags.model.experiment, .cure = "name the logs behind the experiment"};
-  GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags, pool) : InspectUnbound(std::move(all)));
+  GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags, pool) : InspectUnbound(all));
   const nlohmann::ordered_json json = ToJson(run);
   if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteRun(flags.common.out, json));
   fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));

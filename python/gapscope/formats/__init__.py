@@ -6,13 +6,21 @@ import os
 from pathlib import Path
 
 from gapscope._errors import InputError
-from gapscope.formats import _arrow, _hdf5, _lerobot, _mat, _ros
-from gapscope.formats._table import Format, Source, Table
+from gapscope.formats import _arrow, _hdf5, _lerobot, _mat, _mcap, _pace, _ros
+from gapscope.formats._table import MOST_COLUMNS, Format, Source, Table, named_elements
 
 __all__ = ["FORMATS", "Format", "Source", "Table", "format_of", "read_tables"]
 
 # The first that knows a path reads it.
-FORMATS: tuple[Format, ...] = (_lerobot.FORMAT, _ros.FORMAT, _mat.FORMAT, _arrow.FORMAT, _hdf5.FORMAT)
+FORMATS: tuple[Format, ...] = (
+    _lerobot.FORMAT,
+    _mcap.FORMAT,
+    _ros.FORMAT,
+    _mat.FORMAT,
+    _arrow.FORMAT,
+    _hdf5.FORMAT,
+    _pace.FORMAT,
+)
 
 
 def format_of(path: str | os.PathLike[str]) -> Format | None:
@@ -22,7 +30,10 @@ def format_of(path: str | os.PathLike[str]) -> Format | None:
 
 
 def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tuple[Table, ...]:
-    """One table for each recording in a file or folder: of a LeRobot dataset its episodes, else one."""
+    """One table for each recording in a file or folder: of a LeRobot dataset its episodes, else one.
+
+    Raises InputError: nothing is there, no known format, its library is not installed, damaged, too large.
+    """
     text, episodes = _without_episodes(os.fspath(path))
     place, form = Path(text), format_of(path)
     if not place.exists():
@@ -31,7 +42,19 @@ def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tupl
         raise InputError("not a known format", text, place.suffix or "no suffix", ", ".join(f.name for f in FORMATS))
     if episodes is not None and form is not _lerobot.FORMAT:
         raise InputError("episodes of what has none", text, f"#{episodes}", "a LeRobot dataset")
-    return form.read(place, source if episodes is None else source.of_episodes(episodes))
+    try:
+        tables = form.read(place, source if episodes is None else source.of_episodes(episodes))
+    except InputError:
+        raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        raise InputError(f"not a readable {form.name}", text, reason, cure="record it again") from None
+    for table in tables:
+        if len(table.columns) > MOST_COLUMNS:
+            raise InputError("too many columns", text, str(len(table.columns)), f"at most {MOST_COLUMNS}")
+        if any(len(values) == 0 for values in table.columns.values()):
+            raise InputError("a log without rows", text, cure="was the recording stopped before anything was written?")
+    return tuple(named_elements(table, source.joints) for table in tables) if source.joints else tables
 
 
 def _without_episodes(text: str) -> tuple[str, str | None]:

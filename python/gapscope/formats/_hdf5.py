@@ -8,56 +8,65 @@ from typing import Any
 import numpy as np
 
 from gapscope._errors import InputError
-from gapscope.formats._table import Floats, Format, Source, Table, claims, find_time, library, of_arrays, spread
-from gapscope.formats._table import unreadable
+from gapscope.formats._table import MOST_ELEMENTS, Floats, Format, Source, Table, claims, find_time, library
+from gapscope.formats._table import of_arrays, spread
 
-_WHAT, _EXTRA = "HDF5 file", "hdf5"
+_EXTRA = "hdf5"
 
 
 def _knows(path: Path) -> bool:
     return path.suffix.lower() in (".h5", ".hdf5", ".hdf")
 
 
-def read_as(path: Path, source: Source, what: str, extra: str) -> tuple[Table, ...]:
+def _is_column(item: Any, matlab: bool) -> bool:
+    """Numbers in this very file: an external or virtual dataset would read others."""
+    if item.dtype.kind not in "buif" or item.ndim == 0 or item.external or item.is_virtual:
+        return False
+    if matlab:
+        return "MATLAB_int_decode" not in item.attrs or item.attrs.get("MATLAB_class") == b"logical"
+    return int(np.prod([float(n) for n in item.shape[1:]])) <= MOST_ELEMENTS
+
+
+def read_as(path: Path, source: Source, what: str, extra: str, matlab: bool = False) -> tuple[Table, ...]:
+    """Numeric datasets; those of MATLAB are transposed."""
     h5py = library("h5py", what + "s", extra)
     arrays: dict[str, Floats] = {}
+    units: dict[str, str] = {}
     skipped: list[str] = []
-    matlab = what != _WHAT
 
     def take(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset) or name.startswith("#refs#"):
-            return None
-        if item.dtype.kind not in "buif" or item.ndim == 0 or (matlab and "MATLAB_int_decode" in item.attrs):
+        if not isinstance(item, h5py.Dataset) or name.startswith("#"):
+            return
+        if not _is_column(item, matlab):
             skipped.append(name)
-            return None
-        claims(path, name, item.shape)
+            return
+        held = sum(len(values) for values in arrays.values())
+        claims(path, name, (held + int(np.prod([float(n) for n in item.shape])),))
         values = np.asarray(item[()], dtype=np.float64)
-        if matlab:
-            values = np.squeeze(values.T)
-        arrays.update(spread(name, np.atleast_1d(values)))
-        return None
+        columns = spread(name, np.atleast_1d(np.squeeze(values.T) if matlab else values))
+        arrays.update(columns)
+        unit = item.attrs.get("unit", item.attrs.get("units"))
+        if isinstance(unit, str):
+            units.update({column: unit for column in columns})
 
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            group = file
-            if source.variable:
-                if source.variable not in file:
-                    raise InputError("no such group", str(path), repr(source.variable), ", ".join(file))
-                group = file[source.variable]
+    with h5py.File(path, "r", locking=False) as file:
+        group = file
+        if source.variable:
+            # Of the group itself only: a link into another file is not followed.
+            if not isinstance(file.get(source.variable, getlink=True), h5py.HardLink):
+                raise InputError("no such group", str(path), repr(source.variable), ", ".join(file))
+            group = file[source.variable]
+        if isinstance(group, h5py.Dataset):
+            take(source.variable, group)
+        else:
             group.visititems(take)
-    except InputError:
-        raise
-    except Exception as error:
-        raise unreadable(path, what, error) from None
     if not arrays:
         raise InputError(f"a {what} without numbers in arrays", str(path), ", ".join(skipped) or "nothing", "datasets")
-    time = find_time(path, arrays, source.time)
-    findings = [f"left out, being no array of numbers: {', '.join(skipped[:20])}"] if skipped else []
-    return (of_arrays(path, arrays, time, findings=findings),)
+    return (of_arrays(path, arrays, find_time(path, arrays, source.time), skipped, units=units),)
 
 
 def _read(path: Path, source: Source) -> tuple[Table, ...]:
-    return read_as(path, source, _WHAT, _EXTRA)
+    return read_as(path, source, FORMAT.name, _EXTRA)
 
 
-FORMAT = Format("HDF5", _EXTRA, _knows, _read)
+FORMAT = Format("HDF5 file", _EXTRA, _knows, _read)

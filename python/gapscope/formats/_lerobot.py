@@ -7,7 +7,9 @@ recorder's. Units are the dataset's own (degrees, or -100 .. 100 of the calibrat
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import math
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +27,10 @@ def _knows(path: Path) -> bool:
     return path.is_dir() and (path / "meta" / "info.json").is_file()
 
 
-def _labels(info: dict[str, Any]) -> dict[str, Sequence[str]]:
+def _labels(info: Any) -> dict[str, Sequence[str]]:
     found: dict[str, Sequence[str]] = {}
-    for name, feature in info.get("features", {}).items():
-        names = feature.get("names") if isinstance(feature, dict) else None
+    for name, feature in info["features"].items():
+        names = feature.get("names")
         if isinstance(names, dict):  # {"motors": [...]} in v2
             names = next((value for value in names.values() if isinstance(value, list)), None)
         if isinstance(names, list):
@@ -36,41 +38,49 @@ def _labels(info: dict[str, Any]) -> dict[str, Sequence[str]]:
     return found
 
 
-def _asked(path: Path, episodes: str) -> tuple[int, int | None]:
+def _asked(path: Path, episodes: str) -> tuple[int, float]:
+    """The first episode that is asked for, and the first behind them."""
     if not episodes:
-        return 0, None
+        return 0, math.inf
     first, colon, last = episodes.partition(":")
     low = int(first or 0)
-    high = (int(last) if last else None) if colon else low + 1
-    if high is not None and high <= low:
+    high = (int(last) if last else math.inf) if colon else low + 1
+    if high <= low:
         raise InputError("no episode between these", str(path), f"#{episodes}", "#3, #0:20")
     return low, high
 
 
-def _read(path: Path, source: Source) -> tuple[Table, ...]:
-    try:
-        info = json.loads((path / "meta" / "info.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError("a dataset whose meta/info.json is not JSON", str(path), str(error)[:200]) from None
-    low, high = _asked(path, source.episodes)
-    labels, tables = _labels(info if isinstance(info, dict) else {}), []
+def _files(path: Path, low: int, high: float) -> Iterator[Path]:
+    """Data files; of v2.1, which has one an episode, those that are asked for."""
     for file in sorted((path / "data").glob("**/*.parquet")):
-        table = _arrow.load(file)
-        if "episode_index" not in table.column_names or "timestamp" not in table.column_names:
-            there = ", ".join(table.column_names)
-            raise InputError("a data file without episode_index and timestamp", str(file), there)
+        own = re.fullmatch(r"episode_(\d+)", file.stem)
+        if own is None or low <= int(own[1]) < high:
+            yield file
+
+
+def _read(path: Path, source: Source) -> tuple[Table, ...]:
+    labels = _labels(json.loads((path / "meta" / "info.json").read_text(encoding="utf-8")))
+    low, high = _asked(path, source.episodes)
+    tables: dict[int, Table] = {}
+    for file in _files(path, low, high):
+        table, _ = _arrow.load(file)
         arrays = _arrow.columns_of(file, table, labels)
-        for episode in np.unique(arrays["episode_index"]).astype(int):
-            if episode < low or (high is not None and episode >= high):
+        if "episode_index" not in arrays or "timestamp" not in arrays:
+            there = ", ".join(arrays)
+            raise InputError("a data file without episode_index and timestamp", str(file), there)
+        for episode in np.unique(arrays["episode_index"]).astype(int).tolist():
+            if not low <= episode < high:
                 continue
+            if episode in tables:
+                raise InputError("an episode in two files", str(file), f"#{episode}", "each in one")
             rows = arrays["episode_index"] == episode
             columns = {name: values[rows] for name, values in arrays.items() if name not in _BOOKKEEPING}
             clock = {name: "synthetic" for name in columns}
-            name = f"{path.name}#{episode}"
-            tables.append((episode, Table(columns, "timestamp", name=name, findings=(_STAMPS,), clock=clock)))
+            name = f"{path.resolve().name}#{episode}"
+            tables[episode] = Table(columns, "timestamp", name=name, findings=(_STAMPS,), clock=clock)
     if not tables:
         raise InputError("no such episode", str(path), f"#{source.episodes}" if source.episodes else "no data files")
-    return tuple(table for _, table in sorted(tables, key=lambda entry: entry[0]))
+    return tuple(tables[episode] for episode in sorted(tables))
 
 
-FORMAT = Format("LeRobot", _arrow.FORMAT.extra, _knows, _read)
+FORMAT = Format("LeRobot dataset", _arrow.FORMAT.extra, _knows, _read)

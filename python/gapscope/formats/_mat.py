@@ -14,9 +14,8 @@ import numpy as np
 from gapscope._errors import InputError
 from gapscope.formats import _hdf5
 from gapscope.formats._table import Floats, Format, Source, Table, claims, find_time, library, of_arrays, spread
-from gapscope.formats._table import unreadable
 
-_WHAT, _EXTRA = "MAT file", "mat"
+_EXTRA = "mat"
 
 
 def _knows(path: Path) -> bool:
@@ -27,17 +26,11 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
     with path.open("rb") as file:
         head = file.read(128)
     if b"MATLAB 7.3" in head or head.startswith(b"\x89HDF"):
-        return _hdf5.read_as(path, source, _WHAT, _EXTRA)
+        return _hdf5.read_as(path, source, FORMAT.name, _EXTRA, matlab=True)
     io = library("scipy.io", "MAT files", _EXTRA)
-    try:
-        for name, shape, kind in io.whosmat(path):
-            if kind not in ("char", "cell", "struct", "object", "opaque", "function"):
-                claims(path, name, shape)
-        whole = io.loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
-    except InputError:
-        raise
-    except Exception as error:
-        raise unreadable(path, _WHAT, error) from None
+    for name, shape, _ in io.whosmat(path):
+        claims(path, name, shape)
+    whole = io.loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
     variables = {name: value for name, value in whole.items() if not name.startswith("__")}
     if source.variable:
         if source.variable not in variables:
@@ -58,9 +51,7 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
             "arrays, structures with time",
             "of a timeseries ts save struct(ts)",
         )
-    time = find_time(path, arrays, source.time)
-    findings = [f"left out, being no array of numbers: {', '.join(skipped)}"] if skipped else []
-    return (of_arrays(path, arrays, time, findings=findings),)
+    return (of_arrays(path, arrays, find_time(path, arrays, source.time), skipped),)
 
 
 def _columns(name: str, value: Any, alone: bool = False) -> dict[str, Floats]:
@@ -91,4 +82,4 @@ def _of_struct(name: str, value: Any, alone: bool) -> dict[str, Floats]:
     return columns
 
 
-FORMAT = Format("MAT", _EXTRA, _knows, _read)
+FORMAT = Format("MAT file", _EXTRA, _knows, _read)

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
-from gapscope._log import Log
+from gapscope._log import Log, read
 from gapscope._program import Finished, ProgressCallback, run
 from gapscope.formats import format_of
 from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video, from_json
@@ -37,6 +37,7 @@ class _Job:
     keep: tempfile.TemporaryDirectory[str] | None
     arguments: list[str]
     names: dict[str, str]  # of logs from memory, by the files that the program is given
+    experiment: Experiment
 
     def json(self, text: str) -> dict[str, Any]:
         for path, name in self.names.items():
@@ -58,7 +59,7 @@ def _job(command: str, exp: Source, out: Folder) -> _Job:
     folder = Path(out) if out is not None else Path(keep.name)  # type: ignore[union-attr]
     folder.mkdir(parents=True, exist_ok=True)
     experiment = exp if isinstance(exp, Experiment) else Experiment(exp)
-    return _Job(folder, keep, [command, str(experiment.file(folder))], {})
+    return _Job(folder, keep, [command, str(experiment.file(folder))], {}, experiment)
 
 
 def _list(logs: Logs) -> list[OneLog]:
@@ -73,7 +74,7 @@ def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
             files.append(os.fspath(log))
             continue
         if not isinstance(log, Log):
-            log = Log(log)
+            log = read(log, job.experiment)
         if log.path is not None:
             files.append(str(log.path))
         else:

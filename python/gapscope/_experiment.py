@@ -60,5 +60,31 @@ class Experiment:
             ) from failure
         return target
 
+    def log_source(self) -> dict[str, Any]:
+        """What ``log: {source: {...}}`` says, as it stands; empty where it says nothing.
+
+        Of a file: needs a YAML library where the file has a ``source`` (ruamel.yaml, which rosbags brings).
+        """
+        keys: Any = self._keys
+        if self.path is not None:
+            text = self.path.read_text(encoding="utf-8")
+            if "source:" not in text:
+                return {}
+            try:
+                from ruamel.yaml import YAML
+            except ImportError:
+                raise InputError(
+                    "no library that reads the experiment's 'source'", str(self.path), cure="pip install ruamel.yaml"
+                ) from None
+            try:
+                keys = YAML(typ="safe", pure=True).load(text)
+            except Exception as error:
+                raise InputError("not a readable experiment file", str(self.path), str(error)[:200]) from None
+        log = keys.get("log") if isinstance(keys, Mapping) else None
+        source = log.get("source") if isinstance(log, Mapping) else None
+        if source is not None and not isinstance(source, Mapping):
+            raise InputError("'source' is no mapping", repr(self), repr(source)[:80], "log: {source: {topics: [...]}}")
+        return dict(source or {})
+
     def __repr__(self) -> str:
         return f"Experiment({str(self.path) if self.path else self._keys['model']!r})"

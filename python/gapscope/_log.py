@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gapscope._errors import InputError
-from gapscope.formats import Source, Table, format_of, read_tables
+from gapscope._experiment import Experiment
+from gapscope.formats import Source, Table, format_of, read_table, read_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +27,7 @@ class Log:
     """A hardware log.
 
     ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), or one of another tool's
-    format (docs/formats.md: MAT, HDF5, Parquet, ROS bags, LeRobot), a pandas DataFrame, a structured array, or a
+    format (docs/formats.md: MAT, HDF5, Parquet, ROS bags, MCAP, LeRobot), a pandas DataFrame, a structured array, or a
     mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ... ``NAME[n - 1]``. Values are
     in the units that the experiment file states; NaN is a missing value.
 
@@ -60,15 +61,14 @@ class Log:
         self.time = time
         self._table: dict[str, Floats] = {}
         self._header = dict(header or {})
+        self._units: dict[str, str] = {}
+        self._joined = False
         self.findings: tuple[str, ...] = ()
         self.clock: dict[str, str] = {}
         if isinstance(data, (str, os.PathLike)) and format_of(data) is not None:
             if time_unit is not None or header:
                 raise InputError("a file says itself what its header is", os.fspath(data), cure="leave them out")
-            tables = read_tables(data, Source(time=time or ""))
-            if len(tables) != 1:
-                raise InputError("several recordings", os.fspath(data), str(len(tables)), "one", f"{data}#0")
-            self._take_table(tables[0])
+            self._take_table(read_table(data, Source(time=time or "")))
             return
         if isinstance(data, (str, os.PathLike)):
             if time is not None or time_unit is not None or header:
@@ -84,8 +84,9 @@ class Log:
             return
         if time_unit not in (None, "s", "ms", "us", "ns"):
             raise InputError("not a unit of time", "time_unit", repr(time_unit), "s, ms, us, ns")
-        self._unit = time_unit or ""
         self._take(data)
+        if time_unit and self.time is not None:
+            self._units[self.time] = time_unit
         self._check()
 
     @property
@@ -112,8 +113,13 @@ class Log:
             raise InputError("the log is a file already", str(self.path), cure="copy it")
         names = list(self._table)
         meta: dict[str, Any] = {"schema": SCHEMA, "names": names}
-        meta["units"] = [self._unit if name == self.time else "" for name in names]
+        meta["units"] = [self._units.get(name, "") for name in names]
         meta["header"] = self._header
+        meta["findings"] = [{"kind": "converted", "column": "", "count": 1, "text": text} for text in self.findings]
+        if self.clock:
+            meta["clock"] = [self.clock.get(name, "") for name in names]
+        if self._joined:
+            meta["missing"] = "keep"
         if self.time is not None:
             meta["time"] = self.time
         text = np.frombuffer(json.dumps(meta, allow_nan=False).encode(), dtype=np.uint8)
@@ -148,14 +154,14 @@ class Log:
     def of_table(cls, table: Table) -> Log:
         """A log of what a reader gave."""
         log = cls.__new__(cls)
-        log.path, log.name, log._header = None, "", {}
+        log.path, log.name = None, ""
         log._take_table(table)
         return log
 
     def _take_table(self, table: Table) -> None:
-        self._table, self.time, self._unit = dict(table.columns), table.time, ""
+        self._table, self.time, self._joined = dict(table.columns), table.time, table.joined
         self.name = self.name or table.name
-        self._header = dict(table.header)
+        self._header, self._units = dict(table.header), dict(table.units)
         self.findings, self.clock = table.findings, dict(table.clock)
 
     # How data in memory becomes the table.
@@ -268,7 +274,7 @@ class Log:
             )
         if np.isnat(stamps).any():
             raise self._missing_stamp(name, int(np.flatnonzero(np.isnat(stamps))[0]), "NaT")
-        self._unit = "s"
+        self._units[name] = "s"
         steps = (stamps - stamps[0]).astype("timedelta64[ns]") if len(stamps) else stamps.astype("timedelta64[ns]")
         return np.asarray(steps.astype(np.int64) * 1e-9, dtype=np.float64)
 
@@ -330,23 +336,37 @@ def _is_frame(data: Any) -> bool:
 
 
 def read(
-    path: str | os.PathLike[str], *, topics: Iterable[str] = (), variable: str = "", time: str = ""
+    path: str | os.PathLike[str],
+    exp: Experiment | str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    **source: str | Sequence[str],
 ) -> Log:
-    """A log in a file of any format that is known (docs/formats.md).
+    """A log in a file of any format that is known (docs/formats.md). Of a dataset of several episodes: "dataset#3".
 
-    ``topics`` of a bag, else all; ``variable``: of a MAT file, or a group of an HDF5 file; ``time`` names the column of
-    stamps where its name does not say it. Of a dataset of several episodes: "dataset#3".
+    ``exp`` is an experiment whose ``log: {source: {...}}`` says what to take of the file. ``source`` are the same keys,
+    before those of the experiment: ``topics`` of a bag, else all; ``msgs``, a folder of .msg files; ``variable`` of a
+    MAT file, or a group of an HDF5 file; ``time``, the column of stamps where its name does not say it; ``joints``,
+    names of the elements of arrays.
+
+    Raises InputError: nothing is there, not a known format, its library is not installed, damaged, too large, several
+    recordings.
     """
-    logs = read_all(path, topics=topics, variable=variable, time=time)
-    if len(logs) != 1:
-        raise InputError("several recordings", os.fspath(path), str(len(logs)), "one", f"{path}#0, or gs.read_all")
-    return logs[0]
+    if format_of(path) is None:
+        return Log(path)
+    return Log.of_table(read_table(path, _asked(path, exp, source)))
 
 
 def read_all(
-    path: str | os.PathLike[str], *, topics: Iterable[str] = (), variable: str = "", time: str = ""
+    path: str | os.PathLike[str],
+    exp: Experiment | str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    **source: str | Sequence[str],
 ) -> tuple[Log, ...]:
     """Every recording of a file or folder, as `read`: of a LeRobot dataset its episodes ("dataset#0:20": some)."""
     if format_of(path) is None:
         return (Log(path),)
-    return tuple(Log.of_table(table) for table in read_tables(path, Source(tuple(topics), variable, time)))
+    return tuple(Log.of_table(table) for table in read_tables(path, _asked(path, exp, source)))
+
+
+def _asked(path: str | os.PathLike[str], exp: Any, source: Mapping[str, Any]) -> Source:
+    if exp is not None:
+        source = {**(exp if isinstance(exp, Experiment) else Experiment(exp)).log_source(), **source}
+    return Source.of(source, os.fspath(path))

@@ -32,13 +32,21 @@ Command WithPlugins(Command command) {
 }  // namespace
 
 std::vector<Command> AllCommands() {
-  return {WithPlugins(InitCommand()),     InspectCommand(),
-          WithPlugins(ReplayCommand()),   WithPlugins(TuneCommand()),
-          WithPlugins(DiagnoseCommand()), WithPlugins(ExplainCommand()),
-          WithPlugins(ApplyCommand()),    WithPlugins(ExportCommand()),
-          WithPlugins(IdentifyCommand()), WithPlugins(DesignCommand()),
-          WithPlugins(RenderCommand()),   WithPlugins(PlanCommand()),
-          WithPlugins(RunCommand()),      MergeCommand()};
+  return {WithPlugins(InitCommand()),
+          InspectCommand(),
+          ConvertCommand(),
+          WithPlugins(ReplayCommand()),
+          WithPlugins(TuneCommand()),
+          WithPlugins(DiagnoseCommand()),
+          WithPlugins(ExplainCommand()),
+          WithPlugins(ApplyCommand()),
+          WithPlugins(ExportCommand()),
+          WithPlugins(IdentifyCommand()),
+          WithPlugins(DesignCommand()),
+          WithPlugins(RenderCommand()),
+          WithPlugins(PlanCommand()),
+          WithPlugins(RunCommand()),
+          MergeCommand()};
 }
 
 }  // namespace gapscope::cli

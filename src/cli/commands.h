@@ -22,6 +22,7 @@ struct Command {
 
 Command InitCommand();
 Command InspectCommand();
+Command ConvertCommand();
 Command ReplayCommand();
 Command TuneCommand();
 Command DiagnoseCommand();

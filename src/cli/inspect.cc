@@ -1,5 +1,7 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
+#include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
@@ -34,6 +36,26 @@ InspectReport InspectRecording(const Recording& recording, const Experiment& exp
   return Inspect(recording.timeline, channels, recording.findings, recording.rows_in_log);
 }
 
+// Which columns have which rate, by which stamps: a line for each.
+std::vector<Finding> Rates(const Log& log, const Timeline& timeline) {
+  std::map<std::string, std::vector<std::string>> columns;
+  for (const Column& column : log.columns) {
+    if (column.name == timeline.time_column) continue;
+    std::vector<double> stamps;
+    for (std::size_t k = 0; k < timeline.rows.size(); ++k) {
+      if (std::isfinite(column.values[timeline.rows[k]])) stamps.push_back(timeline.time_s[k]);
+    }
+    const double span = stamps.empty() ? 0 : stamps.back() - stamps.front();
+    const std::string rate =
+        span > 0 ? fmt::format("{:.4g} Hz", static_cast<double>(stamps.size() - 1) / span) : "no rate";
+    columns[rate + (column.clock.empty() ? "" : ", " + column.clock + " stamps")].push_back(column.name);
+  }
+  std::vector<Finding> findings;
+  for (const auto& [rate, names] : columns)
+    findings.push_back({"rate", "", names.size(), 0, fmt::format("{}: {}", rate, fmt::join(names, ", "))});
+  return findings;
+}
+
 // A log that no experiment says anything of: all of its columns, in the log's own units.
 Result<InspectReport> InspectAlone(const std::string& path) {
   GS_ASSIGN(const Log log, ReadLog(path, {}));
@@ -47,7 +69,10 @@ Result<InspectReport> InspectAlone(const std::string& path) {
   }
   std::vector<Finding> findings = log.findings;
   findings.insert(findings.end(), timeline.findings.begin(), timeline.findings.end());
-  InspectReport report = Inspect(timeline, channels, findings, log.rows());
+  for (Finding& rate : Rates(log, timeline)) findings.push_back(std::move(rate));
+  InspectOptions options;
+  if (log.joined) options.most_missing = 1;  // where another rate has a row
+  InspectReport report = Inspect(timeline, channels, findings, log.rows(), options);
   report.verdict = {"an experiment file says which columns are commands: `gapscope init MODEL.xml LOG` drafts one"};
   return report;
 }

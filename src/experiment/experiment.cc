@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
 #include <stdexcept>
@@ -28,6 +29,20 @@ std::string ReadScaling(YamlMap& map, const YAML::Node& node, double* factor, do
   return parsed.ok() ? parsed.value().si : "1";
 }
 
+// Its keys are for the reader of a foreign format, which checks them; all of their values are texts.
+nlohmann::json TextsOf(const YAML::Node& node) {
+  if (node.IsScalar()) return node.Scalar();
+  nlohmann::json json = node.IsMap() ? nlohmann::json::object() : nlohmann::json::array();
+  for (const auto& item : node) {
+    if (node.IsMap()) {
+      json[item.first.IsScalar() ? item.first.Scalar() : ""] = TextsOf(item.second);
+    } else {
+      json.push_back(TextsOf(item));
+    }
+  }
+  return json;
+}
+
 Status ReadLogSection(const YAML::Node& node, const std::string& path, Experiment* experiment) {
   if (!node.IsDefined()) return Ok();
   YamlMap map(node, path, "'log'");
@@ -51,6 +66,11 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
     }
     GS_RETURN_IF_ERROR(companion.Finish());
   }
+  if (const YAML::Node source = map.Child("source"); source.IsDefined()) {
+    if (!source.IsMap())
+      map.Fail(source, {.what = "'source' is no mapping", .cure = "source: {topics: [/joint_states]}"});
+    experiment->read.source = TextsOf(source).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  }
   if (const YAML::Node repair = map.Child("repair"); repair.IsDefined()) {
     YamlMap policy(repair, path, "'repair'");
     constexpr TimeRepair kTime[] = {TimeRepair::kDropRows, TimeRepair::kError};
@@ -59,6 +79,7 @@ Status ReadLogSection(const YAML::Node& node, const std::string& path, Experimen
     experiment->timeline.repeated = kTime[policy.Choice("repeated", {"drop_rows", "error"}, 0)];
     experiment->timeline.reversed = kTime[policy.Choice("reversed", {"drop_rows", "error"}, 0)];
     experiment->timeline.missing = kMissing[policy.Choice("missing", {"hold", "keep", "drop_rows", "error"}, 0)];
+    experiment->timeline.missing_stated = policy.Has("missing");
     experiment->timeline.gap_factor = policy.Number("gap_factor", experiment->timeline.gap_factor);
     if (!(experiment->timeline.gap_factor > 1))
       policy.Fail(repair, {.what = "'gap_factor' is in median steps", .allowed = "> 1"});

@@ -153,6 +153,12 @@ Result<Recording> LoadRecording(const Experiment& experiment, const std::string&
 }
 
 Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
+  if (log.joined && !experiment.timeline.missing_stated) {
+    Experiment keeping = experiment;
+    keeping.timeline.missing = MissingRepair::kKeep;
+    keeping.timeline.missing_stated = true;
+    return BindLog(keeping, log);
+  }
   const std::string& log_path = log.path;
   TimelineOptions timeline_options = experiment.timeline;
   for (const auto& spec : experiment.commands) {

@@ -24,8 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const ForeignFormat kMat{"MAT", "mat"}, kHdf5{"HDF5", "hdf5"}, kArrow{"Parquet or Feather", "parquet"},
-    kRos{"ROS bag", "ros"}, kLerobot{"LeRobot", "parquet"};
+const ForeignFormat kMat{"MAT file", "'gapscope[mat]'"}, kHdf5{"HDF5 file", "gapscope[hdf5]"},
+    kArrow{"Parquet or Feather file", "'gapscope[parquet]'"}, kRos{"ROS bag", "'gapscope[ros]'"},
+    kMcap{"MCAP file", "'gapscope[ros,mcap]'"}, kLerobot{"LeRobot dataset", "'gapscope[parquet]'"},
+    kPace{"PACE recording", "gapscope torch"};
 
 constexpr int kRefused = 2;  // the converter's status for what it refuses, then five lines on stdout
 
@@ -111,32 +113,36 @@ const ForeignFormat* ForeignFormatOf(const std::string& path) {
   if (is(".mat")) return &kMat;
   if (is(".h5", ".hdf5", ".hdf")) return &kHdf5;
   if (is(".parquet", ".pq", ".feather", ".arrow")) return &kArrow;
-  return is(".bag", ".mcap", ".db3") ? &kRos : nullptr;
+  if (is(".mcap")) return &kMcap;
+  if (is(".pt", ".pth")) return &kPace;
+  return is(".bag", ".db3") ? &kRos : nullptr;
 }
 
-Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format) {
+Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, const std::string& source) {
   const ScratchFolder scratch;
   if (!scratch.made())
     return Error{
         .what = "no room to convert the log", .where = path, .actual = std::strerror(errno), .cure = "$TMPDIR"};
   const std::string table = scratch.Path("table.npz"), said = scratch.Path("said"), converter = Converter();
-  const int status = Run({converter, path, "--out", table}, said);
+  std::vector<std::string> words = {converter, "--out", table};
+  if (!source.empty()) words.insert(words.end(), {"--options", source});
+  words.insert(words.end(), {"--", path});
+  const int status = Run(words, said);
   if (status == -ENOENT || status == -EACCES || status == 127) {
     return Error{.what = "the log is a " + format.name + ", which the Python package reads",
                  .where = path,
                  .actual = "no program " + converter,
-                 .cure = "pip install 'gapscope[" + format.extra + "]'"};
+                 .cure = "pip install " + format.install};
   }
-  GS_ASSIGN(const std::string words, ReadFile(said));
-  if (status == kRefused) return RefusedBy(words, path);
+  if (status == kRefused) {
+    GS_ASSIGN(const std::string refusal, ReadFile(said));
+    return RefusedBy(refusal, path);
+  }
   if (status != 0)
     return Error{.what = "the converter failed", .where = path, .actual = fmt::format("{}: {}", converter, status)};
   GS_ASSIGN(const std::string bytes, ReadFile(table));
   GS_ASSIGN(Log log, ReadNpz(path, bytes));
   log.format = format.name;
-  std::istringstream findings(words);
-  for (std::string text; std::getline(findings, text);)
-    log.findings.push_back({.kind = "converted", .column = "", .count = 1, .first_row = 0, .text = text});
   return log;
 }
 

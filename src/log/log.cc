@@ -133,7 +133,7 @@ std::string Log::WhereHeader() const { return header_line == 0 ? path : At(path,
 
 Result<Log> ReadLog(const std::string& given, const ReadOptions& options) {
   const ForeignFormat* foreign = options.format ? nullptr : ForeignFormatOf(given);
-  if (foreign) return ReadForeign(given, *foreign);
+  if (foreign) return ReadForeign(given, *foreign, options.source);
   const std::string path = StateFileOf(given);
   GS_ASSIGN(Log log, ReadOne(path, options.format));
   if (options.companions.empty() && log.format == std::string_view("csv_lists")) GS_RETURN_IF_ERROR(JoinControl(&log));

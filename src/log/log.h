@@ -19,6 +19,7 @@ struct Column {
   std::string name;  // as in the file, blanks trimmed
   std::string unit;  // as the file states it ("V" of "voltage [V]"), empty when it does not
   std::vector<double> values;
+  std::string clock = {};  // what its stamps are: "header", "receive", "sampled", "synthetic"; empty: not known
 };
 
 // Something that was noticed or repaired while reading: never silent, always counted.
@@ -44,6 +45,7 @@ struct Log {
   std::map<std::string, std::string> header_text;  // texts of the header, by name
   std::string rig;                                 // what the header says it was recorded on; empty: nothing
   std::string time_column;                         // that the file itself names as the time; empty: it does not
+  bool joined = false;                             // of several rates: NaN where a rate has no row
   std::vector<Finding> findings;
   std::vector<LineAnchor> lines;  // ascending in row; empty: a format without lines
   std::size_t header_line = 1;    // where the columns' names are; 0: a format without lines
@@ -76,6 +78,7 @@ struct Companion {
 struct ReadOptions {
   const LogReader* format = nullptr;  // of LogReaders(); null: the first that matches
   std::vector<Companion> companions = {};
+  std::string source = {};  // what to take of a file of another tool (foreign.h), a JSON object; empty: all
 };
 
 // Reads a log. Errors name file and line (and column): absent, empty, binary, UTF-16, no header, wrong number of

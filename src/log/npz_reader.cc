@@ -92,7 +92,7 @@ void AddColumn(std::string name, std::string unit, std::vector<double> values, L
   infinite.text = fmt::format("'inf' in {} of {} rows (first: row {}); taken as missing", infinite.count, values.size(),
                               infinite.first_row + 1);
   for (Finding* finding : {&missing, &infinite}) {
-    if (finding->count > 0) log->findings.push_back(std::move(*finding));
+    if (finding->count > 0 && !(log->joined && finding == &missing)) log->findings.push_back(std::move(*finding));
   }
   log->columns.push_back({std::move(name), std::move(unit), std::move(values)});
 }
@@ -210,8 +210,13 @@ class OwnSchema {
     const Json names = json.value("names", Json()), units = json.value("units", Json::array());
     if (!IsTexts(names) || names.empty() || names.size() > kMostNpzColumns)
       return Broken("'names' is no list of names");
-    if (!IsTexts(units) || (!units.empty() && units.size() != names.size()))
-      return Broken("'units' is no list of as many units as names");
+    const Json clocks = json.value("clock", Json::array()), missing = json.value("missing", Json(""));
+    for (const auto& [list, what] : {std::pair(&units, "units"), std::pair(&clocks, "clock")}) {
+      if (!IsTexts(*list) || (!list->empty() && list->size() != names.size()))
+        return Broken(fmt::format("'{}' is no list of as many texts as there are names", what));
+    }
+    if (missing != "" && missing != "keep") return Broken("'missing' is not \"keep\"");
+    log_->joined = missing == "keep";
     for (std::size_t c = 0; c < names.size(); ++c) {
       const NpyArray* array = archive_.Find(fmt::format("c{}", c));
       const auto name = names[c].get<std::string>();
@@ -219,6 +224,7 @@ class OwnSchema {
       if (array->is_text() || array->shape.size() != 1 || (c > 0 && array->rows() != log_->rows()))
         return Broken(fmt::format("'c{}' ({}) is no column of {} rows", c, Quoted(name), log_->rows()));
       AddColumn(name, units.empty() ? "" : units[c].get<std::string>(), array->Column(0), log_);
+      if (!clocks.empty()) log_->columns.back().clock = clocks[c].get<std::string>();
     }
     if (log_->rows() == 0) return Broken("no rows");
     const Json time = json.value("time", Json(""));
@@ -236,12 +242,13 @@ class OwnSchema {
   }
 
   Error Broken(std::string actual) const {
-    return Error{
-        .what = "a table that is not as gapscope.log/1 says",
-        .where = ArrayAt(path_, "meta"),
-        .actual = std::move(actual),
-        .allowed = "meta (JSON: schema, names, units, time, header, findings) and columns c0, c1 ... of one length",
-        .cure = "write it with the gapscope package of this version, or save plain arrays: np.savez"};
+    return Error{.what = "a table that is not as gapscope.log/1 says",
+                 .where = ArrayAt(path_, "meta"),
+                 .actual = std::move(actual),
+                 .allowed =
+                     "meta (JSON: schema, names, units, clock, time, missing, header, findings), columns c0, c1 ... of "
+                     "one length",
+                 .cure = "write it with the gapscope package of this version, or save plain arrays: np.savez"};
   }
 
   bool ReadHeader(const Json& header) {
@@ -263,7 +270,7 @@ class OwnSchema {
     for (const Json& item : findings) {
       if (!item.is_object()) return false;
       const Json kind = item.value("kind", Json()), column = item.value("column", Json("")),
-                 text = item.value("text", Json("")), count = item.value("count", Json(1));
+                 text = item.value("text", Json("")), count = item.value("count", Json(1U));
       if (!kind.is_string() || !column.is_string() || !text.is_string() || !count.is_number_unsigned()) return false;
       log_->findings.push_back(
           {kind.get<std::string>(), column.get<std::string>(), count.get<std::size_t>(), 0, text.get<std::string>()});

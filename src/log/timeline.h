@@ -27,6 +27,7 @@ struct TimelineOptions {
   TimeRepair reversed = TimeRepair::kDropRows;
   // For rows without a stamp kHold and kKeep mean kDropRows: a time cannot be held.
   MissingRepair missing = MissingRepair::kHold;
+  bool missing_stated = false;  // by the experiment; else a log of several rates (Log::joined) takes kKeep
   std::vector<std::string> required =
       {};                 // with missing = kDropRows: rows with NaN in any of these columns are dropped
   double gap_factor = 5;  // a step longer than this many median steps is reported as a gap

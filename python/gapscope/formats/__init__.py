@@ -9,7 +9,7 @@ from gapscope._errors import InputError
 from gapscope.formats import _arrow, _hdf5, _lerobot, _mat, _mcap, _pace, _ros
 from gapscope.formats._table import MOST_COLUMNS, Format, Source, Table, named_elements
 
-__all__ = ["FORMATS", "Format", "Source", "Table", "format_of", "read_tables"]
+__all__ = ["FORMATS", "Format", "Source", "Table", "format_of", "read_table", "read_tables"]
 
 # The first that knows a path reads it.
 FORMATS: tuple[Format, ...] = (
@@ -55,6 +55,14 @@ def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tupl
         if any(len(values) == 0 for values in table.columns.values()):
             raise InputError("a log without rows", text, cure="was the recording stopped before anything was written?")
     return tuple(named_elements(table, source.joints) for table in tables) if source.joints else tables
+
+
+def read_table(path: str | os.PathLike[str], source: Source = Source()) -> Table:
+    """As `read_tables`, where there is one recording. Raises InputError: there are several."""
+    tables = read_tables(path, source)
+    if len(tables) != 1:
+        raise InputError("several recordings", os.fspath(path), str(len(tables)), "one", f"{path}#0, or gs.read_all")
+    return tables[0]
 
 
 def _without_episodes(text: str) -> tuple[str, str | None]:

@@ -1,34 +1,53 @@
-"""The converter that the program starts: gapscope-convert FILE --out TABLE.npz.
+"""The converter that the program starts: gapscope-convert FILE --out TABLE.npz --options JSON.
 
-Findings go to stdout, a line each. What is refused: status 2, and five lines: what, where, actual, allowed, cure.
+What is refused: status 2, and five lines on stdout: what, where, actual, allowed, cure.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import resource
 import sys
 
 from gapscope._errors import InputError
-from gapscope._log import read
+from gapscope._log import Log
+from gapscope.formats import Source, read_table
+
+_MOST_BYTES = 16 << 30  # of memory, and never more than the machine has: a small file can claim or unpack to more
+
+
+def _limit_memory() -> None:
+    most = min(_MOST_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    for limit in (soft, hard):
+        most = most if limit == resource.RLIM_INFINITY else min(most, limit)
+    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+
+
+def _options(text: str) -> object:
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InputError("options that are not JSON", "--options", str(error), '{"topics": [...]}') from None
 
 
 def main() -> int:
+    """The status: 0, or 2 where the file is refused."""
     parser = argparse.ArgumentParser(prog="gapscope-convert", description="A log of another tool as one NPZ table.")
-    parser.add_argument("file", help="MAT, HDF5, Parquet, Feather, ROS bag, LeRobot dataset#EPISODE")
+    parser.add_argument("file", help="MAT, HDF5, Parquet, Feather, ROS bag, MCAP, PACE, LeRobot dataset#EPISODE")
     parser.add_argument("--out", required=True, help="the table, .npz")
-    parser.add_argument("--topic", action="append", default=[], help="of a bag; more than once")
-    parser.add_argument("--variable", default="", help="of a MAT file, or a group of an HDF5 file")
-    parser.add_argument("--time", default="", help="the column of stamps")
+    parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable, time, joints (docs/formats.md)")
     given = parser.parse_args()
+    _limit_memory()
     try:
-        log = read(given.file, topics=given.topic, variable=given.variable, time=given.time)
-        log.save(given.out)
+        source = Source.of(_options(given.options), "--options")
+        Log.of_table(read_table(given.file, source)).save(given.out)
     except InputError as error:
         for text in (error.what, error.where, error.actual, error.allowed, error.cure):
             print(" ".join(str(text).split()))
         return 2
-    for finding in log.findings:
-        print(finding)
     return 0
 
 

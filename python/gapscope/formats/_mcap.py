@@ -77,7 +77,8 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        raise InputError("not a readable MCAP file", str(path), reason, cure="mcap recover FILE, if it was cut") from None
+        cure = "mcap recover FILE, if it was cut"
+        raise InputError("not a readable MCAP file", str(path), reason, cure=cure) from None
     return (topics.table(source.topics),)
 
 

@@ -68,7 +68,7 @@ class Source:
             many = isinstance(known[key], tuple)
             values = [value] if isinstance(value, str) else value
             if not isinstance(values, (list, tuple)) or not all(isinstance(v, str) for v in values):
-                raise InputError(f"'{key}' of 'source' is no text", where, repr(value)[:80], "a text or a list of texts")
+                raise InputError(f"'{key}' of 'source' is no text", where, repr(value)[:80], "texts")
             if not many and len(values) != 1:
                 raise InputError(f"'{key}' of 'source' is no text", where, repr(value)[:80], "one text")
             taken[key] = tuple(values) if many else values[0]
@@ -194,7 +194,7 @@ class Series:
 
 
 def join(path: Path, series: Sequence[Series]) -> tuple[Floats, dict[str, Floats]]:
-    """All stamps, in order, in s from the first; each column NaN where its own series has no row (``missing: keep``)."""
+    """All stamps, in order, in s from the first; each column NaN where its own series has no row: `missing: keep`."""
     same_ns = SAME_STAMP_NS if len(series) > 1 else 0
     every = np.unique(np.concatenate([s.stamps for s in series]))
     kept = [int(every[0])]

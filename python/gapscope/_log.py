@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -13,6 +14,7 @@ import numpy.typing as npt
 
 from gapscope._errors import InputError
 from gapscope._experiment import Experiment
+from gapscope._program import run
 from gapscope.formats import Source, Table, format_of, read_table, read_tables
 
 if TYPE_CHECKING:
@@ -91,7 +93,7 @@ class Log:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns. Of a file: only of this package's own, which ``save`` writes."""
+        """Names of the columns, as the program reads them."""
         return tuple(self._load())
 
     def __getitem__(self, column: str) -> Floats:
@@ -136,19 +138,15 @@ class Log:
         return f"Log({self.name + ': ' if self.name else ''}{rows} rows of {', '.join(self._table)})"
 
     def _load(self) -> dict[str, Floats]:
-        if self.path is None:
-            return self._table
-        if self.path.suffix == ".npz":
-            with np.load(self.path, allow_pickle=False) as archive:
-                if "meta" in archive and "c0" in archive:
+        if self.path is not None and not self._table:
+            # The program reads it: what it writes is this package's own table.
+            with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
+                run(["convert", str(self.path), "--out", folder, "--json"])
+                (table,) = Path(folder).iterdir()
+                with np.load(table, allow_pickle=False) as archive:
                     names = json.loads(archive["meta"].tobytes())["names"]
-                    return {name: archive[f"c{k}"] for k, name in enumerate(names)}
-        raise InputError(
-            "the columns of this file are read by the program alone",
-            str(self.path),
-            allowed="tables in memory, and files that Log.save wrote",
-            cure="read it yourself, for example with pandas, and give the DataFrame to Log",
-        )
+                    self._table = {name: archive[f"c{k}"] for k, name in enumerate(names)}
+        return self._table
 
     @classmethod
     def of_table(cls, table: Table) -> Log:

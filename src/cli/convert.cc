@@ -30,7 +30,9 @@ Result<std::map<std::string, std::string>> TargetsOf(const ConvertFlags& flags) 
     for (char& c : name) c = c == '#' || c == ':' ? '_' : c;
     const std::string target = (std::filesystem::path(flags.common.out) / (name + ".npz")).string();
     if (const auto [other, fresh] = taken.emplace(target, file); !fresh)
-      return Error{.what = "two logs of one name", .where = target, .actual = other->second + ", " + file,
+      return Error{.what = "two logs of one name",
+                   .where = target,
+                   .actual = other->second + ", " + file,
                    .cure = "convert them into folders of their own"};
   }
   return taken;

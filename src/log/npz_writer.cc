@@ -12,7 +12,7 @@ namespace gapscope {
 namespace {
 
 constexpr std::size_t kMostWritten = std::size_t{4} << 30;  // beyond it a ZIP archive has another form
-constexpr std::size_t kAlign = 64, kMostAround = 512;  // bytes of headers: a multiple; about one member
+constexpr std::size_t kAlign = 64, kMostAround = 512;       // bytes of headers: a multiple; about one member
 constexpr std::uint16_t kVersion = 20, kFirstOfMay1980 = 161;
 
 // Little-endian, as this program's platforms are (zip.cc checks it).
@@ -41,7 +41,8 @@ class StoredZip {
     std::string entry;
     for (const std::uint16_t field : {kVersion, std::uint16_t{0}, std::uint16_t{0}, std::uint16_t{0}, kFirstOfMay1980})
       AppendNumber(field, &entry);
-    AppendNumber(static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(data.data()), data.size())), &entry);
+    AppendNumber(static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(data.data()), data.size())),
+                 &entry);
     for (int k = 0; k < 2; ++k) AppendNumber(static_cast<std::uint32_t>(data.size()), &entry);
     AppendNumber(static_cast<std::uint16_t>(name.size()), &entry);
     AppendNumber(std::uint16_t{0}, &entry);
@@ -70,7 +71,9 @@ class StoredZip {
 };
 
 std::string MetaOf(const Log& log) {
-  nlohmann::ordered_json json = {{"schema", "gapscope.log/1"}, {"names", nlohmann::ordered_json::array()}, {"units", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json json = {{"schema", "gapscope.log/1"},
+                                 {"names", nlohmann::ordered_json::array()},
+                                 {"units", nlohmann::ordered_json::array()}};
   nlohmann::ordered_json clocks = nlohmann::ordered_json::array();
   bool known = false;
   for (const Column& column : log.columns) {

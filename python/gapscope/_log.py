@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import shutil
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -111,8 +113,10 @@ class Log:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the table as NPZ (``gapscope.log/1``), which the program reads to the last bit."""
+        target = Path(path)
         if self.path is not None:
-            raise InputError("the log is a file already", str(self.path), cure="copy it")
+            with _converted(self.path) as table:
+                return Path(shutil.copyfile(table, target))
         names = list(self._table)
         meta: dict[str, Any] = {"schema": SCHEMA, "names": names}
         meta["units"] = [self._units.get(name, "") for name in names]
@@ -125,7 +129,6 @@ class Log:
         if self.time is not None:
             meta["time"] = self.time
         text = np.frombuffer(json.dumps(meta, allow_nan=False).encode(), dtype=np.uint8)
-        target = Path(path)
         with target.open("wb") as file:
             arrays: dict[str, Any] = {"meta": text, **{f"c{k}": self._table[name] for k, name in enumerate(names)}}
             np.savez(file, **arrays)
@@ -139,13 +142,9 @@ class Log:
 
     def _load(self) -> dict[str, Floats]:
         if self.path is not None and not self._table:
-            # The program reads it: what it writes is this package's own table.
-            with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
-                run(["convert", str(self.path), "--out", folder, "--json"])
-                (table,) = Path(folder).iterdir()
-                with np.load(table, allow_pickle=False) as archive:
-                    names = json.loads(archive["meta"].tobytes())["names"]
-                    self._table = {name: archive[f"c{k}"] for k, name in enumerate(names)}
+            with _converted(self.path) as table, np.load(table, allow_pickle=False) as archive:
+                names = json.loads(archive["meta"].tobytes())["names"]
+                self._table = {name: archive[f"c{k}"] for k, name in enumerate(names)}
         return self._table
 
     @classmethod
@@ -327,6 +326,15 @@ class Log:
             "a time in every row",
             f"df = df.dropna(subset=[{name!r}])",
         )
+
+
+@contextlib.contextmanager
+def _converted(path: Path) -> Iterator[Path]:
+    """A file that the program reads, as this package's own table."""
+    with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
+        run(["convert", str(path), "--out", folder, "--json"])
+        (table,) = Path(folder).iterdir()
+        yield table
 
 
 def _is_frame(data: Any) -> bool:

@@ -1,0 +1,260 @@
+"""Damaged and hostile files of other tools' formats: refused within a memory limit, and nothing in them is executed."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import gapscope as gs
+import numpy as np
+import pytest
+from gapscope._program import program
+from test_formats import Q, ROWS, TIME, converter, write_bag, write_ros1_bag
+
+pytest.importorskip("scipy")
+pa = pytest.importorskip("pyarrow")
+h5py = pytest.importorskip("h5py")
+pytest.importorskip("rosbags")
+pytest.importorskip("mcap")
+
+# All files in one process of its own, with little memory: a line for each.
+READS = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 3 * 2**30))
+import gapscope as gs
+for path in sys.argv[1:]:
+    try:
+        log = gs.read_all(path)[0]
+        print("read", len(log[log.time]), "rows")
+    except gs.InputError as error:
+        print("refused:", " ".join(str(error).split()))
+"""
+
+
+def outcomes(paths: list[Path]) -> list[str]:
+    package = str(Path(gs.__file__).parents[1])
+    command = [sys.executable, "-W", "ignore", "-c", READS, *map(str, paths)]
+    run = subprocess.run(command, capture_output=True, text=True, cwd=package, timeout=120)
+    lines = run.stdout.splitlines()
+    assert run.returncode == 0, (run.returncode, paths[len(lines) : len(lines) + 1], lines[-1:], run.stderr[-800:])
+    return lines
+
+
+def refused(*paths: Path) -> list[str]:
+    lines = outcomes(list(paths))
+    read = [f"{path.name}: {line}" for path, line in zip(paths, lines) if not line.startswith("refused:")]
+    assert not read
+    return lines
+
+
+def whole_files(folder: Path) -> list[Path]:
+    """One file of each format."""
+    import pyarrow.feather as feather
+    import pyarrow.parquet as parquet
+    import scipy.io
+    from mcap.writer import Writer
+
+    columns = {"time_s": TIME, "q": Q}
+    scipy.io.savemat(folder / "v4.mat", columns, format="4")
+    scipy.io.savemat(folder / "v5.mat", columns)
+    scipy.io.savemat(folder / "v7.mat", columns, do_compression=True)
+    with h5py.File(folder / "a.h5", "w") as file:
+        for name, values in columns.items():
+            file.create_dataset(name, data=values, chunks=(50,), compression="gzip")
+    parquet.write_table(pa.table(columns), folder / "a.parquet")
+    feather.write_feather(pa.table(columns), str(folder / "a.feather"))
+    write_bag(folder / "bag", "mcap")
+    next((folder / "bag").glob("*.mcap")).rename(folder / "ros.mcap")
+    write_ros1_bag(folder / "a.bag")
+    with (folder / "json.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("q", "jsonschema", b"{}")
+        channel = writer.register_channel("/q", "json", schema)
+        for k in range(ROWS):
+            writer.add_message(channel, k * 5_000_000, json.dumps({"q": Q[k]}).encode(), k * 5_000_000)
+        writer.finish()
+    return sorted(path for path in folder.iterdir() if path.is_file())
+
+
+def test_truncated_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "whole").mkdir()
+    whole = whole_files(tmp_path / "whole")
+    assert outcomes(whole) == [f"read {300 if path.name == 'ros.mcap' else ROWS} rows" for path in whole]
+    cut = []
+    for path in whole:
+        raw = path.read_bytes()
+        for share in (0.0, 0.02, 0.2, 0.5, 0.8, 0.97):
+            cut.append(tmp_path / f"{share}_{path.name}")
+            cut[-1].write_bytes(raw[: int(share * len(raw))])
+    refused(*cut)
+
+
+def test_damaged_bytes_end_in_a_log_or_a_refusal(tmp_path: Path) -> None:
+    (tmp_path / "whole").mkdir()
+    random, damaged = np.random.default_rng(5), []
+    for path in whole_files(tmp_path / "whole"):
+        raw = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+        for k in range(12):
+            changed = raw.copy()
+            changed[random.integers(len(raw), size=1 + 3 * (k % 4))] = random.integers(256)
+            damaged.append(tmp_path / f"{k}_{path.name}")
+            damaged[-1].write_bytes(changed.tobytes())
+    assert len(outcomes(damaged)) == len(damaged)
+
+
+def varint(number: int) -> bytes:
+    """Thrift's compact form of a number of 64 bits."""
+    number, out = 2 * number, b""
+    while number > 127:
+        out, number = out + bytes([number & 127 | 128]), number >> 7
+    return out + bytes([number])
+
+
+def test_what_claims_too_much_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    import pyarrow.parquet as parquet
+
+    with h5py.File(tmp_path / "rows.h5", "w") as file:
+        file.create_dataset("time_s", shape=(10**9,), dtype="f8", chunks=True)
+    with h5py.File(tmp_path / "sum.h5", "w") as file:  # 3e8 rows each, a kilobyte in all
+        for name in ("time_s", "q"):
+            file.create_dataset(name, shape=(3 * 10**8,), dtype="u1", chunks=(10**6,), compression="gzip")
+    (tmp_path / "rows.mat").write_bytes(struct.pack("<5i", 0, 10**9, 1, 0, 7) + b"time_s\0")  # v4: a header alone
+    parquet.write_table(pa.table({"time_s": TIME}), tmp_path / "rows.parquet")
+    raw = (tmp_path / "rows.parquet").read_bytes()
+    (length,) = struct.unpack("<I", raw[-8:-4])
+    footer = raw[-8 - length : -8].replace(b"\x16" + varint(ROWS), b"\x16" + varint(10**9))
+    assert len(footer) > length
+    path = tmp_path / "rows.parquet"
+    path.write_bytes(raw[: -8 - length] + footer + struct.pack("<I", len(footer)) + b"PAR1")
+    for line in refused(tmp_path / "rows.h5", tmp_path / "rows.mat", path):
+        assert "too large" in line, line
+    refused(tmp_path / "sum.h5")
+
+
+def test_bombs_are_refused(tmp_path: Path) -> None:
+    """A hundred kilobytes that unpack to ten gigabytes."""
+    import zlib
+
+    import zstandard
+
+    zeros = bytes(2**24)
+    deflate = zlib.compressobj(9)
+    packed = b"".join(deflate.compress(zeros) for _ in range(640)) + deflate.flush()
+    mat = bytearray(b"MATLAB 5.0 MAT-file".ljust(124)) + struct.pack("<H2s", 0x100, b"IM")
+    (tmp_path / "a.mat").write_bytes(mat + struct.pack("<II", 15, len(packed)) + packed)
+    frame = zstandard.ZstdCompressor(level=1).compressobj()
+    chunk = b"".join(frame.compress(zeros) for _ in range(640)) + frame.flush()
+    body = struct.pack("<QQQI", 0, 1, 640 * 2**24, 0) + struct.pack("<I", 4) + b"zstd"
+    body += struct.pack("<Q", len(chunk)) + chunk
+    head = b"\x89MCAP0\r\n" + b"\x01" + struct.pack("<QII", 8, 0, 0)
+    end = b"\x02" + struct.pack("<QQQI", 20, 0, 0, 0) + b"\x89MCAP0\r\n"
+    (tmp_path / "a.mcap").write_bytes(head + b"\x06" + struct.pack("<Q", len(body)) + body + end)
+    refused(tmp_path / "a.mat", tmp_path / "a.mcap")
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        with archive.open("time.npy", "w", force_zip64=True) as member:
+            rows = 640 * 2**21
+            head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows},), }}".ljust(117) + "\n"
+            member.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head.encode())
+            for _ in range(64):
+                member.write(zeros)
+    with pytest.raises(gs.InputError):
+        gs.Log(tmp_path / "a.npz").columns
+
+
+class Evil:
+    def __reduce__(self) -> Any:
+        return (exec, ("open('executed', 'w')",))
+
+
+def test_nothing_that_is_read_is_executed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pyarrow.parquet as parquet
+    import scipy.io
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    monkeypatch.chdir(tmp_path)
+    evil = pickle.dumps(Evil())
+    paths = [tmp_path / f"evil{suffix}" for suffix in (".mat", ".h5", ".parquet", ".feather", ".bag", ".mcap", ".db3")]
+    for path in paths:
+        path.write_bytes(evil)
+    with h5py.File(tmp_path / "object.h5", "w") as file:
+        file["time_s"] = np.array([evil])
+    scipy.io.savemat(tmp_path / "object.mat", {"time_s": np.array([evil], dtype=object)})
+    parquet.write_table(pa.table({"time_s": [evil]}), tmp_path / "object.parquet")
+    # A ROS type whose name or definition is Python: rosbags makes code of definitions.
+    for k, (name, text) in enumerate(
+        [
+            ("a/msg/B:\n  open('executed','w')\nclass C", "float64 x\n"),
+            ("a/msg/B", "float64 x\nstring s=\"\"\"+open('executed','w')+\"\"\"\n"),
+            ("a/msg/B", "float64 x=open('executed','w')\n"),
+            ("a/msg/B", "float64[open('executed','w')] x\n"),
+            ("a/msg/B'+open('executed','w')+'", "float64 x\n"),
+        ]
+    ):
+        folder = tmp_path / f"ros{k}"
+        with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            connection = writer.add_connection("/b", name, msgdef=text, rihs01="RIHS01_0")
+            writer.write(connection, 1, b"\0\1\0\0" + bytes(8))
+        paths.append(next(folder.glob("*.mcap")))
+    lines = refused(*paths, tmp_path / "object.h5", tmp_path / "object.mat", tmp_path / "object.parquet")
+    assert not list(tmp_path.rglob("executed")), lines
+    np.savez(tmp_path / "evil.npz", time_s=TIME, q=np.array([Evil()] * ROWS, dtype=object))
+    with pytest.raises(gs.InputError, match="object"):
+        gs.Log(tmp_path / "evil.npz").columns
+    assert not list(tmp_path.rglob("executed"))
+
+
+def test_hdf5_reads_no_other_file(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_bytes(TIME.tobytes())
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("time_s", (ROWS,), "f8", external=[(str(secret), 0, 8 * ROWS)])
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["time_s"] = TIME
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        layout = h5py.VirtualLayout((ROWS,), "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "time_s", (ROWS,))
+        file.create_virtual_dataset("time_s", layout)
+        file["link"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "time_s")
+    refused(tmp_path / "a.h5", tmp_path / "b.h5")
+    with pytest.raises(gs.InputError, match="no such group"):
+        gs.read(tmp_path / "b.h5", variable="link")
+
+
+def test_the_program_refuses_with_status_2(experiment: str, tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "rows.h5", "w") as file:
+        file.create_dataset("time_s", shape=(10**9,), dtype="f8", chunks=True)
+    (tmp_path / "cut.mcap").write_bytes(b"\x89MCAP0\r\n")
+    for name in ("rows.h5", "cut.mcap"):
+        command = [str(program()), "replay", experiment, str(tmp_path / name)]
+        run = subprocess.run(command, capture_output=True, text=True, env=converter(tmp_path))
+        assert run.returncode == 2 and name in run.stderr and run.stdout == "", run.stderr
+
+
+def test_json_that_grows_without_end_is_refused(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    def write(name: str, messages: list[bytes]) -> Path:
+        stream = io.BytesIO()
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/q", "json", 0)
+        for k, data in enumerate(messages):
+            writer.add_message(channel, k, data, k)
+        writer.finish()
+        (tmp_path / name).write_bytes(stream.getvalue())
+        return tmp_path / name
+
+    wide = write("wide.mcap", [json.dumps({f"k{j}": 1 for j in range(11_000)}).encode()])
+    deep = write("deep.mcap", [b'{"a":' * 100_000 + b"1" + b"}" * 100_000])
+    huge = write("huge.mcap", [b'{"a": 1' + b"0" * 400 + b"}"])
+    none = write("none.mcap", [b'"text"'])
+    lines = refused(wide, deep, huge, none)
+    assert "too large" in lines[0] and "without numbers" in lines[3]

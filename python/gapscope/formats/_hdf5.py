@@ -30,24 +30,16 @@ def _is_column(item: Any, matlab: bool) -> bool:
 def read_as(path: Path, source: Source, what: str, extra: str, matlab: bool = False) -> tuple[Table, ...]:
     """Numeric datasets; those of MATLAB are transposed."""
     h5py = library("h5py", what + "s", extra)
-    arrays: dict[str, Floats] = {}
-    units: dict[str, str] = {}
+    found: dict[str, Any] = {}
     skipped: list[str] = []
 
     def take(name: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset) or name.startswith("#"):
             return
-        if not _is_column(item, matlab):
+        if _is_column(item, matlab):
+            found[name] = item
+        else:
             skipped.append(name)
-            return
-        held = sum(len(values) for values in arrays.values())
-        claims(path, name, (held + int(np.prod([float(n) for n in item.shape])),))
-        values = np.asarray(item[()], dtype=np.float64)
-        columns = spread(name, np.atleast_1d(np.squeeze(values.T) if matlab else values))
-        arrays.update(columns)
-        unit = item.attrs.get("unit", item.attrs.get("units"))
-        if isinstance(unit, str):
-            units.update({column: unit for column in columns})
 
     with h5py.File(path, "r", locking=False) as file:
         group = file
@@ -60,9 +52,25 @@ def read_as(path: Path, source: Source, what: str, extra: str, matlab: bool = Fa
             take(source.variable, group)
         else:
             group.visititems(take)
+        claims(path, "all datasets", (sum(item.size for item in found.values()),))
+        arrays, units = _columns(found, matlab)
     if not arrays:
         raise InputError(f"a {what} without numbers in arrays", str(path), ", ".join(skipped) or "nothing", "datasets")
     return (of_arrays(path, arrays, find_time(path, arrays, source.time), skipped, units=units),)
+
+
+def _columns(found: dict[str, Any], matlab: bool) -> tuple[dict[str, Floats], dict[str, str]]:
+    """The datasets' columns, and the units of those that state one."""
+    arrays: dict[str, Floats] = {}
+    units: dict[str, str] = {}
+    for name, item in found.items():
+        values = np.asarray(item[()], dtype=np.float64)
+        columns = spread(name, np.atleast_1d(np.squeeze(values.T) if matlab else values))
+        arrays.update(columns)
+        unit = item.attrs.get("unit", item.attrs.get("units"))
+        if isinstance(unit, str):
+            units.update({column: unit for column in columns})
+    return arrays, units
 
 
 def _read(path: Path, source: Source) -> tuple[Table, ...]:

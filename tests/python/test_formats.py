@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pickle
-import struct
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ import gapscope as gs
 import numpy as np
 import pytest
 from gapscope._program import program
+from gapscope.formats import Source
 
 ROWS = 200
 TIME = np.arange(ROWS) * 0.005 + 100.0
@@ -199,6 +201,180 @@ def test_ros1_bag(tmp_path: Path) -> None:
     assert np.array_equal(log["/q/data"], Q) and log["time_s"][-1] == pytest.approx(0.995)
 
 
+def write_mcap_json(path: Path, messages: list[tuple[str, int, Any]]) -> None:
+    from mcap.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channels: dict[str, int] = {}
+        for topic, ns, message in messages:
+            if topic not in channels:
+                channels[topic] = writer.register_channel(topic, "json", 0)
+            writer.add_message(channels[topic], ns, json.dumps(message).encode(), ns)
+        writer.finish()
+
+
+def test_mcap_of_json(tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    messages: list[tuple[str, int, Any]] = []
+    for k in range(ROWS):
+        ns = 10**12 + k * 5_000_000
+        stamp = {"sec": ns // 10**9, "nsec": ns % 10**9}
+        joints = {"timestamp": stamp, "name": ["arm", "elbow"], "position": [Q[k], 2 * Q[k]], "mode": "on"}
+        messages.append(("/joints", ns + 500_000, joints))
+        if k % 2 == 0:
+            messages.append(("/command", ns, {"u": list(U[k]), "on": True, "inner": {"x": 1}, "image": [0] * 100}))
+    write_mcap_json(tmp_path / "run.mcap", messages)
+    log = gs.read(tmp_path / "run.mcap")
+    assert np.array_equal(log["/joints/arm/position"], Q) and np.array_equal(log["/joints/elbow/position"], 2 * Q)
+    assert np.array_equal(log["/command/u[1]"][::2], U[::2, 1]) and np.isnan(log["/command/u[1]"][1::2]).all()
+    assert log["/command/on"][0] == log["/command/inner/x"][0] == 1 and "/command/image[0]" not in log.columns
+    assert log.clock["/joints/arm/position"] == "header" and log.clock["/command/on"] == "receive"
+    assert log["time_s"][-1] == pytest.approx(0.995, abs=1e-12)
+    only = gs.read(tmp_path / "run.mcap", {"model": "", "log": {"source": {"topics": ["/command"]}}}, joints=["a", "b"])
+    assert np.array_equal(only["/command/u/b"], U[::2, 1]) and "/joints/arm/position" not in only.columns
+    with pytest.raises(gs.InputError, match="/none.*/command, /joints"):
+        gs.read(tmp_path / "run.mcap", topics=["/none"])
+
+
+def test_mcap_of_protobuf(tmp_path: Path) -> None:
+    pytest.importorskip("mcap_protobuf")
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+    from mcap_protobuf.writer import Writer
+
+    file = descriptor_pb2.FileDescriptorProto(name="drive.proto", package="rig", syntax="proto3")
+    file.dependency.append(timestamp_pb2.DESCRIPTOR.name)
+    point = file.message_type.add(name="Point")
+    point.field.add(name="x", number=1, type=1, label=1)
+    drive = file.message_type.add(name="Drive")
+    drive.field.add(name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp")
+    drive.field.add(name="q", number=2, type=1, label=1)
+    drive.field.add(name="u", number=3, type=1, label=3)
+    drive.field.add(name="at", number=4, type=11, label=1, type_name=".rig.Point")
+    drive.field.add(name="note", number=5, type=9, label=1)
+    pool = descriptor_pool.Default()
+    pool.Add(file)
+    kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("rig.Drive"))
+    with (tmp_path / "run.mcap").open("wb") as stream, Writer(stream) as writer:
+        for k in range(ROWS):
+            message = kind(q=Q[k], u=U[k], note="text", at={"x": k} if k % 2 else None)
+            message.timestamp.FromNanoseconds(10**12 + k * 5_000_000)
+            writer.write_message("/drive", message, log_time=10**12 + k * 5_000_000 + 700)
+    log = gs.read(tmp_path / "run.mcap")
+    assert np.array_equal(log["/drive/q"], Q) and np.array_equal(log["/drive/u[1]"], U[:, 1])
+    assert log.clock["/drive/q"] == "header" and np.array_equal(log["/drive/at/x"][1::2], np.arange(1, ROWS, 2))
+    assert np.isnan(log["/drive/at/x"][::2]).all() and log["time_s"][1] == pytest.approx(0.005, abs=1e-12)
+
+
+def test_goals_are_no_commands(tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    points = [{"positions": [0.0]}, {"positions": [1.0]}]
+    messages = [("/goal", 10**9 * k, {"joint_names": ["arm"], "points": points}) for k in range(3)]
+    path = tmp_path / "run.mcap"
+    write_mcap_json(path, [*messages, *(("/q", 10**9 * k, {"x": k}) for k in range(3))])
+    log = gs.read(path)
+    assert log.columns == ("time_s", "/q/x") and "goals of several points: /goal" in log.findings[0]
+    with pytest.raises(gs.InputError, match="goals of several points.*record the controller's state"):
+        gs.read(path, topics=["/goal"])
+    write_mcap_json(path, [(t, ns, {**m, "points": points[1:]}) for t, ns, m in messages])
+    assert np.array_equal(gs.read(path)["/goal/arm/positions"], [1, 1, 1])
+
+
+def test_stamps_of_several_rates(tmp_path: Path) -> None:
+    """Closer than 20 us is one row; a burst within it is told; one rate alone keeps all of its rows."""
+    pytest.importorskip("mcap")
+    a = [("/a", k * 1_000_000, {"x": k}) for k in range(10)]
+    b = [("/b", k * 1_000_000 + 15_000 * (k % 3), {"y": k}) for k in range(10)]
+    write_mcap_json(tmp_path / "run.mcap", a + b)
+    log = gs.read(tmp_path / "run.mcap")
+    assert len(log["time_s"]) == 13 and np.isfinite(log["/a/x"]).sum() == np.isfinite(log["/b/y"]).sum() == 10
+    write_mcap_json(tmp_path / "run.mcap", a + [("/b", 5_000 * k, {"y": k}) for k in range(10)])
+    log = gs.read(tmp_path / "run.mcap")
+    assert np.array_equal(log["time_s"][:3], [0, 25e-6, 1e-3]) and np.array_equal(log["/b/y"][:2], [4, 9])
+    assert "8 messages of /b share their stamp" in log.findings[0]
+    write_mcap_json(tmp_path / "run.mcap", [("/b", 5_000 * k, {"y": k}) for k in range(10)])
+    assert np.array_equal(gs.read(tmp_path / "run.mcap")["/b/y"], np.arange(10))
+
+
+def test_definitions_that_a_bag_lacks(tmp_path: Path) -> None:
+    """As bags in .db3 up to Humble do."""
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    text = "float64 q\n"
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(text, "rig/msg/Drive"))
+    with Writer(tmp_path / "bag", version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection("/drive", "rig/msg/Drive", typestore=store)
+        for k in range(ROWS):
+            data = store.serialize_cdr(store.types["rig/msg/Drive"](q=Q[k]), "rig/msg/Drive")
+            writer.write(connection, 10**12 + k * 5_000_000, data)
+    database = next((tmp_path / "bag").glob("*.db3"))
+    with contextlib.closing(sqlite3.connect(database)) as connection, connection:
+        connection.execute("DELETE FROM message_definitions")
+    with pytest.raises(gs.InputError, match="rig/msg/Drive.*msgs: FOLDER"):
+        gs.read(tmp_path / "bag")
+    with pytest.raises(gs.InputError, match="without .msg files"):
+        gs.read(tmp_path / "bag", msgs=str(tmp_path / "bag"))
+    folder = tmp_path / "src" / "rig" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Drive.msg").write_text(text)
+    assert np.array_equal(gs.read(tmp_path / "bag", msgs=str(tmp_path / "src"))["/drive/q"], Q)
+
+
+def test_pace_is_read_with_weights_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "run.pt"
+    path.write_bytes(pickle.dumps({"time": 0}))
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(gs.InputError, match="pip install torch"):
+        gs.read(path)
+
+    class Torch:
+        __version__ = "2.5.1"
+
+        @staticmethod
+        def load(path: Path, *, map_location: str, weights_only: bool) -> Any:
+            assert weights_only and map_location == "cpu"
+            raise pickle.UnpicklingError("Weights only load failed")
+
+    monkeypatch.setitem(sys.modules, "torch", Torch)
+    with pytest.raises(gs.InputError, match="too old"):
+        gs.read(path)
+    Torch.__version__ = "2.6.0+cpu"
+    with pytest.raises(gs.InputError, match="not a readable PACE recording"):
+        gs.read(path)
+
+
+def test_what_a_source_says_is_checked(tmp_path: Path) -> None:
+    bad: list[tuple[Any, str]] = [({"topic": "a"}, "'topic'"), ({"topics": 3}, "topics"), ([], "no mapping")]
+    for options, says in [*bad, ({"time": ["a", "b"]}, "one text")]:
+        with pytest.raises(gs.InputError, match=says):
+            Source.of(options, "here")
+    assert Source.of({"topics": "/a", "variable": "x"}, "here") == Source(topics=("/a",), variable="x")
+    experiment = tmp_path / "experiment.yaml"
+    experiment.write_text("model: a.xml\nlog:\n  source: {variable: run}\n")
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file["run/time_s"], file["walk/time_s"], file["run/q"] = TIME, TIME, Q
+        file["run/q"].attrs["unit"] = "deg"
+    assert gs.read(path, experiment).columns == ("q", "time_s")
+    assert gs.read(path, experiment, variable="walk").columns == ("time_s",)
+    saved = gs.Log(gs.read(path, experiment).save(tmp_path / "run.npz"))
+    assert np.array_equal(saved["q"], Q) and saved.to_pandas().columns.tolist() == ["q", "time_s"]
+
+
+def test_images_stay_unread(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["time_s"], file["q"] = TIME, Q
+        file.create_dataset("image", (ROWS, 480, 640, 3), "u1", chunks=(1, 480, 640, 3))
+    log = gs.read(tmp_path / "run.h5")
+    assert log.columns == ("q", "time_s") and "image" in log.findings[0]
+
+
 def test_two_rates_replay_as_the_csv_does(experiment: str, demo: str, tmp_path: Path) -> None:
     """The demo's commands and angles in one file, the angles at half its rate: what is there replays alike."""
     pa = pytest.importorskip("pyarrow")
@@ -242,6 +418,69 @@ def test_the_program_starts_the_converter_by_itself(experiment: str, demo: str, 
     gone = {**os.environ, "GAPSCOPE_CONVERT": str(tmp_path / "gone")}
     run = subprocess.run(command, capture_output=True, text=True, env=gone)
     assert run.returncode == 2 and "pip install 'gapscope[mat]'" in run.stderr
+
+
+def split_demo(demo: str, path: Path) -> None:
+    """The demo as two topics of their own rates: commands at 500 Hz, angles at half of it."""
+    table = np.genfromtxt(demo, delimiter=",", names=True)
+    messages: list[tuple[str, int, Any]] = []
+    for k, row in enumerate(table):
+        messages.append(("/drive", round(1e9 * row["time_s"]), {"voltage": row["voltage_v"]}))
+        if k % 2 == 0:
+            angles = {"arm": row["arm_rad"], "pendulum": row["pendulum_rad"]}
+            messages.append(("/angles", round(1e9 * row["time_s"]) + 4_000, angles))
+        messages.append(("/noise", round(1e9 * row["time_s"]) + 900_000, {"x": 0}))
+    write_mcap_json(path, messages)
+
+
+def of_topics(experiment: str, target: Path, more: str = "") -> Path:
+    """The demo's experiment, for `split_demo`."""
+    text = Path(experiment).read_text().replace("model: ", f"model: {Path(experiment).parent}/")
+    text = text.replace("log:", "log:\n  source: {topics: [/drive, /angles]}" + more)
+    for column, name in (("voltage_v", "/drive/voltage"), ("arm_rad", "/angles/arm"), ("pendulum_rad", "/angles/pendulum")):
+        text = text.replace(f"column: {column}", f"column: {name}")
+    target.write_text(text)
+    return target
+
+
+def test_two_rates_in_a_bag_replay_as_the_csv_does(experiment: str, demo: str, tmp_path: Path) -> None:
+    """By the program with its converter, and by the package: commands held, angles compared where they are."""
+    pytest.importorskip("mcap")
+    bag, bound = tmp_path / "run.mcap", of_topics(experiment, tmp_path / "experiment.yaml")
+    split_demo(demo, bag)
+    command = [str(program()), "replay", str(bound), str(bag), "--json"]
+    run = subprocess.run(command, capture_output=True, text=True, env=converter(tmp_path))
+    assert run.returncode == 0, run.stderr
+    whole = gs.replay(experiment, demo)
+    assert json.loads(run.stdout)["error"] == pytest.approx(whole.error, rel=0.02)
+    pytest.importorskip("ruamel.yaml")
+    assert gs.replay(bound, bag).error == json.loads(run.stdout)["error"]
+    held = of_topics(experiment, tmp_path / "held.yaml", "\n  repair: {missing: hold}")
+    assert gs.replay(held, bag).error != json.loads(run.stdout)["error"]
+
+
+def test_the_program_converts_and_inspects(demo: str, tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    bag = tmp_path / "run.mcap"
+    split_demo(demo, bag)
+    environment = converter(tmp_path)
+    call = [str(program()), "inspect", str(bag)]
+    run = subprocess.run(call, capture_output=True, text=True, env=environment)
+    assert run.returncode == 0 and "250 Hz, receive stamps: /angles/arm, /angles/pendulum" in run.stdout, run.stdout
+    assert "fit for use" in run.stdout and "NOT fit" not in run.stdout
+    source = json.dumps({"topics": ["/angles"]})
+    call = [str(program()), "convert", str(bag), demo, "--out", str(tmp_path / "tables"), "--source", source, "--json"]
+    run = subprocess.run(call, capture_output=True, text=True, env=environment)
+    assert run.returncode == 0, run.stderr
+    tables = {Path(log["table"]).name: log for log in json.loads(run.stdout)["logs"]}
+    assert tables["run.npz"]["columns"] == ["time_s", "/angles/arm", "/angles/pendulum"]
+    table = np.genfromtxt(demo, delimiter=",", names=True)
+    same = gs.Log(tmp_path / "tables" / "qube.npz")
+    assert all(np.array_equal(same[name], table[name]) for name in table.dtype.names)
+    assert np.array_equal(gs.Log(tmp_path / "tables" / "run.npz")["/angles/arm"], table["arm_rad"][::2])
+    call = [str(program()), "convert", str(bag), "--out", str(tmp_path), "--source", '{"topic": "/angles"}']
+    run = subprocess.run(call, capture_output=True, text=True, env=environment)
+    assert run.returncode == 2 and "'topic'" in run.stderr and "topics" in run.stderr
 
 
 def test_a_missing_library_names_its_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

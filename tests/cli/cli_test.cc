@@ -353,6 +353,19 @@ TEST_F(CliTest, InspectNeedsNoExperiment) {
   ExpectRefused("inspect '" + scratch_.Path("gone.csv") + "'", {"gone.csv"});
 }
 
+TEST_F(CliTest, ConvertedLogsReplayToTheLastDigit) {
+  const std::string log = JointLog(), out = scratch_.Path("tables");
+  const auto json = nlohmann::json::parse(Run("convert '" + log + "' --out '" + out + "' --json").out);
+  EXPECT_EQ(json["schema"], "gapscope.convert/1");
+  const std::string table = json["logs"][0]["table"];
+  const auto error = [&](const std::string& path) {
+    return nlohmann::json::parse(Run("replay " + Joint() + " '" + path + "' --json").out)["error"];
+  };
+  EXPECT_EQ(error(table), error(log));
+  ExpectRefused("convert '" + log + "' '" + log + "' --out '" + out + "'", {"two logs of one name"});
+  ExpectRefused("convert '" + scratch_.Path("gone.csv") + "' --out '" + out + "'", {"gone.csv"});
+}
+
 TEST_F(CliTest, ExportTellsAndMeasuresWhatAnotherEngineLoses) {
   const std::string log = JointLog(), out = scratch_.Path("out"), to = scratch_.Path("mjx");
   ASSERT_EQ(

@@ -104,6 +104,7 @@ const std::vector<Broken>& Table() {
        {"'commands' is not a list"}},
       {"  - {actuator: aux, default: log.kp * 2}", "  - aux", {"a command is not a map"}},
       {"  - {signal: w,", "  - [signal]\n  - {signal: w,", {"a measured signal is not a map"}},
+      {"repair:", "source: 3\n  repair:", {"'source' is no mapping"}},
       {"repair:", "companions: {find: a}\n  repair:", {"'companions' is not a list"}},
       {"repair:", "companions:\n    - {find: \"\", replace: b}\n  repair:", {"'find' of a companion is empty"}, 8},
       {"{unit: rad, nominal: 0, bounds: [-0.1, 0.1]}", "0.3", {"'hinge.offset'", "is not a map"}},

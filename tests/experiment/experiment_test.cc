@@ -17,6 +17,15 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
+TEST(ExperimentTest, WhatToTakeOfAForeignFileIsHandedOnAsItStands) {
+  const Scratch scratch;
+  const std::string text =
+      Replaced(kGoodExperiment, "repair:", "source: {topics: [/arm, 7], variable: \"a: 'b\"}\n  repair:");
+  const auto loaded = LoadExperiment(scratch.Write("experiment.yaml", text));
+  ASSERT_TRUE(loaded.ok()) << loaded.error().Text();
+  EXPECT_EQ(loaded.value().read.source, R"({"topics":["/arm","7"],"variable":"a: 'b"})");
+}
+
 TEST(ExperimentTest, EveryKeyArrives) {
   const Scratch scratch;
   const std::string path = scratch.Write("rig/experiment.yaml", kGoodExperiment);
@@ -29,7 +38,9 @@ TEST(ExperimentTest, EveryKeyArrives) {
   EXPECT_STREQ(e.read.format->name, "csv");
   EXPECT_EQ(e.timeline.time_column, "time_s");
   EXPECT_EQ(e.timeline.time_unit, "s");
+  EXPECT_EQ(e.read.source, "");
   EXPECT_EQ(e.timeline.missing, MissingRepair::kHold);
+  EXPECT_TRUE(e.timeline.missing_stated);
   EXPECT_EQ(e.timeline.repeated, TimeRepair::kDropRows);
   EXPECT_EQ(e.timeline.reversed, TimeRepair::kError);
   EXPECT_EQ(e.timeline.gap_factor, 7);

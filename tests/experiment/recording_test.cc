@@ -108,6 +108,21 @@ TEST_F(RecordingTest, KeepLeavesMeasuredValuesMissing) {
   EXPECT_EQ(held.value().measured[0].values[2], q[0]);
 }
 
+// What a log of several rates says itself holds where the experiment says nothing.
+TEST_F(RecordingTest, ALogOfSeveralRatesIsKept) {
+  Log log{.path = "run.mcap", .columns = {{.name = "time_s", .values = {0, 1, 2}}}, .joined = true};
+  log.columns.push_back({.name = "u", .values = {100, std::nan(""), 300}});
+  log.columns.push_back({.name = "q", .values = {1, std::nan(""), 3}});
+  for (const bool stated : {false, true}) {
+    Experiment experiment = LoadExperiment(scratch_.Write("experiment.yaml", kExperiment)).value();
+    experiment.timeline.missing_stated = stated;
+    const auto bound = BindLog(experiment, log);
+    ASSERT_TRUE(bound.ok()) << bound.error().Text();
+    EXPECT_EQ(std::isnan(bound.value().measured[0].values[1]), !stated);
+    EXPECT_TRUE(std::isfinite(bound.value().commands[0].values[1]));
+  }
+}
+
 TEST_F(RecordingTest, MissingColumnsNameTheNearest) {
   const std::string command = MessageOf("time_s,uu,q\n0,1,2\n1,1,2\n");
   EXPECT_NE(command.find("log.csv:1: no column 'u' for the actuator 'motor'"), std::string::npos) << command;

@@ -267,6 +267,33 @@ def test_mcap_of_protobuf(tmp_path: Path) -> None:
     assert np.isnan(log["/drive/at/x"][::2]).all() and log["time_s"][1] == pytest.approx(0.005, abs=1e-12)
 
 
+def test_names_are_those_of_plotjuggler(tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    point = {"positions": [1.0, 2.0], "velocities": [3.0, 4.0], "time_from_start": {"sec": 0, "nanosec": 0}}
+    stamp = {"header": {"stamp": {"sec": 5, "nanosec": 7}, "frame_id": ""}, "joint_names": ["arm", "elbow"]}
+    values = [{"interface_names": ["effort", "temperature"], "values": [k, 30 + k]} for k in range(2)]
+    pose = {"position": {"x": 0.5}, "orientation": {"w": 1}}
+    messages = [
+        ("/ctrl", 1, {**stamp, "reference": point, "feedback": point, "output": {"effort": [9.0]}}),
+        ("/dynamic_joint_states", 2, {**stamp, "interface_values": values}),
+        ("/mocap", 3, {"header": {"stamp": {"sec": 0, "nanosec": 0}}, "pose": pose}),
+        ("/lowstate", 4, {"motor_state": [{"q": 0.1}, {"q": 0.2}]}),
+    ]
+    write_mcap_json(tmp_path / "run.mcap", messages)
+    log = gs.read(tmp_path / "run.mcap")
+    held = {name: float(log[name][np.isfinite(log[name])][0]) for name in log.columns}
+    expected = {
+        "/ctrl/elbow/reference/positions": 2,
+        "/ctrl/arm/feedback/velocities": 3,
+        "/dynamic_joint_states/elbow/temperature": 31,
+        "/mocap/pose/position/x": 0.5,
+        "/lowstate/motor_state[1]/q": 0.2,
+    }
+    assert {name: held.get(name) for name in expected} == expected
+    assert log.clock["/ctrl/arm/reference/positions"] == "header" and log.clock["/mocap/pose/position/x"] == "receive"
+    assert not [name for name in log.columns if "header" in name or "output" in name]
+
+
 def test_goals_are_no_commands(tmp_path: Path) -> None:
     pytest.importorskip("mcap")
     points = [{"positions": [0.0]}, {"positions": [1.0]}]
@@ -437,7 +464,8 @@ def of_topics(experiment: str, target: Path, more: str = "") -> Path:
     """The demo's experiment, for `split_demo`."""
     text = Path(experiment).read_text().replace("model: ", f"model: {Path(experiment).parent}/")
     text = text.replace("log:", "log:\n  source: {topics: [/drive, /angles]}" + more)
-    for column, name in (("voltage_v", "/drive/voltage"), ("arm_rad", "/angles/arm"), ("pendulum_rad", "/angles/pendulum")):
+    names = {"voltage_v": "/drive/voltage", "arm_rad": "/angles/arm", "pendulum_rad": "/angles/pendulum"}
+    for column, name in names.items():
         text = text.replace(f"column: {column}", f"column: {name}")
     target.write_text(text)
     return target

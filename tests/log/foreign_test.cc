@@ -1,0 +1,89 @@
+// Files of other tools are handed to the converter, word by word; what it says comes back.
+#include "src/log/foreign.h"
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "src/log/npz_writer.h"
+#include "tests/log/log_fixture.h"
+
+namespace gapscope {
+namespace {
+
+class ForeignTest : public ::testing::Test {
+ protected:
+  // A converter that writes its words, a line each, to the file "words" and then does what `script` says.
+  void Install(const std::string& script) {
+    const std::string path = folder_.Write(
+        "convert", "#!/bin/sh\nprintf '%s\\n' \"$@\" > '" + folder_.Path("words") + "'\n" + script + "\n");
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+    setenv("GAPSCOPE_CONVERT", path.c_str(), 1);
+  }
+  ~ForeignTest() override { unsetenv("GAPSCOPE_CONVERT"); }
+
+  std::string MessageOf(const std::string& path) const {
+    const auto read = ReadLog(path, {});
+    EXPECT_FALSE(read.ok());
+    return read.ok() ? "" : read.error().Text();
+  }
+
+  const TempFolder folder_;
+};
+
+TEST_F(ForeignTest, FormatsAreKnownByName) {
+  for (const auto& [name, format] : std::vector<std::pair<std::string, std::string>>{{"a.MAT", "MAT file"},
+                                                                                     {"a.h5", "HDF5 file"},
+                                                                                     {"a.feather", "Parquet"},
+                                                                                     {"a.mcap", "MCAP file"},
+                                                                                     {"a.bag", "ROS bag"},
+                                                                                     {"bag/metadata.yaml", "ROS bag"},
+                                                                                     {"set/meta/info.json", "LeRobot"},
+                                                                                     {"a.pt", "PACE"}}) {
+    std::string path = folder_.Write(name, "?");
+    if (name.starts_with("bag/")) path = folder_.Path("bag");
+    if (name.starts_with("set/")) path = folder_.Path("set#3");
+    const ForeignFormat* found = ForeignFormatOf(path);
+    ASSERT_NE(found, nullptr) << path;
+    EXPECT_TRUE(found->name.starts_with(format)) << found->name;
+  }
+  EXPECT_EQ(ForeignFormatOf(folder_.Write("a.csv", "t,x\n")), nullptr);
+  EXPECT_EQ(ForeignFormatOf(folder_.Path("gone.mat")), nullptr);
+}
+
+TEST_F(ForeignTest, WithoutAConverterTheErrorSaysWhatToInstall) {
+  setenv("GAPSCOPE_CONVERT", folder_.Path("gone").c_str(), 1);
+  const std::string said = MessageOf(folder_.Write("a.mcap", "?"));
+  EXPECT_NE(said.find("MCAP file"), std::string::npos) << said;
+  EXPECT_NE(said.find("pip install 'gapscope[ros,mcap]'"), std::string::npos) << said;
+}
+
+TEST_F(ForeignTest, WordsArriveAsTheyStand) {
+  Log table = MakeLog({{"t", {0, 1}}, {"q", {2, 3}}});
+  ASSERT_TRUE(WriteNpz(folder_.Path("made.npz"), table).ok());
+  Install("cp '" + folder_.Path("made.npz") + "' \"$2\"");
+  const std::string path = folder_.Write("a $(touch x);'b.mat", "?");
+  const auto log = ReadLog(path, {.source = R"({"variable": "a 'b"})"});
+  ASSERT_TRUE(log.ok()) << log.error().Text();
+  EXPECT_EQ(log.value().Find("q")->values, (std::vector<double>{2, 3}));
+  EXPECT_EQ(log.value().format, "MAT file");
+  const std::string words = ReadFile(folder_.Path("words")).value();
+  EXPECT_TRUE(words.starts_with("--out\n")) << words;
+  EXPECT_TRUE(words.ends_with("\n--options\n{\"variable\": \"a 'b\"}\n--\n" + path + "\n")) << words;
+}
+
+TEST_F(ForeignTest, RefusalsAndFailuresAreErrors) {
+  const std::string path = folder_.Write("a.mat", "?");
+  Install("printf 'too large\\n%s, q\\n7 rows\\n5\\nsplit it\\n' here; exit 2");
+  const auto refused = ReadLog(path, {});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().what, "too large");
+  EXPECT_EQ(refused.error().where, "here, q");
+  EXPECT_EQ(refused.error().cure, "split it");
+  Install("kill -9 $$");
+  EXPECT_NE(MessageOf(path).find("the converter failed"), std::string::npos);
+  Install("echo PK > \"$2\"");
+  EXPECT_NE(MessageOf(path).find("NPZ"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace gapscope

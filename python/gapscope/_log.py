@@ -17,7 +17,8 @@ import numpy.typing as npt
 from gapscope._errors import InputError
 from gapscope._experiment import Experiment
 from gapscope._program import run
-from gapscope.formats import Source, Table, format_of, read_table, read_tables
+from gapscope.formats import Source, Table, format_of
+from gapscope.formats.apart import convert, load_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,7 +73,8 @@ class Log:
         if isinstance(data, (str, os.PathLike)) and format_of(data) is not None:
             if time_unit is not None or header:
                 raise InputError("a file says itself what its header is", os.fspath(data), cure="leave them out")
-            self._take_table(read_table(data, Source(time=time or "")))
+            (table,) = convert(data, Source(time=time or ""), every=False)
+            self._take_table(table)
             return
         if isinstance(data, (str, os.PathLike)):
             if time is not None or time_unit is not None or header:
@@ -118,7 +120,7 @@ class Log:
             with _converted(self.path) as table:
                 return Path(shutil.copyfile(table, target))
         names = list(self._table)
-        meta: dict[str, Any] = {"schema": SCHEMA, "names": names}
+        meta: dict[str, Any] = {"schema": SCHEMA, "name": self.name, "names": names}
         meta["units"] = [self._units.get(name, "") for name in names]
         meta["header"] = self._header
         meta["findings"] = [{"kind": "converted", "column": "", "count": 1, "text": text} for text in self.findings]
@@ -142,9 +144,8 @@ class Log:
 
     def _load(self) -> dict[str, Floats]:
         if self.path is not None and not self._table:
-            with _converted(self.path) as table, np.load(table, allow_pickle=False) as archive:
-                names = json.loads(archive["meta"].tobytes())["names"]
-                self._table = {name: archive[f"c{k}"] for k, name in enumerate(names)}
+            with _converted(self.path) as table:
+                self._table = dict(load_table(table).columns)
         return self._table
 
     @classmethod
@@ -358,7 +359,8 @@ def read(
     """
     if format_of(path) is None:
         return Log(path)
-    return Log.of_table(read_table(path, _asked(path, exp, source)))
+    (table,) = convert(path, _asked(path, exp, source), every=False)
+    return Log.of_table(table)
 
 
 def read_all(
@@ -369,7 +371,7 @@ def read_all(
     """Every recording of a file or folder, as `read`: of a LeRobot dataset its episodes ("dataset#0:20": some)."""
     if format_of(path) is None:
         return (Log(path),)
-    return tuple(Log.of_table(table) for table in read_tables(path, _asked(path, exp, source)))
+    return tuple(Log.of_table(table) for table in convert(path, _asked(path, exp, source), every=True))
 
 
 def _asked(path: str | os.PathLike[str], exp: Any, source: Mapping[str, Any]) -> Source:

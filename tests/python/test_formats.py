@@ -16,7 +16,7 @@ import gapscope as gs
 import numpy as np
 import pytest
 from gapscope._program import program
-from gapscope.formats import Source
+from gapscope.formats import Source, read_table
 
 ROWS = 200
 TIME = np.arange(ROWS) * 0.005 + 100.0
@@ -356,7 +356,7 @@ def test_pace_is_read_with_weights_only(tmp_path: Path, monkeypatch: pytest.Monk
     path.write_bytes(pickle.dumps({"time": 0}))
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(gs.InputError, match="pip install torch"):
-        gs.read(path)
+        read_table(path)
 
     class Torch:
         __version__ = "2.5.1"
@@ -368,10 +368,10 @@ def test_pace_is_read_with_weights_only(tmp_path: Path, monkeypatch: pytest.Monk
 
     monkeypatch.setitem(sys.modules, "torch", Torch)
     with pytest.raises(gs.InputError, match="too old"):
-        gs.read(path)
+        read_table(path)
     Torch.__version__ = "2.6.0+cpu"
     with pytest.raises(gs.InputError, match="not a readable PACE recording"):
-        gs.read(path)
+        read_table(path)
 
 
 def test_what_a_source_says_is_checked(tmp_path: Path) -> None:
@@ -515,7 +515,7 @@ def test_a_missing_library_names_its_cure(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "run.parquet").write_bytes(b"PAR1")
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(gs.InputError, match=r"pip install 'gapscope\[parquet\]'"):
-        gs.read(tmp_path / "run.parquet")
+        read_table(tmp_path / "run.parquet")
 
 
 def test_time_is_found_or_asked_for(tmp_path: Path) -> None:

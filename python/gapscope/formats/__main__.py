@@ -1,6 +1,7 @@
-"""The converter that the program starts: gapscope-convert FILE --out TABLE.npz --options JSON.
+"""The converter, a process of its own: gapscope-convert FILE --out TABLE.npz --options JSON.
 
-What is refused: status 2, and five lines on stdout: what, where, actual, allowed, cure.
+The program starts it, and so does this package: libraries of formats may crash on a stranger's bytes. What is refused:
+status 2, and five lines on stdout: what, where, actual, allowed, cure.
 """
 
 from __future__ import annotations
@@ -10,20 +11,20 @@ import json
 import os
 import resource
 import sys
+from pathlib import Path
 
 from gapscope._errors import InputError
 from gapscope._log import Log
-from gapscope.formats import Source, read_table
+from gapscope.formats import Source, read_table, read_tables
 
-_MOST_BYTES = 16 << 30  # of memory, and never more than the machine has: a small file can claim or unpack to more
+_MOST_BYTES = 16 << 30  # of memory and of a file, and never more memory than the machine has: small files unpack to more
 
 
-def _limit_memory() -> None:
-    most = min(_MOST_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+def _limit(what: int, most: int) -> None:
+    soft, hard = resource.getrlimit(what)
     for limit in (soft, hard):
         most = most if limit == resource.RLIM_INFINITY else min(most, limit)
-    resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+    resource.setrlimit(what, (most, hard))
 
 
 def _options(text: str) -> object:
@@ -37,13 +38,19 @@ def main() -> int:
     """The status: 0, or 2 where the file is refused."""
     parser = argparse.ArgumentParser(prog="gapscope-convert", description="A log of another tool as one NPZ table.")
     parser.add_argument("file", help="MAT, HDF5, Parquet, Feather, ROS bag, MCAP, PACE, LeRobot dataset#EPISODE")
-    parser.add_argument("--out", required=True, help="the table, .npz")
+    parser.add_argument("--out", required=True, help="the table, .npz; with --all a folder")
+    parser.add_argument("--all", action="store_true", help="every recording of the file, 000000.npz and so on")
     parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable, time, joints (docs/formats.md)")
     given = parser.parse_args()
-    _limit_memory()
+    _limit(resource.RLIMIT_AS, min(_MOST_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))
+    _limit(resource.RLIMIT_FSIZE, _MOST_BYTES)
     try:
         source = Source.of(_options(given.options), "--options")
-        Log.of_table(read_table(given.file, source)).save(given.out)
+        if given.all:
+            for k, table in enumerate(read_tables(given.file, source)):
+                Log.of_table(table).save(Path(given.out) / f"{k:06d}.npz")
+        else:
+            Log.of_table(read_table(given.file, source)).save(given.out)
     except InputError as error:
         for text in (error.what, error.where, error.actual, error.allowed, error.cure):
             print(" ".join(str(text).split()))

@@ -12,9 +12,10 @@ def main() -> None:
         path = str(program())
     except InputError as error:
         sys.exit(f"gapscope: {error}")
-    beside = os.path.join(os.path.dirname(os.path.abspath(sys.argv[0])), "gapscope-convert")
-    if os.path.exists(beside):
-        os.environ.setdefault("GAPSCOPE_CONVERT", beside)
+    for neighbour in (sys.argv[0], sys.executable):
+        converter = os.path.join(os.path.dirname(os.path.abspath(neighbour)), "gapscope-convert")
+        if os.path.exists(converter):
+            os.environ.setdefault("GAPSCOPE_CONVERT", converter)
     os.execv(path, [path, *sys.argv[1:]])
 
 

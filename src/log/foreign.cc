@@ -138,6 +138,11 @@ Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, co
     GS_ASSIGN(const std::string refusal, ReadFile(said));
     return RefusedBy(refusal, path);
   }
+  if (status < 0)
+    return Error{.what = "a file on which the library of its format crashes",
+                 .where = path,
+                 .actual = "the converter was killed",
+                 .cure = "record it again"};
   if (status != 0)
     return Error{.what = "the converter failed", .where = path, .actual = fmt::format("{}: {}", converter, status)};
   GS_ASSIGN(const std::string bytes, ReadFile(table));

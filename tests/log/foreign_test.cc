@@ -80,6 +80,8 @@ TEST_F(ForeignTest, RefusalsAndFailuresAreErrors) {
   EXPECT_EQ(refused.error().where, "here, q");
   EXPECT_EQ(refused.error().cure, "split it");
   Install("kill -9 $$");
+  EXPECT_NE(MessageOf(path).find("crashes"), std::string::npos);
+  Install("exit 1");
   EXPECT_NE(MessageOf(path).find("the converter failed"), std::string::npos);
   Install("echo PK > \"$2\"");
   EXPECT_NE(MessageOf(path).find("NPZ"), std::string::npos);

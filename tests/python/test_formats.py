@@ -24,6 +24,11 @@ Q = np.sin(np.arange(ROWS) * 0.1)
 U = np.random.default_rng(3).normal(size=(ROWS, 2))
 
 
+def read(path: Path | str, **source: str | list[str]) -> gs.Log:
+    """As gs.read, but in this process: faster."""
+    return gs.Log.of_table(read_table(path, Source.of(source, "source")))
+
+
 def same(log: gs.Log, time: str = "time_s") -> None:
     """To the last bit."""
     assert np.array_equal(log[time], TIME)
@@ -49,9 +54,9 @@ def test_simulink_and_quarc(tmp_path: Path) -> None:
     path = tmp_path / "scope.mat"
     signals = np.array([({"values": Q, "label": "q"}), ({"values": U, "label": "u"})], dtype=object)
     io.savemat(path, {"out": {"time": TIME, "signals": signals}})
-    same(gs.read(path), time="time")
+    same(read(path), time="time")
     io.savemat(path, {"data": np.vstack([TIME, Q, U.T])})  # To Host File: a column for each sample
-    log = gs.read(path)
+    log = read(path)
     assert np.array_equal(log["time_s"], TIME) and np.array_equal(log["data[0]"], Q)
 
 
@@ -64,18 +69,18 @@ def test_mat_73_and_hdf5(tmp_path: Path) -> None:
     raw = bytearray(path.read_bytes())
     raw[:124] = b"MATLAB 7.3 MAT-file".ljust(124)
     path.write_bytes(bytes(raw))
-    same(gs.read(path))
+    same(read(path))
     path = tmp_path / "run.h5"
     with h5py.File(path, "w") as file:
         group = file.create_group("run")
         group["time_s"], group["q"], group["u"] = TIME, Q, U
         file["short"] = Q[:7]
-    log = gs.read(path)
+    log = read(path)
     assert np.array_equal(log["run/time_s"], TIME) and np.array_equal(log["run/u[1]"], U[:, 1])
     assert "short" not in log.columns and any("short" in finding for finding in log.findings)
-    same(gs.read(path, variable="run"))
+    same(read(path, variable="run"))
     with pytest.raises(gs.InputError, match="'walk'.*run"):
-        gs.read(path, variable="walk")
+        read(path, variable="walk")
 
 
 def test_parquet_and_feather(tmp_path: Path) -> None:
@@ -87,12 +92,14 @@ def test_parquet_and_feather(tmp_path: Path) -> None:
     parquet.write_table(table, tmp_path / "run.parquet")
     feather.write_feather(table, str(tmp_path / "run.feather"))
     for path in (tmp_path / "run.parquet", tmp_path / "run.feather"):
-        log = gs.read(path)
+        log = read(path)
         same(log)
         assert "name" not in log.columns and log["on"][0] == 1
-    table = pa.table({"stamp": (TIME * 1e9).astype("datetime64[ns]"), "q": [None, *Q[1:]]})
+    stamps = (TIME * 1e9).astype("datetime64[ns]")
+    table = pa.table({"stamp": pa.array(stamps, mask=np.arange(ROWS) == 7), "q": [None, *Q[1:]]})
     parquet.write_table(table, tmp_path / "run.parquet")
-    log = gs.read(tmp_path / "run.parquet")
+    log = read(tmp_path / "run.parquet")
+    assert np.flatnonzero(np.isnan(log["stamp"])).tolist() == [7]
     assert log["stamp"][0] == 0 and log["stamp"][1] == pytest.approx(0.005) and np.isnan(log["q"][0])
 
 
@@ -120,13 +127,13 @@ def test_lerobot(tmp_path: Path, version: str) -> None:
             parquet.write_table(episode(k), folder / f"episode_{k:06d}.parquet")
     logs = gs.read_all(tmp_path)
     assert [log.name for log in logs] == [f"{tmp_path.name}#0", f"{tmp_path.name}#1"]
-    assert np.array_equal(gs.read(f"{tmp_path}#1")["action/lift"], (U[:, 1].astype(np.float32) + 1).astype(float))
+    assert np.array_equal(read(f"{tmp_path}#1")["action/lift"], (U[:, 1].astype(np.float32) + 1).astype(float))
     assert logs[0].clock["action/pan"] == "synthetic" and "not measured" in logs[0].findings[0]
     assert len(gs.read_all(f"{tmp_path}#0:1")) == 1
     with pytest.raises(gs.InputError, match="no such episode.*#7"):
-        gs.read(f"{tmp_path}#7")
+        read(f"{tmp_path}#7")
     with pytest.raises(gs.InputError, match="several recordings"):
-        gs.read(tmp_path)
+        read(tmp_path)
 
 
 def write_bag(path: Path, storage: str) -> None:
@@ -166,7 +173,7 @@ def test_ros2_bag(tmp_path: Path, storage: str) -> None:
     write_bag(bag, storage)
     inner = next(file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
     for path in (bag, inner) if storage == "mcap" else (bag,):
-        log = gs.read(path)
+        log = read(path)
         there = np.isfinite(log["/joint_states/arm/position"])
         assert np.array_equal(log["/joint_states/arm/position"][there], Q)
         assert np.array_equal(log["/joint_states/elbow/position"][there], 2 * Q)
@@ -175,10 +182,10 @@ def test_ros2_bag(tmp_path: Path, storage: str) -> None:
         assert log["time_s"][sent][1] == pytest.approx(0.011, abs=1e-9)
         assert log.clock["/commands/data[0]"] == "receive" and log.clock["/joint_states/arm/position"] == "header"
         assert "mixed clocks" in log.findings[0]
-    only = gs.read(bag, topics=["/joint_states"])
+    only = read(bag, topics=["/joint_states"])
     assert set(only.columns) == {"time_s", "/joint_states/arm/position", "/joint_states/elbow/position"}
     with pytest.raises(gs.InputError, match="/states.*/joint_states"):
-        gs.read(bag, topics=["/states"])
+        read(bag, topics=["/states"])
 
 
 def write_ros1_bag(path: Path) -> None:
@@ -197,7 +204,7 @@ def test_ros1_bag(tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
     path = tmp_path / "run.bag"
     write_ros1_bag(path)
-    log = gs.read(path)
+    log = read(path)
     assert np.array_equal(log["/q/data"], Q) and log["time_s"][-1] == pytest.approx(0.995)
 
 
@@ -261,7 +268,7 @@ def test_mcap_of_protobuf(tmp_path: Path) -> None:
             message = kind(q=Q[k], u=U[k], note="text", at={"x": k} if k % 2 else None)
             message.timestamp.FromNanoseconds(10**12 + k * 5_000_000)
             writer.write_message("/drive", message, log_time=10**12 + k * 5_000_000 + 700)
-    log = gs.read(tmp_path / "run.mcap")
+    log = read(tmp_path / "run.mcap")
     assert np.array_equal(log["/drive/q"], Q) and np.array_equal(log["/drive/u[1]"], U[:, 1])
     assert log.clock["/drive/q"] == "header" and np.array_equal(log["/drive/at/x"][1::2], np.arange(1, ROWS, 2))
     assert np.isnan(log["/drive/at/x"][::2]).all() and log["time_s"][1] == pytest.approx(0.005, abs=1e-12)
@@ -280,7 +287,7 @@ def test_names_are_those_of_plotjuggler(tmp_path: Path) -> None:
         ("/lowstate", 4, {"motor_state": [{"q": 0.1}, {"q": 0.2}]}),
     ]
     write_mcap_json(tmp_path / "run.mcap", messages)
-    log = gs.read(tmp_path / "run.mcap")
+    log = read(tmp_path / "run.mcap")
     held = {name: float(log[name][np.isfinite(log[name])][0]) for name in log.columns}
     expected = {
         "/ctrl/elbow/reference/positions": 2,
@@ -300,12 +307,12 @@ def test_goals_are_no_commands(tmp_path: Path) -> None:
     messages = [("/goal", 10**9 * k, {"joint_names": ["arm"], "points": points}) for k in range(3)]
     path = tmp_path / "run.mcap"
     write_mcap_json(path, [*messages, *(("/q", 10**9 * k, {"x": k}) for k in range(3))])
-    log = gs.read(path)
+    log = read(path)
     assert log.columns == ("time_s", "/q/x") and "goals of several points: /goal" in log.findings[0]
     with pytest.raises(gs.InputError, match="goals of several points.*record the controller's state"):
-        gs.read(path, topics=["/goal"])
+        read(path, topics=["/goal"])
     write_mcap_json(path, [(t, ns, {**m, "points": points[1:]}) for t, ns, m in messages])
-    assert np.array_equal(gs.read(path)["/goal/arm/positions"], [1, 1, 1])
+    assert np.array_equal(read(path)["/goal/arm/positions"], [1, 1, 1])
 
 
 def test_stamps_of_several_rates(tmp_path: Path) -> None:
@@ -314,14 +321,14 @@ def test_stamps_of_several_rates(tmp_path: Path) -> None:
     a = [("/a", k * 1_000_000, {"x": k}) for k in range(10)]
     b = [("/b", k * 1_000_000 + 15_000 * (k % 3), {"y": k}) for k in range(10)]
     write_mcap_json(tmp_path / "run.mcap", a + b)
-    log = gs.read(tmp_path / "run.mcap")
+    log = read(tmp_path / "run.mcap")
     assert len(log["time_s"]) == 13 and np.isfinite(log["/a/x"]).sum() == np.isfinite(log["/b/y"]).sum() == 10
     write_mcap_json(tmp_path / "run.mcap", a + [("/b", 5_000 * k, {"y": k}) for k in range(10)])
-    log = gs.read(tmp_path / "run.mcap")
+    log = read(tmp_path / "run.mcap")
     assert np.array_equal(log["time_s"][:3], [0, 25e-6, 1e-3]) and np.array_equal(log["/b/y"][:2], [4, 9])
     assert "8 messages of /b share their stamp" in log.findings[0]
     write_mcap_json(tmp_path / "run.mcap", [("/b", 5_000 * k, {"y": k}) for k in range(10)])
-    assert np.array_equal(gs.read(tmp_path / "run.mcap")["/b/y"], np.arange(10))
+    assert np.array_equal(read(tmp_path / "run.mcap")["/b/y"], np.arange(10))
 
 
 def test_definitions_that_a_bag_lacks(tmp_path: Path) -> None:
@@ -342,13 +349,13 @@ def test_definitions_that_a_bag_lacks(tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(database)) as connection, connection:
         connection.execute("DELETE FROM message_definitions")
     with pytest.raises(gs.InputError, match="rig/msg/Drive.*msgs: FOLDER"):
-        gs.read(tmp_path / "bag")
+        read(tmp_path / "bag")
     with pytest.raises(gs.InputError, match="without .msg files"):
-        gs.read(tmp_path / "bag", msgs=str(tmp_path / "bag"))
+        read(tmp_path / "bag", msgs=str(tmp_path / "bag"))
     folder = tmp_path / "src" / "rig" / "msg"
     folder.mkdir(parents=True)
     (folder / "Drive.msg").write_text(text)
-    assert np.array_equal(gs.read(tmp_path / "bag", msgs=str(tmp_path / "src"))["/drive/q"], Q)
+    assert np.array_equal(read(tmp_path / "bag", msgs=str(tmp_path / "src"))["/drive/q"], Q)
 
 
 def test_pace_is_read_with_weights_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -398,8 +405,19 @@ def test_images_stay_unread(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["time_s"], file["q"] = TIME, Q
         file.create_dataset("image", (ROWS, 480, 640, 3), "u1", chunks=(1, 480, 640, 3))
-    log = gs.read(tmp_path / "run.h5")
+    log = read(tmp_path / "run.h5")
     assert log.columns == ("q", "time_s") and "image" in log.findings[0]
+
+
+def test_what_the_program_reads_itself(tmp_path: Path) -> None:
+    """A SAGE folder, whose two files have stamps of their own, and a CSV: their columns through the program."""
+    (tmp_path / "joint_list.txt").write_text("hip\nknee\n")
+    (tmp_path / "state_motor.csv").write_text('time,positions\n0,"[1, 2]"\n1,"[3, 4]"\n2,"[5, 6]"\n')
+    (tmp_path / "control.csv").write_text('time,positions\n0.5,"[7, 8]"\n1.5,"[9, 10]"\n')
+    log = gs.read(tmp_path)
+    assert log.columns == ("time", "positions/hip", "positions/knee", "control/positions/hip", "control/positions/knee")
+    assert np.array_equal(log["control/positions/knee"], [np.nan, 8, 10], equal_nan=True)
+    assert gs.Log(log.save(tmp_path / "run.npz"))["positions/hip"].tolist() == [1, 3, 5]
 
 
 def test_two_rates_replay_as_the_csv_does(experiment: str, demo: str, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from gapscope._errors import InputError
 from gapscope._log import Log
 from gapscope.formats import Source, read_table, read_tables
 
-_MOST_BYTES = 16 << 30  # of memory and of a file, and never more memory than the machine has: small files unpack to more
+_MOST_BYTES = 16 << 30  # of memory, and no more than the machine has, and of a file: a small one may unpack to more
 
 
 def _limit(what: int, most: int) -> None:
@@ -51,7 +51,10 @@ def main() -> int:
                 Log.of_table(table).save(Path(given.out) / f"{k:06d}.npz")
         else:
             Log.of_table(read_table(given.file, source)).save(given.out)
-    except InputError as error:
+    except (InputError, MemoryError) as failure:
+        error = InputError("not enough memory for this log", given.file, cure="take a part of it")
+        if isinstance(failure, InputError):
+            error = failure
         for text in (error.what, error.where, error.actual, error.allowed, error.cure):
             print(" ".join(str(text).split()))
         return 2

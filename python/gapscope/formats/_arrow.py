@@ -72,7 +72,9 @@ def columns_of(path: Path, table: Any, labels: dict[str, Sequence[str]] | None =
         kind = column.type
         if types.is_timestamp(kind):
             stamps = column.cast("timestamp[ns]").to_numpy().astype("datetime64[ns]")
-            arrays[name] = (stamps - stamps[0]).astype(np.int64) * 1e-9
+            there = ~np.isnat(stamps)
+            arrays[name] = np.full(len(stamps), np.nan)
+            arrays[name][there] = (stamps[there] - stamps[there][:1]).astype(np.int64) * 1e-9
         elif hasattr(kind, "value_type"):
             arrays.update(_of_lists(path, name, column, (labels or {}).get(name)))
         else:
@@ -94,7 +96,9 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
     arrays = columns_of(path, table)
     if not arrays:
         raise InputError("a table without numbers", str(path), ", ".join(skipped), "columns of numbers")
-    return (of_arrays(path, arrays, find_time(path, arrays, source.time), skipped),)
+    dates = library("pyarrow", "Arrow tables", _EXTRA).types.is_timestamp
+    units = {one.name: "s" for one in table.schema if dates(one.type)}
+    return (of_arrays(path, arrays, find_time(path, arrays, source.time), skipped, units=units),)
 
 
 FORMAT = Format("Parquet or Feather file", _EXTRA, _knows, _read)

@@ -77,7 +77,8 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
             columns = {name: values[rows] for name, values in arrays.items() if name not in _BOOKKEEPING}
             clock = {name: "synthetic" for name in columns}
             name = f"{path.resolve().name}#{episode}"
-            tables[episode] = Table(columns, "timestamp", name=name, findings=(_STAMPS,), clock=clock)
+            units = {"timestamp": "s"}
+            tables[episode] = Table(columns, "timestamp", name, units=units, findings=(_STAMPS,), clock=clock)
     if not tables:
         raise InputError("no such episode", str(path), f"#{source.episodes}" if source.episodes else "no data files")
     return tuple(tables[episode] for episode in sorted(tables))

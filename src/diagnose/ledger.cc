@@ -32,6 +32,16 @@ GiveUp TooSlow(double known, int iterations) {
   };
 }
 
+// In all Jacobians.
+double NumbersIn(const std::deque<Candidate*>& candidates) {
+  double numbers = 0;
+  for (const Candidate* candidate : candidates) {
+    if (!candidate->derivatives) continue;
+    for (const auto& jacobian : candidate->derivatives->jacobians) numbers += static_cast<double>(jacobian.size());
+  }
+  return numbers;
+}
+
 bool IsPart(const EffectSet& small, const EffectSet& large) {
   return small.size() < large.size() && std::includes(large.begin(), large.end(), small.begin(), small.end());
 }
@@ -105,9 +115,15 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
 void Ledger::Remember(Candidate* candidate) {
   std::erase(remembered_, candidate);
   remembered_.push_back(candidate);
-  if (remembered_.size() <= kDiagnosePolicy.search.jacobians) return;
-  remembered_.front()->derivatives.reset();
-  remembered_.pop_front();
+  const auto forget = [&](auto at) {
+    (*at)->derivatives.reset();
+    remembered_.erase(at);
+  };
+  if (remembered_.size() > kDiagnosePolicy.search.jacobians) forget(remembered_.begin());
+  // The first one is the base model's, which most sets begin with.
+  constexpr std::size_t kLeast = 3;
+  while (remembered_.size() > kLeast && NumbersIn(remembered_) > kDiagnosePolicy.search.jacobian_numbers)
+    forget(std::next(remembered_.begin()));
 }
 
 Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std::map<std::string, double>& values,

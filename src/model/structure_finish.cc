@@ -164,6 +164,7 @@ std::vector<mjsActuator*> Structure::ActuatorsOn(const std::string& joint) const
   std::vector<mjsActuator*> found;
   for (mjsElement* e = mjs_firstElement(spec.get(), mjOBJ_ACTUATOR); e; e = mjs_nextElement(spec.get(), e)) {
     mjsActuator* actuator = mjs_asActuator(e);
+    if (actuator->gaintype == mjGAIN_DCMOTOR && actuator->ctrlspec == mjINPUT_NONE) continue;  // no drive
     if (actuator->trntype == mjTRN_JOINT && mjs_getString(actuator->target) == joint) found.push_back(actuator);
   }
   return found;

@@ -215,6 +215,7 @@ ordered_json JsonSearchPolicy() {
           {"search.tie_share", policy.search.tie_share},
           {"search.simpler", policy.search.simpler},
           {"search.jacobians", policy.search.jacobians},
+          {"search.jacobian_numbers", policy.search.jacobian_numbers},
           {"search.least_replays", policy.search.least_replays},
           {"search.replays", policy.search.replays},
           {"search.until_grown", policy.search.until_grown},

@@ -41,7 +41,7 @@ std::string ToTable(const ExportRun& run) {
   constexpr double kMuch = 0.1;
   std::string text;
   if (const double lost = run.errors.Lost(); lost > kMuch)
-    text += fmt::format("{:.0f} % of what the model closes is open again in {}\n", 100 * lost, run.out);
+    text += fmt::format("{:.0f} % of what the model closes is open again in {}\n", 100 * std::min(lost, 1.0), run.out);
   text += fmt::format("{}: {} for {}, steps of {:.4g} ms\n", run.out, run.result, run.what, 1e3 * run.time_step_s);
   for (const NativeEffect& effect : run.effects)
     text += fmt::format("  {:<36} {:<13} {}\n", effect.use.Text(), FidelityName(effect.fidelity), effect.how);

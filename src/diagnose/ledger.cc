@@ -115,7 +115,7 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
 void Ledger::Remember(Candidate* candidate) {
   std::erase(remembered_, candidate);
   remembered_.push_back(candidate);
-  const auto forget = [&](auto at) {
+  const auto forget = [&](const auto& at) {
     (*at)->derivatives.reset();
     remembered_.erase(at);
   };

@@ -51,6 +51,7 @@ std::vector<Finding> Rates(const Log& log, const Timeline& timeline) {
     columns[rate + (column.clock.empty() ? "" : ", " + column.clock + " stamps")].push_back(column.name);
   }
   std::vector<Finding> findings;
+  findings.reserve(columns.size());
   for (const auto& [rate, names] : columns)
     findings.push_back({"rate", "", names.size(), 0, fmt::format("{}: {}", rate, fmt::join(names, ", "))});
   return findings;

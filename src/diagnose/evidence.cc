@@ -79,7 +79,7 @@ void Evidence::Choose(Candidate* candidate) {
 // Only chosen sets are fitted to the end.
 void Evidence::Compare(Candidate* candidate) {
   if (candidate->converged || !compared_.insert(candidate).second) return;
-  found_.ledger.Continue(candidate, Effort::kFinish, FarBehind(*found_.chosen));
+  found_.ledger.Continue(candidate, Effort::kTry, FarBehind(*found_.chosen));
 }
 
 void Evidence::SetCharacter(const std::vector<EffectUse>& uses, StatementNumbers* numbers) const {

@@ -204,7 +204,7 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
   mjData* d = data_.get();
   const Recording& logged = recording.finer ? *recording.finer : recording;
   const double stamp = recording.time_s[row] + recording.start_s - logged.start_s;
-  const std::size_t at = RowAt(logged.time_s, stamp);
+  const std::size_t at = recording.finer ? RowAt(logged.time_s, stamp) : row;
   const double from = logged.time_s[at > 0 ? at - 1 : 0] + stamps_.forces_s, to = stamp + stamps_.forces_s;
   for (std::size_t c = 0; c < delays_s_.size(); ++c) {
     std::size_t near = at;

@@ -186,6 +186,12 @@ class Run(_Open):
         """The page report.html; the last expression of a notebook's cell shows it."""
         return Report(self.out / "report.html", self._keep)
 
+    def _go_on(self, command: str, *words: str, **options: object) -> dict[str, Any]:
+        """What a command on this result's folder prints with --json; options that are None are not given."""
+        given = [word for name, value in options.items() if value is not None for word in (f"--{name}", str(value))]
+        answer = run([command, str(self.out), *words, *given, "--json"])
+        return typing.cast(dict[str, Any], json.loads(answer.stdout))
+
     @property
     def json(self) -> dict[str, Any]:
         """The result as the program wrote it."""
@@ -233,16 +239,11 @@ class _WithModel(Run):
 
         ``timestep``, s: of the written MJCF. ``experiment``: where its file has moved since.
         """
-        command = ["export", str(self.out), "--to", target, "--out", os.fspath(out), "--json"]
-        command += [] if timestep is None else ["--timestep", repr(float(timestep))]
-        command += [] if experiment is None else ["--experiment", experiment]
-        return from_json(Exported, json.loads(run(command).stdout))
+        return from_json(Exported, self._go_on("export", to=target, out=out, timestep=timestep, experiment=experiment))
 
     def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> dict[str, Any]:
         """Writes the result into the text of the experiment's own MJCF (docs/apply.md); what changed there."""
-        command = ["apply", str(self.out), "--out", os.fspath(out), "--json"]
-        command += [] if experiment is None else ["--experiment", experiment]
-        return typing.cast(dict[str, Any], json.loads(run(command).stdout))
+        return self._go_on("apply", out=out, experiment=experiment)
 
     @property
     def model(self) -> Model:
@@ -414,7 +415,7 @@ class Diagnosis(_WithModel):
 
     def explain(self, statement: str) -> dict[str, Any]:
         """The evidence of one statement ("coulomb_friction@arm") in full: terms, blocks of time, rivals."""
-        return typing.cast(dict[str, Any], json.loads(run(["explain", str(self.out), statement, "--json"]).stdout))
+        return self._go_on("explain", statement)
 
     def _repr_html_(self) -> str:
         return _html.diagnosis(self)

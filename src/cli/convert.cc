@@ -9,7 +9,6 @@
 #include "src/cli/session.h"
 #include "src/log/log.h"
 #include "src/log/npz_writer.h"
-#include "src/report/write_run.h"
 
 namespace gapscope::cli {
 namespace {

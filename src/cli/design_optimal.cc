@@ -87,7 +87,7 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
                  .where = "--separate",
                  .cure = "add a second --separate EFFECT@ON, or --separate none"};
   GS_ASSIGN(const DesignRig rig, LoadRig(flags.rig));
-  ThreadPool pool(flags.rig.common.jobs > 0 ? flags.rig.common.jobs : DefaultWorkers());
+  ThreadPool pool(WorkersOf(flags.rig.common));
   const OptimalOptions options{.rehearsal = rig.rehearsal,
                                .duration_s = flags.rig.duration_s,
                                .margin = flags.rig.margin,

@@ -186,7 +186,7 @@ Result<int> RunDiagnose(const DiagnoseFlags& flags) {
   if (flags.resume && flags.common.out.empty())
     return Error{
         .what = "nothing to resume from", .where = "--resume", .cure = "name the interrupted run's folder with --out"};
-  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+  ThreadPool pool(WorkersOf(flags.common));
   GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));

@@ -21,7 +21,7 @@ struct ExplainFlags {
 
 // The page draws the held-out logs' windows by the model with the effect and by the one without it.
 Status WriteExplanation(const ExplainFlags& flags, const EarlierDiagnosis& earlier, const ExplainRun& run) {
-  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+  ThreadPool pool(WorkersOf(flags.common));
   GS_ASSIGN(Experiment experiment, LoadExperiment(earlier.model.experiment));
   experiment.replay.while_column = earlier.while_column;
   experiment.replay.mode = ReplayMode::kWindows;

@@ -10,7 +10,6 @@
 #include "src/export/target.h"
 #include "src/report/export_report.h"
 #include "src/report/read_run.h"
-#include "src/report/write_run.h"
 
 namespace gapscope::cli {
 namespace {
@@ -29,7 +28,6 @@ std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json) {
     if (!logs.is_array()) return;
     for (const auto& log : logs) {
       if (log.is_string()) paths.push_back(log.get<std::string>());
-      if (log.is_object() && log.contains("path")) paths.push_back(log["path"].get<std::string>());
       if (log.is_object() && log.contains("log")) paths.push_back(log["log"].get<std::string>());
     }
   };
@@ -80,7 +78,7 @@ Result<int> RunExport(const ExportFlags& flags) {
                 .left_out = exported.left_out,
                 .logs = JudgedBy(json)};
   GS_RETURN_IF_ERROR(WriteFile(run.out, xml));
-  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
+  ThreadPool pool(WorkersOf(flags.common));
   GS_RETURN_IF_ERROR(Measure(model, loaded.values, &run, pool));
   const std::string text = ToJson(run).dump(2) + "\n";
   GS_RETURN_IF_ERROR(WriteFile((std::filesystem::path(flags.common.out) / "fidelity.json").string(), text));

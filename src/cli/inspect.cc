@@ -78,7 +78,8 @@ Result<InspectReport> InspectAlone(const std::string& path) {
   return report;
 }
 
-Result<InspectRun> InspectBound(const InspectFlags& flags, ThreadPool& pool) {
+Result<InspectRun> InspectBound(const InspectFlags& flags) {
+  ThreadPool pool(WorkersOf(flags.common));
   GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
   GS_ASSIGN(const auto recordings, LoadRecordings(experiment, flags.model.logs, pool));
@@ -101,13 +102,12 @@ Result<InspectRun> InspectUnbound(const std::vector<std::string>& logs) {
 bool IsExperiment(const std::string& path) { return path.ends_with(".yaml") || path.ends_with(".yml"); }
 
 Result<int> RunInspect(const InspectFlags& flags) {
-  ThreadPool pool(flags.common.jobs > 0 ? flags.common.jobs : DefaultWorkers());
   std::vector<std::string> all = {flags.model.experiment};
   all.insert(all.end(), flags.model.logs.begin(), flags.model.logs.end());
   const bool bound = IsExperiment(flags.model.experiment);
   if (bound && flags.model.logs.empty())
     return Error{.what = "no log", .where = flags.model.experiment, .cure = "name the logs behind the experiment"};
-  GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags, pool) : InspectUnbound(all));
+  GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags) : InspectUnbound(all));
   const nlohmann::ordered_json json = ToJson(run);
   if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteRun(flags.common.out, json));
   fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));

@@ -184,9 +184,11 @@ Status OverrideValues(const Model& model, const std::vector<std::string>& params
   return Ok();
 }
 
+int WorkersOf(const CommonFlags& flags) { return flags.jobs > 0 ? flags.jobs : DefaultWorkers(); }
+
 Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) {
   Session session;
-  session.pool = std::make_unique<ThreadPool>(common.jobs > 0 ? common.jobs : DefaultWorkers());
+  session.pool = std::make_unique<ThreadPool>(WorkersOf(common));
   GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));
   if (!flags.while_column.empty()) session.experiment.replay.while_column = flags.while_column;
   GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));

@@ -28,6 +28,9 @@ struct CommonFlags {
   std::string out;
 };
 
+// As --jobs says; without it one a processor.
+int WorkersOf(const CommonFlags& flags);
+
 // --json, --quiet and --progress.
 std::vector<Option> PrintOptions(CommonFlags& flags);
 // Those, --jobs and --seed.

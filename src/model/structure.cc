@@ -40,14 +40,14 @@ Status Structure::AddMotorTerm(const std::string& actuator, const std::string& k
   const std::string joint = rig_.JointOf(actuator);
   if (joint.empty()) return NoSuch("the model has no such actuator on a joint", actuator, rig_.Actuators(), "");
   AddTerm(plugins::kMotorSpecs, &motor_[joint], key, expression);
-  Enter("motor", joint, key);
+  Enter(kMotorTerms, joint, key);
   return Ok();
 }
 
 Status Structure::AddFrictionTerm(const std::string& joint, const std::string& key, const std::string& expression) {
   if (!FindJoint(joint)) return NoSuch("the model has no such joint", joint, rig_.Joints(), "");
   AddTerm(plugins::Friction::kSpecs, &friction_[joint], key, expression);
-  Enter("friction", joint, key);
+  Enter(kFrictionTerms, joint, key);
   return Ok();
 }
 
@@ -61,7 +61,7 @@ Status Structure::AddSpringTerm(const std::string& joint, const std::string& key
                  .cure = "drop one of them"};
   }
   AddTerm(plugins::Spring::kSpecs, &spring_[joint], key, expression);
-  Enter("spring", joint, key);
+  Enter(kSpringTerms, joint, key);
   return Ok();
 }
 

@@ -107,8 +107,12 @@ class Structure {
   Status FinishFriction(const std::string& name, Terms terms);
   void FinishSpring(const std::string& joint, const Terms& terms);
   void FinishOwnTorque(const OwnTorque& torque);
-  // The same without plugins.
+  // The same without plugins. Groups of terms, by which Enter and Tell know them:
+  static constexpr const char *kMotorTerms = "motor", *kFrictionTerms = "friction", *kSpringTerms = "spring";
   Status FinishNative();
+  // A term's number (0: there is no such term), and a field's as the experiment sets it, else the MJCF's own.
+  double ValueIn(const Terms& terms, const std::string& key) const;
+  double ValueOf(const std::string& field, double own) const;
   void Enter(const std::string& group, const std::string& place, const std::string& key);
   void Tell(const std::string& group, const std::string& place, const std::string& key, Fidelity fidelity,
             const std::string& how);

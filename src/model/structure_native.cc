@@ -12,13 +12,9 @@
 namespace gapscope {
 namespace {
 
-constexpr char kMotor[] = "motor", kFriction[] = "friction", kSpring[] = "spring";
-
-// `field` of a joint, by the settings or by the MJCF itself.
-double ValueOf(const std::vector<FieldSetting>& settings, const std::string& field, double own,
-               const std::function<double(const std::string&)>& value_of) {
-  const auto set = std::find_if(settings.begin(), settings.end(), [&](const auto& s) { return s.field == field; });
-  return set == settings.end() ? own : value_of(set->expressions.front());
+bool FeedsBack(const std::vector<mjsActuator*>& inputs) {
+  return std::any_of(inputs.begin(), inputs.end(),
+                     [](const mjsActuator* input) { return input->biasprm[1] != 0 || input->biasprm[2] != 0; });
 }
 
 std::string Term(const std::string& group, const std::string& place, const std::string& key) {
@@ -41,6 +37,16 @@ std::string FidelityName(Fidelity fidelity) {
   return "";
 }
 
+double Structure::ValueIn(const Terms& terms, const std::string& key) const {
+  const auto term = terms.find(key);
+  return term == terms.end() ? 0 : value_of(term->second);
+}
+
+double Structure::ValueOf(const std::string& field, double own) const {
+  const auto set = std::find_if(settings.begin(), settings.end(), [&](const auto& s) { return s.field == field; });
+  return set == settings.end() ? own : value_of(set->expressions.front());
+}
+
 void Structure::Enter(const std::string& group, const std::string& place, const std::string& key) {
   if (entering) owners_[Term(group, place, key)].push_back(*entering);
 }
@@ -52,7 +58,9 @@ void Structure::Tell(const std::string& group, const std::string& place, const s
   for (const auto& [joint, motor] : motor_joint) {
     if (motor == place) entered = joint;
   }
-  for (const EffectUse& use : owners_[Term(group, entered, key)]) TellOf(use, fidelity, how);
+  const auto owners = owners_.find(Term(group, entered, key));
+  if (owners == owners_.end()) return;  // no effect has this term
+  for (const EffectUse& use : owners->second) TellOf(use, fidelity, how);
 }
 
 void Structure::TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how) {
@@ -104,9 +112,9 @@ bool Structure::AddPassive(const std::string& joint, double amplitude, double pe
 }
 
 void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
-  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto value = [&](const char* key) { return ValueIn(terms, key); };
   const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
-    if (terms.contains(key)) Tell(kSpring, joint, key, fidelity, how);
+    Tell(kSpringTerms, joint, key, fidelity, how);
   };
   const auto passive = [&](const char* key, double amplitude, double per_rad, double phase) {
     const bool done = AddPassive(joint, amplitude, per_rad, phase);
@@ -135,34 +143,32 @@ void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
 void Structure::NativeElastic(const std::string& joint, const Terms& terms) {
   const char* keys[] = {"stiffness_n_m_per_rad", "rest_rad", "cubic_n_m_per_rad3"};
   if (std::none_of(std::begin(keys), std::end(keys), [&](const char* key) { return terms.contains(key); })) return;
-  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto value = [&](const char* key) { return ValueIn(terms, key); };
   mjsJoint* element = FindJoint(joint);
   const std::string field = "joint/" + joint + "/";
-  const double own = ValueOf(settings, field + "stiffness", element->stiffness[0], value_of);
-  const double own_rest = ValueOf(settings, field + "springref", element->springref, value_of);
-  const double own_cubic = ValueOf(settings, field + "stiffness_cubic", element->stiffness[2], value_of);
+  const double own = ValueOf(field + "stiffness", element->stiffness[0]);
+  const double own_rest = ValueOf(field + "springref", element->springref);
+  const double own_cubic = ValueOf(field + "stiffness_cubic", element->stiffness[2]);
   const double added = value(keys[0]), rest = value(keys[1]), cubic = value(keys[2]);
   const double sum = own + added;
   const double common = sum != 0 ? (own * own_rest + added * rest) / sum : rest;
   const bool one_rest = own == 0 || std::abs(own_rest - rest) < 1e-12;
   Put(field + "stiffness", sum);
   Put(field + "springref", common);
-  for (const char* key : keys) {
-    if (terms.contains(key)) Tell(kSpring, joint, key, Fidelity::kExact, "the joint's own spring");
-  }
+  for (const char* key : keys) Tell(kSpringTerms, joint, key, Fidelity::kExact, "the joint's own spring");
   if (cubic == 0 && own_cubic == 0) return;
   const bool kept = features.polynomials && one_rest && (own_cubic == 0 || own_rest == rest);
   if (kept) Put(field + "stiffness_cubic", own_cubic + cubic);
   if (!kept && cubic != 0)
-    Tell(kSpring, joint, keys[2], added != 0 ? Fidelity::kApproximated : Fidelity::kDropped,
+    Tell(kSpringTerms, joint, keys[2], added != 0 ? Fidelity::kApproximated : Fidelity::kDropped,
          features.polynomials ? "without its cubic term: the joint's own spring rests elsewhere"
                               : "without its cubic term: springs are linear there");
 }
 
 Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
-  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto value = [&](const char* key) { return ValueIn(terms, key); };
   const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
-    if (terms.contains(key)) Tell(kFriction, joint, key, fidelity, how);
+    Tell(kFrictionTerms, joint, key, fidelity, how);
   };
   const std::string on = MotorSide(joint);
   const double positive = value("friction_positive_n_m"), negative = value("friction_negative_n_m");
@@ -178,7 +184,7 @@ Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
   tell("load_coefficient", Fidelity::kDropped, "friction in proportion to a load has no native form");
   if (terms.contains("quadratic_n_m_s2_per_rad2")) {
     const std::string field = "joint/" + on + "/damping_quadratic";
-    const double own = ValueOf(settings, field, FindJoint(on)->damping[1], value_of);
+    const double own = ValueOf(field, FindJoint(on)->damping[1]);
     if (features.polynomials) Put(field, own + value("quadratic_n_m_s2_per_rad2"));
     tell("quadratic_n_m_s2_per_rad2", features.polynomials ? Fidelity::kExact : Fidelity::kDropped,
          features.polynomials ? "the joint's own quadratic damping" : "damping is linear there");
@@ -192,23 +198,21 @@ void Structure::NativeDelay(const std::string& joint, const std::string& key, do
   if (delay_s <= 0) return;
   const std::string in_steps = fmt::format("{:.4g} ms, {:.3g} steps of {:.4g} ms", 1e3 * delay_s, steps, 1e3 * step_s);
   if (!features.delays || steps < 1) {
-    Tell(kMotor, joint, key, Fidelity::kHost,
+    Tell(kMotorTerms, joint, key, Fidelity::kHost,
          fmt::format("send commands {} later: {}", in_steps,
                      features.delays ? "less than a step is none" : "actuators have no delay there"));
     return;
   }
   const bool whole = std::abs(steps - std::round(steps)) < 1e-6;
-  bool feeds_back = false;
   for (mjsActuator* input : inputs) {
     input->delay += delay_s;
     input->nsample = std::max(input->nsample, static_cast<int>(std::ceil(input->delay / step_s - 1e-6)) + 1);
     input->interp = whole ? 0 : 1;
-    feeds_back = feeds_back || input->biasprm[1] != 0 || input->biasprm[2] != 0;
   }
-  const bool late_feedback = feeds_back && key == "torque_delay_s";
+  const bool late_feedback = FeedsBack(inputs) && key == "torque_delay_s";
   if (late_feedback) MakeFeedbackLate(joint, delay_s, inputs);
   const bool early = spec->option.integrator == mjINT_RK4;  // whose last stage is at the end of a step
-  Tell(kMotor, joint, key, late_feedback || early ? Fidelity::kApproximated : Fidelity::kExact,
+  Tell(kMotorTerms, joint, key, late_feedback || early ? Fidelity::kApproximated : Fidelity::kExact,
        "the actuator's own delay of " + in_steps + (early ? ", by RK4 up to a step less" : "") +
            (late_feedback ? "; that of its feedback by less damping and other inertia" : ""));
 }
@@ -220,11 +224,11 @@ void Structure::Put(const std::string& field, double number) {
 
 // kp q(t - D) + kv q'(t - D), to second order in D: kp q + (kv - kp D) q' + (kp D^2 / 2 - kv D) q''.
 void Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs) {
-  double inertia = ValueOf(settings, "joint/" + joint + "/armature", FindJoint(joint)->armature, value_of);
+  double inertia = ValueOf("joint/" + joint + "/armature", FindJoint(joint)->armature);
   for (const mjsActuator* input : inputs) {
     const std::string field = std::string("actuator/") + mjs_getString(mjs_getName(input->element)) + "/";
-    const double kp = ValueOf(settings, field + "kp", -input->biasprm[1], value_of);
-    const double kv = ValueOf(settings, field + "kv", -input->biasprm[2], value_of);
+    const double kp = ValueOf(field + "kp", -input->biasprm[1]);
+    const double kv = ValueOf(field + "kv", -input->biasprm[2]);
     if (kp == 0 && kv == 0) continue;
     Put(field + "kv", kv - kp * delay_s);
     inertia += 0.5 * kp * delay_s * delay_s - kv * delay_s;
@@ -233,14 +237,12 @@ void Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const
 }
 
 void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
-  const auto value = [&](const char* key) { return terms.contains(key) ? value_of(terms.at(key)) : 0.0; };
+  const auto value = [&](const char* key) { return ValueIn(terms, key); };
   const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
-    if (terms.contains(key)) Tell(kMotor, joint, key, fidelity, how);
+    Tell(kMotorTerms, joint, key, fidelity, how);
   };
   const std::vector<mjsActuator*> inputs = ActuatorsOn(joint);
-  const bool feeds_back = std::any_of(inputs.begin(), inputs.end(), [](const mjsActuator* input) {
-    return input->biasprm[1] != 0 || input->biasprm[2] != 0;
-  });
+  const bool feeds_back = FeedsBack(inputs);
   for (const char* key : {"command_delay_s", "torque_delay_s"}) NativeDelay(joint, key, value(key), inputs);
   if (const double limit = value("torque_limit_n_m"); limit > 0 && std::isfinite(limit)) {
     const double most = limit * (inputs.size() == 1 ? std::abs(inputs.front()->gear[0]) : 1);

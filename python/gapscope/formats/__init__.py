@@ -48,7 +48,7 @@ def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tupl
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        raise InputError(f"not a readable {form.name}", text, reason, cure="record it again") from None
+        raise InputError(f"not a readable {form.name}", text, reason, cure=form.cure) from None
     for table in tables:
         if len(table.columns) > MOST_COLUMNS:
             raise InputError("too many columns", text, str(len(table.columns)), f"at most {MOST_COLUMNS}")

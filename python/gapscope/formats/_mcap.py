@@ -10,7 +10,7 @@ from typing import Any
 
 from gapscope._errors import InputError
 from gapscope.formats import _ros
-from gapscope.formats._messages import Topics
+from gapscope.formats._messages import Topics, check_topics
 from gapscope.formats._table import Format, Source, Table, library
 
 _EXTRA = "mcap"
@@ -61,25 +61,16 @@ class _Decoders:
 def _read(path: Path, source: Source) -> tuple[Table, ...]:
     mcap = library("mcap.reader", "MCAP files", _EXTRA)
     topics, decoders = Topics(path), _Decoders(path)
-    try:
-        with path.open("rb") as file:
-            reader = mcap.make_reader(file, validate_crcs=True)
-            summary = reader.get_summary()
-            channels = list(summary.channels.values()) if summary else []
-            if channels and {channel.message_encoding for channel in channels} <= {"cdr", "ros1"}:
-                return _ros.FORMAT.read(path, source)
-            there = sorted({channel.topic for channel in channels})
-            if lost := [topic for topic in source.topics if topic not in there]:
-                raise InputError("no such topic", str(path), ", ".join(lost), ", ".join(there))
-            for schema, channel, message in reader.iter_messages(topics=list(source.topics) or None):
-                topics.add(channel.topic, message.log_time, decoders.decode(schema, channel, message.data))
-    except InputError:
-        raise
-    except Exception as error:
-        reason = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-        cure = "mcap recover FILE, if it was cut"
-        raise InputError("not a readable MCAP file", str(path), reason, cure=cure) from None
+    with path.open("rb") as file:
+        reader = mcap.make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        channels = list(summary.channels.values()) if summary else []
+        if channels and {channel.message_encoding for channel in channels} <= {"cdr", "ros1"}:
+            return _ros.FORMAT.read(path, source)
+        check_topics(path, (channel.topic for channel in channels), source.topics)
+        for schema, channel, message in reader.iter_messages(topics=list(source.topics) or None):
+            topics.add(channel.topic, message.log_time, decoders.decode(schema, channel, message.data))
     return (topics.table(source.topics),)
 
 
-FORMAT = Format("MCAP file", _EXTRA, _knows, _read)
+FORMAT = Format("MCAP file", _EXTRA, _knows, _read, cure="mcap recover FILE, if it was cut")

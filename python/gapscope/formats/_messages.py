@@ -21,6 +21,13 @@ _POINTS = ("positions", "velocities", "accelerations", "effort")
 _STATES = ("reference", "desired", "feedback", "actual", "output", "error")
 
 
+def check_topics(path: Path, there: Iterable[str], asked: Sequence[str]) -> None:
+    """Raises InputError: a topic that is asked for is not there."""
+    known = sorted(set(there))
+    if lost := [topic for topic in asked if topic not in known]:
+        raise InputError("no such topic", str(path), ", ".join(lost), ", ".join(known))
+
+
 class Topics:
     """The messages of a bag, as they come."""
 

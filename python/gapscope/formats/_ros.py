@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gapscope._errors import InputError
-from gapscope.formats._messages import Topics
+from gapscope.formats._messages import Topics, check_topics
 from gapscope.formats._table import MOST_VALUES, Format, Source, Table, library
 
 _EXTRA = "ros"
@@ -40,9 +40,7 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
         known.register(_definitions(Path(source.msgs)))
     topics = Topics(path)
     with highlevel.AnyReader([path], default_typestore=known) as reader:
-        there = sorted({connection.topic for connection in reader.connections})
-        if lost := [topic for topic in source.topics if topic not in there]:
-            raise InputError("no such topic", str(path), ", ".join(lost), ", ".join(there))
+        check_topics(path, (connection.topic for connection in reader.connections), source.topics)
         if reader.message_count > MOST_VALUES // 8:
             raise InputError("a bag too large", str(path), f"{reader.message_count} messages")
         wanted = [c for c in reader.connections if not source.topics or c.topic in source.topics]

@@ -89,6 +89,7 @@ class Format:
     extra: str  # of pip install 'gapscope[EXTRA]'
     knows: Callable[[Path], bool]
     read: Callable[[Path, Source], tuple[Table, ...]]
+    cure: str = "record it again"  # of a file that cannot be read
 
 
 def library(module: str, what: str, extra: str) -> Any:

@@ -176,6 +176,22 @@ void Ledger::Continue(Candidate* candidate, Effort effort, double reach) {
   Try(candidate, {.point = candidate->point, .cost = candidate->train_cost}, effort, reach);
 }
 
+void Ledger::LookAside(Candidate* candidate) {
+  constexpr double kAside = 1.25;
+  for (const EffectUse& use : candidate->effects) {
+    if (EffectOf(use, *bench_.rig).character != EffectCharacter::kSecondMass) continue;
+    const PlacedParameter size = PlacedParameters(use, *bench_.rig, bench_.scales).front();
+    const auto i = static_cast<std::size_t>(candidate->model->IndexOf(size.name));
+    for (const double factor : {kAside, 1 / kAside}) {
+      std::vector<double> values = candidate->values;
+      values[i] = std::clamp(factor * values[i], size.low, size.high);
+      FitPoint point = candidate->problem->At(values, candidate->point);
+      const double cost = CostAt(bench_, *candidate, point);
+      Try(candidate, {.point = std::move(point), .cost = cost}, Effort::kFinish);
+    }
+  }
+}
+
 void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort) {
   constexpr double kLeft = 0.05;  // of the size that another shape took over
   for (const EffectUse& use : candidate->effects) {

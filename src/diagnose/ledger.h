@@ -38,6 +38,8 @@ class Ledger {
   void Clear();
   // Fits on from where the set is: above `reach` only as fast as would lead below it.
   void Continue(Candidate* candidate, Effort effort, double reach = kInfinity);
+  // From where the size of each effect with a hidden mass is smaller or larger: blows leave kinks that a fit ends at.
+  void LookAside(Candidate* candidate);
 
  private:
   struct Start {

@@ -255,6 +255,7 @@ class Searcher {
   void Lead() {
     result_.chosen = Leaders().front();
     result_.ledger.Continue(result_.chosen, Effort::kFinish);
+    result_.ledger.LookAside(result_.chosen);
   }
 
   // The chosen set without a member, refitted from the leader's optimum, or an earlier fit that is better.

@@ -40,21 +40,29 @@ void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int pa
   }
 }
 
+// Over a long step the residuals bend: what only a ratio tells would seem to be known by itself. Over a short one they
+// are jagged where the motion has blows or sticks: what no fit can find would seem to be known to many digits.
+Uncertainty UncertaintyAt(const Candidate& candidate, double step, const Eigen::MatrixXd& beside) {
+  const Linearization at =
+      Linearize(*candidate.problem, candidate.point, {.step = step, .columns = DifferenceOptions::Columns::kCentral});
+  return EstimateUncertainty(*candidate.problem, candidate.point, at, beside);
+}
+
 }  // namespace
 
 std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate,
                                                                const Eigen::MatrixXd& beside) {
   std::map<EffectUse, std::vector<EffectEstimate>> sizes;
   if (candidate.effects.empty()) return sizes;
-  // A longer step bends: what only a ratio tells would seem to be known by itself.
-  const Linearization at = Linearize(*candidate.problem, candidate.point,
-                                     {.step = kFineStep, .columns = DifferenceOptions::Columns::kCentral});
-  const Uncertainty uncertainty = EstimateUncertainty(*candidate.problem, candidate.point, at, beside);
+  const Uncertainty uncertainty = UncertaintyAt(candidate, kFineStep, beside),
+                    over_kinks = UncertaintyAt(candidate, kCoarseStep, beside);
   for (const EffectUse& use : candidate.effects) {
     for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {
-      for (const auto& tuned : uncertainty.tuned) {
+      for (std::size_t i = 0; i < uncertainty.tuned.size(); ++i) {
+        const TunedParameter &tuned = uncertainty.tuned[i], &wider = over_kinks.tuned[i];
         if (candidate.model->parameters()[tuned.index].name != p.name) continue;
-        EffectEstimate size{p.key, p.unit, tuned.value, tuned.low, tuned.high};
+        EffectEstimate size{p.key, p.unit, tuned.value, std::min(tuned.low, wider.low),
+                            std::max(tuned.high, wider.high)};
         if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, tuned.index, &size);
         sizes[use].push_back(std::move(size));
       }

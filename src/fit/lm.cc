@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "src/fit/checkpoint.h"
+#include "src/fit/objective.h"
 #include "src/fit/policy.h"
 
 namespace gapscope {
@@ -39,7 +40,10 @@ class LmRun {
     *residuals = std::move(evaluation.residuals);
     return evaluation.cost;
   }
-  Eigen::VectorXd DampedStep(const Linearization& at, const FitPoint& point) const;
+  Eigen::VectorXd DampedStep(const Linearization& at, const FitPoint& point, double damping) const;
+  Eigen::VectorXd DampedStep(const Linearization& at, const FitPoint& point) const {
+    return DampedStep(at, point, s_.damping);
+  }
   FitPoint BentStep(const Derivatives& derivatives, const Linearization& at, const Eigen::VectorXd& step);
   double TryStep(const Derivatives& derivatives, const Linearization& at, const Eigen::VectorXd& step, FitPoint* trial,
                  Residuals* residuals);
@@ -50,6 +54,8 @@ class LmRun {
     s_.residuals = std::move(residuals);
     s_.damping = std::max(s_.damping * shrink, kLmPolicy.least_damping);
   }
+  bool IsKink(const Linearization& at) const;
+  bool FindOtherStates();
   void End(Termination termination) { s_.done = true, s_.termination = termination; }
 
   FitProblem& problem_;
@@ -62,11 +68,11 @@ double Promised(const Linearization& at, const Eigen::VectorXd& step) {
   return -at.gradient.dot(step) - 0.5 * step.dot(at.hessian * step);
 }
 
-Eigen::VectorXd LmRun::DampedStep(const Linearization& at, const FitPoint& point) const {
+Eigen::VectorXd LmRun::DampedStep(const Linearization& at, const FitPoint& point, double damping) const {
   if (point.y.size() == 0) return {};
   Eigen::MatrixXd hessian = at.hessian;
   hessian.diagonal() +=
-      s_.damping * at.hessian.diagonal().cwiseMax(1e-12 * std::max(at.hessian.diagonal().maxCoeff(), 1e-300));
+      damping * at.hessian.diagonal().cwiseMax(1e-12 * std::max(at.hessian.diagonal().maxCoeff(), 1e-300));
   return BoundedStep(hessian, at.gradient, point.y, problem_.layout().low, problem_.layout().high);
 }
 
@@ -125,6 +131,26 @@ double LmRun::TryStep(const Derivatives& derivatives, const Linearization& at, c
   return TakeBetterStates(problem_, *trial, *residuals, still, others);
 }
 
+// Where the linear model goes on promising what no step gains, some window's motion has a kink (contacts, dry
+// friction), and its state may stand on the wrong side.
+bool LmRun::IsKink(const Linearization& at) const {
+  const Eigen::VectorXd step = DampedStep(at, s_.point, kLmPolicy.least_damping);
+  return Promised(at, step) > kLmPolicy.kink * s_.cost;
+}
+
+// Whether windows' states found anew, from where the log has them, lead on.
+bool LmRun::FindOtherStates() {
+  ProblemObjective objective(problem_);
+  FitPoint anew = s_.point;
+  for (auto& state : anew.states) state.setZero();
+  anew = SolveStates(problem_, objective, anew, 3, &s_.work);
+  Residuals residuals;
+  (void)Cost(anew, &residuals);
+  const double before = s_.cost;
+  s_.cost = TakeBetterStates(problem_, s_.point, s_.residuals, anew, residuals);
+  return before - s_.cost > kLmPolicy.kink * before;
+}
+
 void LmRun::Iterate() {
   // What looks far ahead needs no exact motion; the bottom does.
   const DifferenceOptions differences{
@@ -174,6 +200,12 @@ void LmRun::Iterate() {
   }
   // A small step means the bottom when it was hardly damped, or when it happens again and again (a narrow valley).
   if (accepted && ++s_.quiet < (undamped ? 1 : 3)) return;
+  if (IsKink(at) && FindOtherStates()) {
+    s_.difference = options_.coarse_step;
+    s_.damping = options_.damping;
+    s_.quiet = 0;
+    return;
+  }
   End(accepted || s_.iterations > 1 ? Termination::kConverged : Termination::kStalled);
 }
 

@@ -47,6 +47,7 @@ struct LmPolicy {
   int most_secant_steps = 8;
   double poor_ratio = 0.2;  // of the promised gain: a secant Jacobian that keeps less is spent
   double bend_share = 0.1;  // of the step, at which its bend is measured
+  double kink = 0.01;       // of the cost: what a whole step still promises at a kink, and looking over it must gain
   double most_bend =
       0.75;  // |acceleration| / |velocity|: beyond it the second derivative says nothing of the whole step
 };

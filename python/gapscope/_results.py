@@ -233,13 +233,23 @@ class Exported(_Open):
 @dataclass(frozen=True)
 class _WithModel(Run):
     def export(
-        self, target: str, out: str | os.PathLike[str], *, timestep: float | None = None, experiment: str | None = None
+        self,
+        target: str,
+        out: str | os.PathLike[str],
+        *,
+        timestep: float | None = None,
+        draws: int | None = None,
+        seed: int | None = None,
+        experiment: str | None = None,
     ) -> Exported:
         """Writes OUT/model.xml and OUT/fidelity.json: "mujoco", "mujoco_native", "mujoco_warp" or "mjx".
 
-        ``timestep``, s: of the written MJCF. ``experiment``: where its file has moved since.
+        ``timestep``, s: of the written MJCF. ``draws``, of a tune: also OUT/randomization.json and
+        OUT/randomization.npz, whose arrays of (draws, ...) are named as MuJoCo's (docs/export.md). ``experiment``:
+        where its file has moved since.
         """
-        return from_json(Exported, self._go_on("export", to=target, out=out, timestep=timestep, experiment=experiment))
+        options = {"timestep": timestep, "draws": draws, "seed": seed, "experiment": experiment}
+        return from_json(Exported, self._go_on("export", to=target, out=out, **options))
 
     def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> dict[str, Any]:
         """Writes the result into the text of the experiment's own MJCF (docs/apply.md); what changed there."""

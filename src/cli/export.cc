@@ -7,7 +7,9 @@
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
+#include "src/export/randomize.h"
 #include "src/export/target.h"
+#include "src/log/npz_archive.h"
 #include "src/report/export_report.h"
 #include "src/report/read_run.h"
 
@@ -19,6 +21,9 @@ struct ExportFlags {
   ResultSource source;
   TargetName target = TargetName::kMujoco;
   double time_step_s = 0;
+  int draws = 0;
+
+  std::string Path(const char* file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
 
 // The logs that the result was judged by; of a replay all of its logs.
@@ -58,6 +63,48 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
   return Ok();
 }
 
+// What a tune knows of its parameters, of this model. Errors: another result, or one of an earlier version.
+Result<UncertainParameters> UncertainOf(const Model& model, const nlohmann::ordered_json& json,
+                                        const std::string& where) {
+  constexpr char kCure[] = "run `gapscope tune` (--from DIR takes over what a diagnosis found), and export its result";
+  if (json.value("schema", "") != kTuneSchema)
+    return Error{.what = "only a result of tune says how its parameters vary together", .where = where, .cure = kCure};
+  GS_ASSIGN(const TuneRun run, ReadTuneRun(json, where));
+  const auto& covariance = run.spread.covariance;
+  if (covariance.size() != run.parameters.size())
+    return Error{.what = "a result of an earlier version, without its covariance", .where = where, .cure = kCure};
+  std::vector<std::size_t> known;
+  UncertainParameters uncertain;
+  for (std::size_t i = 0; i < run.parameters.size(); ++i) {
+    const std::string& name = run.parameters[i].name;
+    if (!run.parameters[i].identifiable) continue;
+    known.push_back(i);
+    uncertain.parameters.push_back({.index = model.IndexOf(name),
+                                    .logarithmic = run.spread.logarithmic.at(i) != 0,
+                                    .together = std::ranges::any_of(run.correlated, [&](const auto& pair) {
+                                      return pair.a == name || pair.b == name;
+                                    })});
+  }
+  const auto n = static_cast<Eigen::Index>(known.size());
+  uncertain.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
+    return covariance.at(known[static_cast<std::size_t>(a)]).at(known[static_cast<std::size_t>(b)]);
+  });
+  return uncertain;
+}
+
+// randomization.json and .npz.
+Status WriteRandomization(const ExportFlags& flags, const Model& model, const std::vector<double>& values,
+                          const UncertainParameters& uncertain, const MakeExport& make, ExportRun* run) {
+  const auto draws = static_cast<std::size_t>(flags.draws);
+  GS_ASSIGN(run->randomization, Randomize(model, values, uncertain, make, draws, flags.common.seed));
+  run->draws = draws;
+  NpzArchive archive;
+  archive.Add("parameters", {draws, uncertain.parameters.size()}, run->randomization.drawn);
+  for (const DrawnField& field : run->randomization.fields) archive.Add(field.name, field.shape, field.values);
+  GS_RETURN_IF_ERROR(WriteFile(flags.Path("randomization.npz"), archive.Finish()));
+  return WriteFile(flags.Path("randomization.json"), RandomizationJson(*run).dump(2) + "\n");
+}
+
 Result<int> RunExport(const ExportFlags& flags) {
   GS_ASSIGN(const nlohmann::ordered_json json, ReadJson(flags.source.path));
   GS_ASSIGN(const ResultModel loaded, LoadWholeResult(json, flags.source));
@@ -65,14 +112,20 @@ Result<int> RunExport(const ExportFlags& flags) {
   const ExportTarget& target = TargetOf(flags.target);
   NativeFeatures features = target.has;
   features.time_step_s = flags.time_step_s;
-  GS_ASSIGN(const ExportedModel exported, target.plugins ? model.Export(loaded.values, nullptr, {})
-                                                         : model.ExportNative(loaded.values, nullptr, features));
+  const MakeExport make = [&](std::span<const double> values) {
+    return target.plugins ? model.Export(values, nullptr, {}) : model.ExportNative(values, nullptr, features);
+  };
+  UncertainParameters uncertain;
+  if (flags.draws > 0) {
+    GS_ASSIGN(uncertain, UncertainOf(model, json, flags.source.path));
+  }
+  GS_ASSIGN(const ExportedModel exported, make(loaded.values));
   if (target.plugins && flags.time_step_s > 0) exported.spec->option.timestep = flags.time_step_s;
   GS_ASSIGN(const std::string xml, SpecToXml(*exported.spec, model.experiment().model_path));
   ExportRun run{.result = flags.source.path,
                 .target = NameOf(flags.target),
                 .what = target.what,
-                .out = (std::filesystem::path(flags.common.out) / "model.xml").string(),
+                .out = flags.Path("model.xml"),
                 .time_step_s = exported.spec->option.timestep,
                 .effects = exported.native,
                 .left_out = exported.left_out,
@@ -80,8 +133,11 @@ Result<int> RunExport(const ExportFlags& flags) {
   GS_RETURN_IF_ERROR(WriteFile(run.out, xml));
   ThreadPool pool(WorkersOf(flags.common));
   GS_RETURN_IF_ERROR(Measure(model, loaded.values, &run, pool));
+  if (flags.draws > 0) {
+    GS_RETURN_IF_ERROR(WriteRandomization(flags, model, loaded.values, uncertain, make, &run));
+  }
   const std::string text = ToJson(run).dump(2) + "\n";
-  GS_RETURN_IF_ERROR(WriteFile((std::filesystem::path(flags.common.out) / "fidelity.json").string(), text));
+  GS_RETURN_IF_ERROR(WriteFile(flags.Path("fidelity.json"), text));
   fmt::print("{}", flags.common.json ? text : ToTable(run));
   return kDone;
 }
@@ -105,6 +161,12 @@ Command ExportCommand() {
        .range = Above(0, 0),
        .unset = "the MJCF's",
        .help = "Time step of the written MJCF, s"},
+      {.flag = "--draws",
+       .value = &flags->draws,
+       .range = Between(0, 100000),
+       .unset = "none",
+       .help = "Of a tune: also randomization.json, the 95 % range of each parameter in numbers of the MJCF, and "
+               "randomization.npz, so many joint draws of all that vary"},
       WhileOption(flags->source.while_column),
       {.flag = "--experiment",
        .value = &flags->source.experiment,

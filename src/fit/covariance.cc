@@ -89,15 +89,20 @@ TunedParameter OfCoordinate(const FitProblem& problem, const FitPoint& point, co
   return tuned;
 }
 
-// A parameter that coordinates give together (SearchSpace::Couple): its deviation to first order in them.
-TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
-                        const SearchSpace::Couple& couple, int index) {
+// How the value, or the logarithm of its magnitude, moves with its coordinate.
+double NaturalSlope(const Coordinate& c, double y) {
+  const double h = 1e-6 * (c.high - c.low);
+  const double below = c.ToValue(y - h), above = c.ToValue(y + h);
+  return (c.logarithmic ? std::log(above / below) : above - below) / (2 * h);
+}
+
+// How a parameter that coordinates give together (SearchSpace::Couple) moves with them, in units of their ranges.
+Eigen::VectorXd SlopeOf(const FitProblem& problem, const FitPoint& point, const SearchSpace::Couple& couple,
+                        int index) {
   const SearchSpace& space = problem.space();
   std::vector<double> values = space.Values(point.y);
   const auto k = static_cast<std::size_t>(index);
-  const Parameter& p = problem.model().parameters()[k];
-  TunedParameter tuned{.index = index, .value = values[k]};
-  Eigen::VectorXd slope = Eigen::VectorXd::Zero(covariance.robust.rows());
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(point.y.size());
   for (const Eigen::Index i : {couple.size, couple.other, couple.cubic_place}) {
     if (i < 0) continue;
     const double range = problem.layout().high[i] - problem.layout().low[i], h = 1e-6 * range;
@@ -107,6 +112,16 @@ TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const 
     slope[i] = (values[k] - below) / (2 * h) * range;
     space.SetCoordinate(point.y, i, point.y[i], &values);
   }
+  return slope;
+}
+
+// Its deviation to first order.
+TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
+                        const SearchSpace::Couple& couple, int index) {
+  const auto k = static_cast<std::size_t>(index);
+  const Parameter& p = problem.model().parameters()[k];
+  TunedParameter tuned{.index = index, .value = problem.space().Values(point.y)[k]};
+  const Eigen::VectorXd slope = SlopeOf(problem, point, couple, index);
   const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
   const double half = HalfOf(covariance, slope);
   tuned.low = std::max(p.low, tuned.value - half);
@@ -203,12 +218,22 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
     const Eigen::VectorXd in_range = (problem.layout().high - problem.layout().low).cwiseInverse();
     covariance.robust += in_range.asDiagonal() * beside * in_range.asDiagonal();
   }
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(space.size(), point.y.size());
   for (Eigen::Index i = 0; i < space.size(); ++i) {
     const auto couple = std::find_if(space.couples().begin(), space.couples().end(),
                                      [&](const auto& c) { return c.size == i || c.other == i; });
     const int index = coordinates[static_cast<std::size_t>(i)].parameter;
-    TunedParameter tuned = couple == space.couples().end() ? OfCoordinate(problem, point, covariance, i)
-                                                           : OfCouple(problem, point, covariance, *couple, index);
+    const bool alone = couple == space.couples().end();
+    TunedParameter tuned =
+        alone ? OfCoordinate(problem, point, covariance, i) : OfCouple(problem, point, covariance, *couple, index);
+    if (alone) {
+      slopes(i, i) = NaturalSlope(coordinates[static_cast<std::size_t>(i)], point.y[i]) *
+                     (problem.layout().high[i] - problem.layout().low[i]);
+    } else {
+      slopes.row(i) = SlopeOf(problem, point, *couple, index);
+    }
+    result.spread.parameters.push_back(index);
+    result.spread.logarithmic.push_back(alone && coordinates[static_cast<std::size_t>(i)].logarithmic);
     if (!tuned.identifiable) {
       const Parameter& p = problem.model().parameters()[static_cast<std::size_t>(index)];
       tuned.low = p.low;
@@ -216,6 +241,12 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
     }
     result.tuned.push_back(tuned);
   }
+  for (Eigen::Index i = 0; i < space.size(); ++i) {
+    const Eigen::VectorXd slope = slopes.row(i);
+    const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
+    if (deviation > 0) slopes.row(i) *= HalfOf(covariance, slope) / (kNormalQuantile * deviation);
+  }
+  result.spread.covariance = slopes * covariance.robust * slopes.transpose();
   const Eigen::VectorXd range = problem.layout().high - problem.layout().low;
   result.covariance = range.asDiagonal() * covariance.robust * range.asDiagonal();
   result.of_prior = range.asDiagonal() * covariance.of_prior * range.asDiagonal();

@@ -37,6 +37,55 @@ ordered_json ToJson(const ExportRun& run) {
   return json;
 }
 
+ordered_json RandomizationJson(const ExportRun& run) {
+  ordered_json json = {{"schema", "gapscope.randomization/1"},
+                       {"result", run.result},
+                       {"target", run.target},
+                       {"model", run.out},
+                       {"draws", run.draws},
+                       {"seed", run.info.seed},
+                       {"parameters", ordered_json::array()},
+                       {"fields", ordered_json::object()},
+                       {"versions", JsonVersions(run.info)}};
+  for (const ParameterRange& range : run.randomization.ranges) {
+    ordered_json numbers = ordered_json::array();
+    for (const VaryingNumber& number : range.numbers) {
+      numbers.push_back({{"field", number.field},
+                         {"index", {number.row, number.column}},
+                         {"value", number.value},
+                         {"low", number.low},
+                         {"high", number.high}});
+    }
+    json["parameters"].push_back({{"name", range.name},
+                                  {"unit", range.unit},
+                                  {"value", range.value},
+                                  {"low", range.low},
+                                  {"high", range.high},
+                                  {"conditional", range.conditional},
+                                  {"numbers", std::move(numbers)}});
+  }
+  for (const DrawnField& field : run.randomization.fields) json["fields"][field.name] = field.shape;
+  return json;
+}
+
+namespace {
+
+std::string RangeLines(const ExportRun& run) {
+  std::string text = fmt::format("  {} draws of what the logs leave open, and 95 % ranges:\n", run.draws);
+  for (const ParameterRange& range : run.randomization.ranges) {
+    std::vector<std::string> fields;
+    for (const VaryingNumber& number : range.numbers) {
+      if (fields.empty() || fields.back() != number.field) fields.push_back(number.field);
+    }
+    text += fmt::format("  {:<36} {:.4g} .. {:.4g} {}{}: {}\n", range.name, range.low, range.high, range.unit,
+                        range.conditional ? ", the others as they are" : "",
+                        fields.empty() ? "no number of the MJCF, so the host's" : Join(fields));
+  }
+  return text;
+}
+
+}  // namespace
+
 std::string ToTable(const ExportRun& run) {
   constexpr double kMuch = 0.1;
   std::string text;
@@ -46,6 +95,7 @@ std::string ToTable(const ExportRun& run) {
   for (const NativeEffect& effect : run.effects)
     text += fmt::format("  {:<36} {:<13} {}\n", effect.use.Text(), FidelityName(effect.fidelity), effect.how);
   if (!run.left_out.empty()) text += fmt::format("  as it was, since each log sets it anew: {}\n", Join(run.left_out));
+  if (run.draws > 0) text += RangeLines(run);
   if (!run.unmeasured.empty()) return text + "  not measured: " + run.unmeasured + "\n";
   return text + fmt::format("  held-out error: nominal {:.4g}, the model {:.4g}, exported {:.4g}\n", run.errors.nominal,
                             run.errors.model, run.errors.exported);

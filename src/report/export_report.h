@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "src/export/fidelity.h"
+#include "src/export/randomize.h"
 #include "src/model/native.h"
 #include "src/report/run.h"
 
@@ -21,10 +22,14 @@ struct ExportRun {
   std::vector<std::string> logs;      // that the errors are of; empty: none could be read
   std::string unmeasured;             // why there are no errors; empty: there are
   FidelityErrors errors;
+  std::size_t draws = 0;  // 0: no randomisation was asked for
+  Randomization randomization;
 };
 
 nlohmann::ordered_json ToJson(const ExportRun& run);
 std::string ToTable(const ExportRun& run);
+// gapscope.randomization/1.
+nlohmann::ordered_json RandomizationJson(const ExportRun& run);
 
 }  // namespace gapscope
 

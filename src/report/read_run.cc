@@ -58,6 +58,12 @@ void ReadKnowledge(const ordered_json& json, TuneRun* run) {
     const auto& names = entry.at("parameters");
     run->correlated.push_back({names.at(0), names.at(1), NumberAt(entry, "correlation")});
   }
+  if (!json.contains("spread")) return;
+  for (const bool logarithmic : json["spread"].at("logarithmic")) run->spread.logarithmic.push_back(logarithmic);
+  for (const auto& row : json["spread"].at("covariance")) {
+    auto& numbers = run->spread.covariance.emplace_back();
+    for (const auto& number : row) numbers.push_back(NumberFrom(number));
+  }
 }
 
 TuneRun TuneRunFrom(const ordered_json& json) {

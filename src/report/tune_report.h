@@ -30,6 +30,11 @@ struct TuneRun {
     std::string a, b;
     double correlation = 0;
   };
+  // How the parameters vary together, in their order (gapscope::Spread).
+  struct Spread {
+    std::vector<char> logarithmic;
+    std::vector<std::vector<double>> covariance;
+  };
   struct Log {
     std::string log;
     Outcome outcome = Outcome::kCompleted;
@@ -47,6 +52,7 @@ struct TuneRun {
   std::vector<std::string> left_frozen;  // parameters that would be tuned if the logs knew them
   std::vector<Flat> flat;
   std::vector<Correlated> correlated;
+  Spread spread;  // empty: a result of an earlier version
   double error_nominal = 0, error_train = 0, error_held_out = 0;
   std::string held_out_by;  // how logs were held out, for the user
   std::vector<Log> train, held_out;

@@ -301,6 +301,7 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
   summary.tuned = std::move(uncertainty.tuned);
   summary.flat = std::move(uncertainty.flat);
   summary.correlated = std::move(uncertainty.correlated);
+  summary.spread = std::move(uncertainty.spread);
   if (journal && !journal->status().ok()) summary.warnings.push_back(journal->status().error().Text());
   Score(model, data, options, pool, &summary);
   summary.wall_s = since(begin);

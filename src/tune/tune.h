@@ -42,6 +42,7 @@ struct TuneSummary {
   std::vector<int> left_frozen;  // of TuneOptions::if_known
   std::vector<FlatDirection> flat;
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above 0.95
+  Spread spread;                                         // of `tuned`
   std::vector<LogReplay> train, held_out;                // at the tuned values
   // See ReplayError; nominal on the held-out data.
   double error_nominal = 0, error_train = 0, error_held_out = 0;

@@ -390,12 +390,31 @@ TEST_F(CliTest, ExportTellsAndMeasuresWhatAnotherEngineLoses) {
   EXPECT_NE(Run("export '" + out + "' --to mjx --out '" + to + "'").out.find("not measured"), std::string::npos);
 }
 
+TEST_F(CliTest, ATuneIsExportedWithDraws) {
+  const std::string out = scratch_.Path("out"), to = scratch_.Path("to");
+  ASSERT_EQ(Run("tune " + Joint() + " '" + JointLog() + "' --starts 1 --out '" + out + "'").status, 0);
+  const Answer answer = Run("export '" + out + "' --to mjx --draws 7 --seed 3 --out '" + to + "'");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  EXPECT_NE(answer.out.find("7 draws of what the logs leave open"), std::string::npos) << answer.out;
+  const auto json = nlohmann::json::parse(ReadAll(to + "/randomization.json"));
+  EXPECT_EQ(json["schema"], "gapscope.randomization/1");
+  EXPECT_EQ(json["draws"], 7);
+  std::size_t known = 0;
+  const auto tuned = nlohmann::json::parse(ReadAll(out + "/result.json"));
+  for (const auto& p : tuned["parameters"]) known += p["identifiable"] == true;
+  ASSERT_GT(known, 0u);
+  EXPECT_EQ(json["parameters"].size(), known);
+  for (const auto& p : json["parameters"]) EXPECT_LT(p["low"], p["high"]) << p["name"];
+  EXPECT_EQ(ReadAll(to + "/randomization.npz").substr(0, 2), "PK");
+}
+
 TEST_F(CliTest, ExportRefusesWhatItCannotWrite) {
   const std::string log = JointLog(), out = scratch_.Path("out"), to = scratch_.Path("to");
   ASSERT_EQ(Run("replay " + Joint() + " '" + log + "' --out '" + out + "'").status, 0);
   ExpectRefused("export '" + out + "' --to mjx", {"--out"});
   ExpectRefused("export '" + out + "' --to gazebo --out '" + to + "'", {"--to", "gazebo", "mjx"});
   ExpectRefused("export '" + out + "' --to mjx --timestep 0 --out '" + to + "'", {"--timestep"});
+  ExpectRefused("export '" + out + "' --to mjx --draws 5 --out '" + to + "'", {"only a result of tune", "--from"});
   ExpectRefused("export '" + scratch_.Write("list.json", "[1]") + "' --to mjx --out '" + to + "'", {"schema none"});
   EXPECT_FALSE(std::filesystem::exists(to));
 }

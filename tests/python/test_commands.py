@@ -253,6 +253,24 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
         result.export("mjy", tmp_path / "other")
 
 
+def test_a_tune_is_drawn_from(experiment: str, demo: str, tmp_path: Path) -> None:
+    """What stock MuJoCo makes of a draw is the draw: the arrays are named and shaped as its own."""
+    tuned = gs.tune(experiment, demo, freeze=["motor.resistance", "motor.km", "arm.mass", "pendulum.mass"], starts=1)
+    out = Path(tuned.export("mujoco_native", tmp_path / "native", draws=20, seed=4).model).parent
+    told = json.loads((out / "randomization.json").read_text())
+    drawn = np.load(out / "randomization.npz")
+    assert drawn["parameters"].shape == (20, len(told["parameters"]))
+    assert {name: list(drawn[name].shape) for name in told["fields"]} == told["fields"]
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_path(str(out / "model.xml"))
+    for name, shape in told["fields"].items():
+        assert np.shape(getattr(model, name)) == tuple(shape[1:]), name
+    for number in (number for parameter in told["parameters"] for number in parameter["numbers"]):
+        row, column = number["index"]
+        loaded = np.reshape(getattr(model, number["field"])[row], -1)[column]
+        assert loaded == pytest.approx(number["value"], rel=1e-5)
+
+
 def test_identify_design_and_apply(experiment: str, demo: str, tmp_path: Path) -> None:
     pull = gs.identify("cable", experiment, demo)
     assert pull["schema"] == "gapscope.identify.cable/1" and "stiffness" in pull["values"]

@@ -1,0 +1,194 @@
+#include "src/export/randomize.h"
+
+#include <fmt/format.h>
+#include <mujoco/mjxmacro.h>
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <set>
+#include <type_traits>
+
+#include "src/core/dense.h"
+#include "src/fit/covariance.h"
+
+namespace gapscope {
+namespace {
+
+// An array of a compiled model.
+struct Array {
+  std::string name;
+  std::size_t rows = 0, columns = 0;
+  std::span<const mjtNum> numbers;
+};
+
+std::vector<Array> ArraysOf(const mjModel& model) {
+  std::vector<Array> arrays = {{"opt.gravity", 1, 3, model.opt.gravity}};
+  const auto add = [&]<class T>(const char* name, const T* data, mjtSize rows, mjtSize columns) {
+    if constexpr (std::is_same_v<T, mjtNum>) {
+      if (rows > 0 && columns > 0)
+        arrays.push_back({name, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns),
+                          {data, static_cast<std::size_t>(rows * columns)}});
+    }
+  };
+  const mjModel* m = &model;
+  MJMODEL_POINTERS_PREAMBLE(m)
+  (void)nuser_body, (void)nuser_jnt, (void)nuser_geom, (void)nuser_site, (void)nuser_cam, (void)nuser_tendon;
+  (void)nuser_actuator, (void)nuser_sensor, (void)nq, (void)nv, (void)na, (void)nu, (void)nmocap, (void)nplastic;
+#define X(type, name, nr, nc) add(#name, m->name, m->nr, nc);
+  MJMODEL_POINTERS
+#undef X
+  return arrays;
+}
+
+// Made of other numbers by the compiler.
+bool FollowsFromOthers(const std::string& field) {
+  static const std::set<std::string> kFollow = {
+      "body_subtreemass",  "body_invweight0",  "dof_invweight0",  "dof_M0",        "dof_length",    "tendon_length0",
+      "tendon_invweight0", "actuator_acc0",    "actuator_length0", "actuator_lengthrange", "cam_poscom0", "cam_pos0",
+      "cam_mat0",          "light_poscom0",    "light_pos0",      "light_dir0"};
+  return kFollow.contains(field);
+}
+
+Status CheckSame(const std::vector<Array>& base, const std::vector<Array>& other, const std::string& where) {
+  const bool same = std::ranges::equal(base, other, [](const Array& a, const Array& b) {
+    return a.name == b.name && a.rows == b.rows && a.columns == b.columns;
+  });
+  if (same) return Ok();
+  return Error{.what = "within what the logs allow the MJCF changes its elements",
+               .where = where,
+               .cure = "freeze the parameter that does it, or export to an engine that has its effect"};
+}
+
+double Moved(const UncertainParameter& uncertain, const Parameter& p, double value, double by) {
+  return std::clamp(uncertain.logarithmic ? value * std::exp(by) : value + by, p.low, p.high);
+}
+
+// A parameter's deviation; where it goes together with others, that with the others as they are.
+double DeviationOf(const UncertainParameters& uncertain, Eigen::Index i) {
+  const Eigen::MatrixXd& c = uncertain.covariance;
+  if (!uncertain.parameters[static_cast<std::size_t>(i)].together) return std::sqrt(std::max(0.0, c(i, i)));
+  const double precision = Ldlt(c).Solve(Eigen::VectorXd(Eigen::VectorXd::Unit(c.rows(), i)))[i];
+  return precision > 0 ? std::sqrt(1 / precision) : 0;
+}
+
+// The model's arrays at changed values; it must outlive them.
+class Exporter {
+ public:
+  Exporter(const Model& model, std::span<const double> values, const MakeExport& make)
+      : model_(model), values_(values), make_(make) {}
+
+  Status Begin() {
+    GS_ASSIGN(base_, make_(values_));
+    arrays_ = ArraysOf(*base_.compiled);
+    varies_.assign(arrays_.size(), false);
+    return Ok();
+  }
+  const std::vector<Array>& arrays() const { return arrays_; }
+
+  // The arrays with these values; the model that they are of is `kept`.
+  Result<std::vector<Array>> At(std::span<const double> values, ExportedModel* kept) const {
+    GS_ASSIGN(*kept, make_(values));
+    std::vector<Array> arrays = ArraysOf(*kept->compiled);
+    GS_RETURN_IF_ERROR(CheckSame(arrays_, arrays, model_.experiment().path));
+    return arrays;
+  }
+
+  // Whether an array varies over the ranges that were asked for.
+  bool Varies(std::size_t array) const { return varies_[array]; }
+
+  Result<ParameterRange> RangeOf(const UncertainParameter& uncertain, double deviation) {
+    const auto k = static_cast<std::size_t>(uncertain.index);
+    const Parameter& p = model_.parameters()[k];
+    ParameterRange range{.name = p.name, .unit = p.unit, .value = values_[k], .conditional = uncertain.together};
+    const double a = Moved(uncertain, p, values_[k], -kNormalQuantile * deviation),
+                 b = Moved(uncertain, p, values_[k], kNormalQuantile * deviation);
+    range.low = std::min(a, b), range.high = std::max(a, b);
+    std::vector<double> values(values_.begin(), values_.end());
+    ExportedModel low, high;
+    values[k] = range.low;
+    GS_ASSIGN(const std::vector<Array> at_low, At(values, &low));
+    values[k] = range.high;
+    GS_ASSIGN(const std::vector<Array> at_high, At(values, &high));
+    for (std::size_t f = 0; f < arrays_.size(); ++f) {
+      if (std::ranges::equal(at_low[f].numbers, at_high[f].numbers)) continue;
+      varies_[f] = true;
+      if (!FollowsFromOthers(arrays_[f].name)) AddNumbers(arrays_[f], at_low[f], at_high[f], &range);
+    }
+    return range;
+  }
+
+ private:
+  static void AddNumbers(const Array& base, const Array& low, const Array& high, ParameterRange* range) {
+    for (std::size_t i = 0; i < base.numbers.size(); ++i) {
+      if (low.numbers[i] == high.numbers[i]) continue;
+      range->numbers.push_back({.field = base.name,
+                                .row = i / base.columns,
+                                .column = i % base.columns,
+                                .value = base.numbers[i],
+                                .low = std::min(low.numbers[i], high.numbers[i]),
+                                .high = std::max(low.numbers[i], high.numbers[i])});
+    }
+  }
+
+  const Model& model_;
+  std::span<const double> values_;
+  const MakeExport& make_;
+  ExportedModel base_;
+  std::vector<Array> arrays_;
+  std::vector<bool> varies_;
+};
+
+// Where a field's draws go.
+DrawnField FieldOf(const Array& base, std::size_t draws) {
+  DrawnField field{.name = base.name, .shape = {draws}, .values = {}};
+  if (!base.name.starts_with("opt.")) field.shape.push_back(base.rows);
+  if (base.columns > 1) field.shape.push_back(base.columns);
+  field.values.reserve(draws * base.numbers.size());
+  return field;
+}
+
+}  // namespace
+
+Result<Randomization> Randomize(const Model& model, std::span<const double> values, const UncertainParameters& uncertain,
+                                const MakeExport& make, std::size_t draws, std::uint64_t seed) {
+  Exporter exporter(model, values, make);
+  GS_RETURN_IF_ERROR(exporter.Begin());
+  Randomization result;
+  const auto n = static_cast<Eigen::Index>(uncertain.parameters.size());
+  for (Eigen::Index i = 0; i < n; ++i) {
+    GS_ASSIGN(ParameterRange range,
+              exporter.RangeOf(uncertain.parameters[static_cast<std::size_t>(i)], DeviationOf(uncertain, i)));
+    result.ranges.push_back(std::move(range));
+  }
+  const SymmetricEigen eigen(uncertain.covariance);
+  const Eigen::MatrixXd root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  std::mt19937_64 random(seed + 1);
+  std::normal_distribution<double> normal;
+  std::vector<std::size_t> varying;
+  for (std::size_t f = 0; f < exporter.arrays().size(); ++f) {
+    if (!exporter.Varies(f)) continue;
+    varying.push_back(f);
+    result.fields.push_back(FieldOf(exporter.arrays()[f], draws));
+  }
+  for (std::size_t d = 0; d < draws; ++d) {
+    const Eigen::VectorXd by = root * Eigen::VectorXd::NullaryExpr(n, [&](Eigen::Index) { return normal(random); });
+    std::vector<double> at(values.begin(), values.end());
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const UncertainParameter& p = uncertain.parameters[static_cast<std::size_t>(i)];
+      const auto k = static_cast<std::size_t>(p.index);
+      at[k] = Moved(p, model.parameters()[k], values[k], by[i]);
+      result.drawn.push_back(at[k]);
+    }
+    ExportedModel kept;
+    GS_ASSIGN(const std::vector<Array> arrays, exporter.At(at, &kept));
+    for (std::size_t f = 0; f < varying.size(); ++f) {
+      const auto numbers = arrays[varying[f]].numbers;
+      result.fields[f].values.insert(result.fields[f].values.end(), numbers.begin(), numbers.end());
+    }
+  }
+  return result;
+}
+
+}  // namespace gapscope

@@ -1,0 +1,63 @@
+// A tuned model's uncertainty as domain randomisation: which numbers of the MJCF vary, in which ranges, and joint draws
+// of them.
+#ifndef GAPSCOPE_EXPORT_RANDOMIZE_H_
+#define GAPSCOPE_EXPORT_RANDOMIZE_H_
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "src/model/model.h"
+
+namespace gapscope {
+
+// A parameter that varies, at its best value. Its deviation and correlations: UncertainParameters::covariance.
+struct UncertainParameter {
+  int index = -1;            // in Model::parameters()
+  bool logarithmic = false;  // the covariance is of ln |value|
+  bool together = false;     // correlated so much with another one that its range holds with the others as they are
+};
+struct UncertainParameters {
+  std::vector<UncertainParameter> parameters;
+  Eigen::MatrixXd covariance;
+};
+
+// One number of an array of mjModel ("dof_damping", "opt.gravity") at both ends of a parameter's range.
+struct VaryingNumber {
+  std::string field;
+  std::size_t row = 0, column = 0;
+  double value = 0, low = 0, high = 0;
+};
+struct ParameterRange {
+  std::string name, unit;
+  double value = 0, low = 0, high = 0;  // 95 %
+  bool conditional = false;             // with the others as they are
+  std::vector<VaryingNumber> numbers;     // empty: the MJCF has none; the host does it
+};
+
+// An array of mjModel of which some number varies, for each draw.
+struct DrawnField {
+  std::string name;
+  std::vector<std::size_t> shape;  // draws, rows, and columns where there is more than one
+  std::vector<double> values;
+};
+struct Randomization {
+  std::vector<ParameterRange> ranges;
+  std::vector<DrawnField> fields;
+  std::vector<double> drawn;  // draws x parameters, in the order of `ranges`
+};
+
+// The MJCF with these values of all parameters.
+using MakeExport = std::function<Result<ExportedModel>(std::span<const double>)>;
+
+// `draws` of a normal distribution, kept within the parameters' bounds; the same seed gives the same ones. What follows
+// from other numbers (inverse weights, lengths) varies with them in `fields` and is not told in `ranges`. Errors: as
+// `make`; a draw whose MJCF has other elements.
+Result<Randomization> Randomize(const Model& model, std::span<const double> values, const UncertainParameters& uncertain,
+                                const MakeExport& make, std::size_t draws, std::uint64_t seed);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_EXPORT_RANDOMIZE_H_

@@ -47,8 +47,8 @@ class Judging {
   }
 
   // What a richer description does beyond a simpler one is a finding of its own: where that is not sure, the simpler
-  // one takes its place, and where it is open, they are told together. One size for all places is simpler than one
-  // each, and so is an effect that another contains.
+  // one takes its place, and where it is open, or the richer one is what there mostly is, they are told together. One
+  // size for all places is simpler than one each, and so is an effect that another contains.
   std::vector<Statement> Simplify() {
     std::vector<Statement> dropped;
     for (const EffectUse& use : found_.uses) {
@@ -84,7 +84,7 @@ class Judging {
     Weigh(members, &beyond);
     const Told told = ToldBeyond(beyond.probability);
     if (told == Told::kRicher) return;
-    const bool open = members.size() == 1 && told == Told::kTogether;
+    const bool open = members.size() == 1 && (told == Told::kTogether || IsUsual(members.front(), simple, *bench_.rig));
     const double rise = std::log(simpler->train_cost / found_.chosen->train_cost);
     Member joined{.use = simple};
     for (const EffectUse& use : members) {

@@ -67,6 +67,12 @@ bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig,
                      [&](const Contained& c) { return simpler.effect == c.effect && (c.exactly || !exactly); });
 }
 
+bool IsUsual(const EffectUse& richer, const EffectUse& simpler, const Rig& rig) {
+  const std::vector<Contained>& contains = EffectOf(richer, rig).contains;
+  return richer.on == simpler.on &&
+         std::ranges::any_of(contains, [&](const Contained& c) { return c.usual && c.effect == simpler.effect; });
+}
+
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
   const auto changes = [](const Recording::Command& command) {
     return std::any_of(command.values.begin(), command.values.end(),

@@ -17,6 +17,8 @@ bool IsFinding(const EffectUse& use, const Model& base);
 // Whether `richer` can do all that `simpler` does, at the same place; `exactly`: not only nearly, as far as its bounds
 // go. Nearly, too, one size for all places and the same effect on one of them: they are rivals.
 bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig, bool exactly = false);
+// Whether, where `simpler` is, `richer` mostly is too, which holds it.
+bool IsUsual(const EffectUse& richer, const EffectUse& simpler, const Rig& rig);
 
 // What the logs hold, as far as it makes effects one.
 struct LoggedSignals {

@@ -28,7 +28,9 @@ std::vector<Array> ArraysOf(const mjModel& model) {
   const auto add = [&]<class T>(const char* name, const T* data, mjtSize rows, mjtSize columns) {
     if constexpr (std::is_same_v<T, mjtNum>) {
       if (rows > 0 && columns > 0)
-        arrays.push_back({name, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns),
+        arrays.push_back({name,
+                          static_cast<std::size_t>(rows),
+                          static_cast<std::size_t>(columns),
                           {data, static_cast<std::size_t>(rows * columns)}});
     }
   };
@@ -45,9 +47,10 @@ std::vector<Array> ArraysOf(const mjModel& model) {
 // Made of other numbers by the compiler.
 bool FollowsFromOthers(const std::string& field) {
   static const std::set<std::string> kFollow = {
-      "body_subtreemass",  "body_invweight0",  "dof_invweight0",  "dof_M0",        "dof_length",    "tendon_length0",
-      "tendon_invweight0", "actuator_acc0",    "actuator_length0", "actuator_lengthrange", "cam_poscom0", "cam_pos0",
-      "cam_mat0",          "light_poscom0",    "light_pos0",      "light_dir0"};
+      "body_subtreemass", "body_invweight0",      "dof_invweight0",    "dof_M0",
+      "dof_length",       "tendon_length0",       "tendon_invweight0", "actuator_acc0",
+      "actuator_length0", "actuator_lengthrange", "cam_poscom0",       "cam_pos0",
+      "cam_mat0",         "light_poscom0",        "light_pos0",        "light_dir0"};
   return kFollow.contains(field);
 }
 
@@ -151,8 +154,9 @@ DrawnField FieldOf(const Array& base, std::size_t draws) {
 
 }  // namespace
 
-Result<Randomization> Randomize(const Model& model, std::span<const double> values, const UncertainParameters& uncertain,
-                                const MakeExport& make, std::size_t draws, std::uint64_t seed) {
+Result<Randomization> Randomize(const Model& model, std::span<const double> values,
+                                const UncertainParameters& uncertain, const MakeExport& make, std::size_t draws,
+                                std::uint64_t seed) {
   Exporter exporter(model, values, make);
   GS_RETURN_IF_ERROR(exporter.Begin());
   Randomization result;

@@ -34,7 +34,7 @@ struct ParameterRange {
   std::string name, unit;
   double value = 0, low = 0, high = 0;  // 95 %
   bool conditional = false;             // with the others as they are
-  std::vector<VaryingNumber> numbers;     // empty: the MJCF has none; the host does it
+  std::vector<VaryingNumber> numbers;   // empty: the MJCF has none; the host does it
 };
 
 // An array of mjModel of which some number varies, for each draw.
@@ -55,8 +55,9 @@ using MakeExport = std::function<Result<ExportedModel>(std::span<const double>)>
 // `draws` of a normal distribution, kept within the parameters' bounds; the same seed gives the same ones. What follows
 // from other numbers (inverse weights, lengths) varies with them in `fields` and is not told in `ranges`. Errors: as
 // `make`; a draw whose MJCF has other elements.
-Result<Randomization> Randomize(const Model& model, std::span<const double> values, const UncertainParameters& uncertain,
-                                const MakeExport& make, std::size_t draws, std::uint64_t seed);
+Result<Randomization> Randomize(const Model& model, std::span<const double> values,
+                                const UncertainParameters& uncertain, const MakeExport& make, std::size_t draws,
+                                std::uint64_t seed);
 
 }  // namespace gapscope
 

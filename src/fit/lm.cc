@@ -131,9 +131,12 @@ double LmRun::TryStep(const Derivatives& derivatives, const Linearization& at, c
   return TakeBetterStates(problem_, *trial, *residuals, still, others);
 }
 
-// Where the linear model goes on promising what no step gains, some window's motion has a kink (contacts, dry
-// friction), and its state may stand on the wrong side.
+// Where the linear model goes on promising what no step gains, some window's motion has a kink (a blow), and what no
+// signal says of its start may stand on the wrong side.
 bool LmRun::IsKink(const Linearization& at) const {
+  const bool hidden = !problem_.model().mirrored_joints().empty() ||
+                      std::ranges::any_of(problem_.layout().unseen, [](const auto& log) { return !log.dofs.empty(); });
+  if (!hidden) return false;
   const Eigen::VectorXd step = DampedStep(at, s_.point, kLmPolicy.least_damping);
   return Promised(at, step) > kLmPolicy.kink * s_.cost;
 }

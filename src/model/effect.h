@@ -82,6 +82,7 @@ enum class BaseTerm { kNone, kDryFriction, kSpring };
 struct Contained {
   std::string effect;
   bool exactly = true;
+  bool usual = false;  // where the simpler one is there, this one mostly is
 };
 // Where a fit of this effect starts from a simpler one that is fitted already: each start gives every parameter
 // `of_simpler` times the simpler one's first, plus `value` (SI); both 0: its own `start`.

@@ -24,6 +24,10 @@ TEST(RulesTest, OnlyEffectsOnOnePlaceContainEachOther) {
   // Nearly: a cable that pulls from afar.
   EXPECT_TRUE(Contains({"cable_spring", "arm"}, bias, known));
   EXPECT_FALSE(Contains({"cable_spring", "arm"}, bias, known, true));
+  const EffectUse coulomb{"coulomb_friction", "arm"};
+  EXPECT_TRUE(IsUsual({"stribeck_friction", "arm"}, coulomb, known)) << "a hump at low speed";
+  EXPECT_FALSE(IsUsual({"stribeck_friction", "pendulum"}, coulomb, known));
+  EXPECT_FALSE(IsUsual({"direction_asymmetry", "arm"}, coulomb, known)) << "mostly alike both ways";
 }
 
 TEST(RulesTest, ABiasIsNoFindingOnAPositionServo) {

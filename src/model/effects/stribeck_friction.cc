@@ -40,7 +40,8 @@ Effect Effect_stribeck_friction() {
       .partners = {"coulomb_friction"},
       .of_motion = true,
       .character = EffectCharacter::kDryFriction,
-      .contains = {{.effect = "coulomb_friction"}},
+      // Most dry friction has a hump (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30, 1994).
+      .contains = {{.effect = "coulomb_friction", .usual = true}},
       // A hump over what slides.
       .starts_from = {.effect = "coulomb_friction", .starts = {{{.of_simpler = 0.9}, {.of_simpler = 1.5}, {}}}},
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {

@@ -85,6 +85,10 @@ Result<UncertainParameters> UncertainOf(const Model& model, const nlohmann::orde
                                       return pair.a == name || pair.b == name;
                                     })});
   }
+  if (known.empty())
+    return Error{.what = "the logs know none of the parameters: there is nothing to draw",
+                 .where = where,
+                 .cure = "tune with more logs, or with --freeze NAME for what goes together"};
   const auto n = static_cast<Eigen::Index>(known.size());
   uncertain.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
     return covariance.at(known[static_cast<std::size_t>(a)]).at(known[static_cast<std::size_t>(b)]);

@@ -392,7 +392,13 @@ TEST_F(CliTest, ExportTellsAndMeasuresWhatAnotherEngineLoses) {
 
 TEST_F(CliTest, ATuneIsExportedWithDraws) {
   const std::string out = scratch_.Path("out"), to = scratch_.Path("to");
-  ASSERT_EQ(Run("tune " + Joint() + " '" + JointLog() + "' --starts 1 --out '" + out + "'").status, 0);
+  const std::string tune = "tune " + Joint() + " '" + JointLog() + "' --starts 1 --out '" + out + "'";
+  ASSERT_EQ(Run(tune).status, 0);
+  ExpectRefused("export '" + out + "' --to mjx --draws 7 --out '" + to + "'", {"nothing to draw", "--freeze"});
+  ASSERT_EQ(Run(tune + " --with command_delay --freeze motor.kp --freeze motor.kd --freeze joint.inertia" +
+                " --freeze joint.damping")
+                .status,
+            0);
   const Answer answer = Run("export '" + out + "' --to mjx --draws 7 --seed 3 --out '" + to + "'");
   ASSERT_EQ(answer.status, 0) << answer.err;
   EXPECT_NE(answer.out.find("7 draws of what the logs leave open"), std::string::npos) << answer.out;

@@ -233,7 +233,7 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
       slopes.row(i) = SlopeOf(problem, point, *couple, index);
     }
     result.spread.parameters.push_back(index);
-    result.spread.logarithmic.push_back(alone && coordinates[static_cast<std::size_t>(i)].logarithmic);
+    result.spread.logarithmic.push_back(alone && coordinates[static_cast<std::size_t>(i)].logarithmic ? 1 : 0);
     if (!tuned.identifiable) {
       const Parameter& p = problem.model().parameters()[static_cast<std::size_t>(index)];
       tuned.low = p.low;

@@ -59,7 +59,8 @@ void ReadKnowledge(const ordered_json& json, TuneRun* run) {
     run->correlated.push_back({names.at(0), names.at(1), NumberAt(entry, "correlation")});
   }
   if (!json.contains("spread")) return;
-  for (const bool logarithmic : json["spread"].at("logarithmic")) run->spread.logarithmic.push_back(logarithmic);
+  for (const bool logarithmic : json["spread"].at("logarithmic"))
+    run->spread.logarithmic.push_back(logarithmic ? 1 : 0);
   for (const auto& row : json["spread"].at("covariance")) {
     auto& numbers = run->spread.covariance.emplace_back();
     for (const auto& number : row) numbers.push_back(NumberFrom(number));

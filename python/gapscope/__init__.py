@@ -29,12 +29,11 @@ from gapscope._results import (
     Report,
     SignalScore,
     Statement,
-    Trace,
-    Traces,
     Tune,
     Video,
     Where,
 )
+from gapscope._traces import Trace, Traces
 
 __all__ = [
     "Bug",

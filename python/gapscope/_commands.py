@@ -12,10 +12,11 @@ from typing import Any, TypeAlias, TypeVar
 
 from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
+from gapscope._json import from_json
 from gapscope._log import Log, read
 from gapscope._program import Finished, ProgressCallback, run
 from gapscope.formats import format_of
-from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video, from_json
+from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video
 
 Source: TypeAlias = Experiment | str | os.PathLike[str] | Mapping[str, Any]
 OneLog: TypeAlias = Log | str | os.PathLike[str]

@@ -12,7 +12,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from gapscope._log import Floats
-    from gapscope._results import Diagnosis, Inspection, Replay, Traces, Tune
+    from gapscope._results import Diagnosis, Inspection, Replay, Tune
+    from gapscope._traces import Traces
 
 _WIDTH, _HEIGHT = 240, 36
 _MEASURED, _PREDICTED = "#444", "#d62"

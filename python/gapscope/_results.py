@@ -5,35 +5,24 @@ Numbers that the program does not know (null) are NaN. What a newer program adds
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import os
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import Any
 
 from gapscope import _html
-from gapscope._log import Floats
+from gapscope._json import Open, from_json
 from gapscope._plugins import load_plugins
 from gapscope._program import run
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Open:
-    """What every result has: what it does not know by name."""
-
-    extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
+from gapscope._traces import Traces
 
 
 @dataclass(frozen=True)
-class Interval(_Open):
+class Interval(Open):
     """A value and its 95 % interval, in the parameter's own unit."""
 
     value: float = math.nan
@@ -46,7 +35,7 @@ class Interval(_Open):
 
 
 @dataclass(frozen=True)
-class SignalScore(_Open):
+class SignalScore(Open):
     """Measured against predicted, SI.
 
     ``nrmse``: over the signal's standard deviation; ``lag_s`` > 0: measured is later than predicted.
@@ -61,7 +50,7 @@ class SignalScore(_Open):
 
 
 @dataclass(frozen=True)
-class Where(_Open):
+class Where(Open):
     """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share."""
 
     signal: str = ""
@@ -73,7 +62,7 @@ class Where(_Open):
 
 
 @dataclass(frozen=True)
-class LogResult(_Open):
+class LogResult(Open):
     """One log of a replay or a tune."""
 
     log: str
@@ -82,59 +71,6 @@ class LogResult(_Open):
     samples: int = 0
     signals: Mapping[str, SignalScore] = field(default_factory=dict)
     where: tuple[Where, ...] = ()
-
-
-@dataclass(frozen=True)
-class Trace:
-    """A signal of one log over time, SI, each of shape (rows,); NaN where the log has no value."""
-
-    time_s: Floats
-    measured: Floats
-    predicted: Floats
-
-
-class Traces(Mapping[str, Trace]):
-    """The traces of one log by signal; read from disk when the first is asked for. ``commands``: those by actuator."""
-
-    def __init__(self, path: Path, keep: Any = None) -> None:
-        self.path = path
-        self._keep = keep
-        self._columns: dict[str, Floats] | None = None
-
-    def _load(self) -> dict[str, Floats]:
-        if self._columns is None:
-            with self.path.open(encoding="utf-8") as file:
-                names = file.readline().rstrip("\n").split(",")
-                start = file.tell()
-                try:
-                    table = np.loadtxt(file, delimiter=",", ndmin=2)
-                except ValueError:  # a value that is not there: an empty field
-                    file.seek(start)
-                    table = np.loadtxt(file, delimiter=",", ndmin=2, converters=_number)
-            self._columns = {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
-        return self._columns
-
-    def __getitem__(self, signal: str) -> Trace:
-        columns = self._load()
-        return Trace(columns["__time"], columns[f"measured/{signal}"], columns[f"predicted/{signal}"])
-
-    def __iter__(self) -> typing.Iterator[str]:
-        return (name.removeprefix("measured/") for name in self._load() if name.startswith("measured/"))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-    @property
-    def commands(self) -> Mapping[str, Floats]:
-        return {
-            name.removeprefix("command/"): values
-            for name, values in self._load().items()
-            if name.startswith("command/")
-        }
-
-
-def _number(text: str) -> float:
-    return float(text) if text.strip() else math.nan
 
 
 @dataclass(frozen=True)
@@ -171,7 +107,7 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Run(_Open):
+class Run(Open):
     """What results have in common: the folder that the program wrote, and what it said on the way."""
 
     out: Path
@@ -199,7 +135,7 @@ class Run(_Open):
 
 
 @dataclass(frozen=True)
-class ExportedEffect(_Open):
+class ExportedEffect(Open):
     """What became of an effect: ``form`` is "exact", "approximated", "host" or "dropped"."""
 
     name: str
@@ -209,7 +145,7 @@ class ExportedEffect(_Open):
 
 
 @dataclass(frozen=True)
-class ExportError(_Open):
+class ExportError(Open):
     """Normalised errors on the logs that the result was judged by; ``lost``: share of what closed that opened again."""
 
     nominal: float = math.nan
@@ -219,7 +155,7 @@ class ExportError(_Open):
 
 
 @dataclass(frozen=True)
-class Exported(_Open):
+class Exported(Open):
     """A model for another engine: ``model`` is the MJCF's path. ``unmeasured``: why there are no errors."""
 
     target: str
@@ -299,7 +235,7 @@ class Replay(_WithTraces):
 
 
 @dataclass(frozen=True)
-class Parameter(_Open):
+class Parameter(Open):
     """A fitted parameter in its own unit, with its 95 % interval. Not ``identifiable``: the logs do not say."""
 
     name: str
@@ -317,7 +253,7 @@ class Parameter(_Open):
 
 
 @dataclass(frozen=True)
-class TuneError(_Open):
+class TuneError(Open):
     """Normalised errors: before, on what was fitted, on what was not."""
 
     nominal: float
@@ -326,7 +262,7 @@ class TuneError(_Open):
 
 
 @dataclass(frozen=True)
-class Flat(_Open):
+class Flat(Open):
     """A direction of parameters that the logs leave open."""
 
     direction: Mapping[str, float]
@@ -362,7 +298,7 @@ class Tune(_WithTraces):
 
 
 @dataclass(frozen=True)
-class FoundEffect(_Open):
+class FoundEffect(Open):
     """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes."""
 
     name: str
@@ -375,7 +311,7 @@ class FoundEffect(_Open):
 
 
 @dataclass(frozen=True)
-class Statement(_Open):
+class Statement(Open):
     """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen"."""
 
     name: str
@@ -389,7 +325,7 @@ class Statement(_Open):
 
 
 @dataclass(frozen=True)
-class Gap(_Open):
+class Gap(Open):
     """Held-out normalised errors, and which share of what can close did."""
 
     nominal: float
@@ -400,7 +336,7 @@ class Gap(_Open):
 
 
 @dataclass(frozen=True)
-class NextExperiment(_Open):
+class NextExperiment(Open):
     """The command that writes the input which would settle most."""
 
     command: str = ""
@@ -432,7 +368,7 @@ class Diagnosis(_WithModel):
 
 
 @dataclass(frozen=True)
-class Channel(_Open):
+class Channel(Open):
     """A command or measured signal as it stands in the log, in its own unit."""
 
     name: str
@@ -449,7 +385,7 @@ class Channel(_Open):
 
 
 @dataclass(frozen=True)
-class Finding(_Open):
+class Finding(Open):
     """Something noticed or repaired while reading."""
 
     kind: str = ""
@@ -459,7 +395,7 @@ class Finding(_Open):
 
 
 @dataclass(frozen=True)
-class Inspection(_Open):
+class Inspection(Open):
     """Whether a log is ``fit`` for use, and what it cannot show (``verdict``)."""
 
     log: str
@@ -492,25 +428,3 @@ def _by_name(items: tuple[Parameter, ...], name: str) -> Parameter:
         if item.name == name:
             return item
     raise KeyError(f"{name}; there are {', '.join(item.name for item in items)}")
-
-
-def from_json(kind: Callable[..., T], data: Mapping[str, Any], **given: Any) -> T:
-    """A dataclass of the program's JSON; ``given`` are fields that it does not hold."""
-    hints = typing.get_type_hints(kind)
-    names = {f.name for f in dataclasses.fields(kind)} - {"extra"} - set(given)  # type: ignore[arg-type]
-    known = {name: _convert(hints[name], data[name]) for name in names if name in data}
-    extra = {key: value for key, value in data.items() if key not in names}
-    return kind(**given, **known, extra=extra)
-
-
-def _convert(hint: Any, value: Any) -> Any:
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if hint is float:
-        return math.nan if value is None else float(value)
-    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
-        return from_json(hint, value or {})
-    if origin is tuple:
-        return tuple(_convert(arguments[0], item) for item in value or ())
-    if origin is not None and issubclass(origin, Mapping):
-        return {key: _convert(arguments[1], item) for key, item in (value or {}).items()}
-    return hint() if value is None and hint in (str, int, bool) else value

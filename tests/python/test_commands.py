@@ -15,7 +15,7 @@ from typing import Any
 import gapscope as gs
 import numpy as np
 import pytest
-from gapscope._results import from_json
+from gapscope._json import from_json
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {

@@ -1,0 +1,67 @@
+"""Measured and predicted signals over time, as the program writes them (traces/*.csv)."""
+
+from __future__ import annotations
+
+import math
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gapscope._log import Floats
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A signal of one log over time, SI, each of shape (rows,); NaN where the log has no value."""
+
+    time_s: Floats
+    measured: Floats
+    predicted: Floats
+
+
+class Traces(Mapping[str, Trace]):
+    """The traces of one log by signal; read from disk when the first is asked for. ``commands``: those by actuator."""
+
+    def __init__(self, path: Path, keep: Any = None) -> None:
+        self.path = path
+        self._keep = keep
+        self._columns: dict[str, Floats] | None = None
+
+    def _load(self) -> dict[str, Floats]:
+        if self._columns is None:
+            with self.path.open(encoding="utf-8") as file:
+                names = file.readline().rstrip("\n").split(",")
+                start = file.tell()
+                try:
+                    table = np.loadtxt(file, delimiter=",", ndmin=2)
+                except ValueError:  # a value that is not there: an empty field
+                    file.seek(start)
+                    table = np.loadtxt(file, delimiter=",", ndmin=2, converters=_number)
+            self._columns = {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
+        return self._columns
+
+    def __getitem__(self, signal: str) -> Trace:
+        columns = self._load()
+        return Trace(columns["__time"], columns[f"measured/{signal}"], columns[f"predicted/{signal}"])
+
+    def __iter__(self) -> typing.Iterator[str]:
+        return (name.removeprefix("measured/") for name in self._load() if name.startswith("measured/"))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    @property
+    def commands(self) -> Mapping[str, Floats]:
+        return {
+            name.removeprefix("command/"): values
+            for name, values in self._load().items()
+            if name.startswith("command/")
+        }
+
+
+def _number(text: str) -> float:
+    return float(text) if text.strip() else math.nan

@@ -70,17 +70,16 @@ Result<UncertainParameters> UncertainOf(const Model& model, const nlohmann::orde
   if (json.value("schema", "") != kTuneSchema)
     return Error{.what = "only a result of tune says how its parameters vary together", .where = where, .cure = kCure};
   GS_ASSIGN(const TuneRun run, ReadTuneRun(json, where));
-  const auto& covariance = run.spread.covariance;
-  if (covariance.size() != run.parameters.size())
+  if (run.spread.logarithmic.size() != run.parameters.size())
     return Error{.what = "a result of an earlier version, without its covariance", .where = where, .cure = kCure};
-  std::vector<std::size_t> known;
+  std::vector<Eigen::Index> known;
   UncertainParameters uncertain;
   for (std::size_t i = 0; i < run.parameters.size(); ++i) {
     const std::string& name = run.parameters[i].name;
     if (!run.parameters[i].identifiable) continue;
-    known.push_back(i);
+    known.push_back(static_cast<Eigen::Index>(i));
     uncertain.parameters.push_back({.index = model.IndexOf(name),
-                                    .logarithmic = run.spread.logarithmic.at(i) != 0,
+                                    .logarithmic = run.spread.logarithmic[i],
                                     .together = std::ranges::any_of(run.correlated, [&](const auto& pair) {
                                       return pair.a == name || pair.b == name;
                                     })});
@@ -89,10 +88,7 @@ Result<UncertainParameters> UncertainOf(const Model& model, const nlohmann::orde
     return Error{.what = "the logs know none of the parameters: there is nothing to draw",
                  .where = where,
                  .cure = "tune with more logs, or with --freeze NAME for what goes together"};
-  const auto n = static_cast<Eigen::Index>(known.size());
-  uncertain.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
-    return covariance.at(known[static_cast<std::size_t>(a)]).at(known[static_cast<std::size_t>(b)]);
-  });
+  uncertain.covariance = run.spread.covariance(known, known);
   return uncertain;
 }
 
@@ -126,7 +122,8 @@ Result<int> RunExport(const ExportFlags& flags) {
   GS_ASSIGN(const ExportedModel exported, make(loaded.values));
   if (target.plugins && flags.time_step_s > 0) exported.spec->option.timestep = flags.time_step_s;
   GS_ASSIGN(const std::string xml, SpecToXml(*exported.spec, model.experiment().model_path));
-  ExportRun run{.result = flags.source.path,
+  ExportRun run{.info = {.seed = flags.common.seed},
+                .result = flags.source.path,
                 .target = NameOf(flags.target),
                 .what = target.what,
                 .out = flags.Path("model.xml"),

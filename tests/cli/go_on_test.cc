@@ -1,10 +1,8 @@
 // What a user does with a diagnosis: asks why, and goes on from what he accepts.
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "tests/experiment/scratch.h"
+#include "tests/cli/fixture.h"
 
 namespace gapscope::testing {
 namespace {
@@ -14,22 +12,14 @@ const std::string kQube = "'" + kSource + "/models/qube/experiment.yaml'", kLog 
 
 // One quick diagnosis of the demo's log, for all of them: its arm has a cable spring and dry friction that the model
 // lacks.
-class GoOnTest : public ::testing::Test {
+class GoOnTest : public CliTest {
  protected:
   void SetUp() override {
     found_ = Run("diagnose " + kQube + " " + kLog + " --effort quick --quiet --out '" + Folder() + "'");
     ASSERT_EQ(found_.status, 0) << found_.err;
   }
   std::string Folder() const { return scratch_.Path("found"); }
-  Answer Run(const std::string& arguments) { return scratch_.Shell("'" GAPSCOPE_PROGRAM "' " + arguments); }
   nlohmann::json Found() const { return nlohmann::json::parse(ReadAll(Folder() + "/result.json")); }
-  void ExpectRefused(const std::string& arguments, const std::vector<std::string>& says) {
-    SCOPED_TRACE(arguments);
-    const Answer answer = Run(arguments);
-    EXPECT_EQ(answer.status, 2);
-    EXPECT_EQ(answer.out, "");
-    for (const auto& part : says) EXPECT_NE(answer.err.find(part), std::string::npos) << answer.err;
-  }
   // What is asked of it.
   void TheTermsOfAStatementMakeItsEvidence();
   void AStatementIsDrawnWithItsEffectAndWithoutIt();
@@ -37,7 +27,6 @@ class GoOnTest : public ::testing::Test {
   void WhatDoesNotGoTogetherIsRefused();
   void AnotherVersionsDiagnosisIsRefused();
 
-  Scratch scratch_;
   Answer found_;
 };
 

@@ -176,6 +176,12 @@ void Ledger::Continue(Candidate* candidate, Effort effort, double reach) {
   Try(candidate, {.point = candidate->point, .cost = candidate->train_cost}, effort, reach);
 }
 
+void Ledger::TryWith(Candidate* candidate, const std::vector<double>& values, Effort effort) {
+  FitPoint point = candidate->problem->At(values, candidate->point);
+  const double cost = CostAt(bench_, *candidate, point);
+  Try(candidate, {.point = std::move(point), .cost = cost}, effort);
+}
+
 void Ledger::LookAside(Candidate* candidate) {
   constexpr double kAside = 1.25;
   for (const EffectUse& use : candidate->effects) {
@@ -185,9 +191,7 @@ void Ledger::LookAside(Candidate* candidate) {
     for (const double factor : {kAside, 1 / kAside}) {
       std::vector<double> values = candidate->values;
       values[i] = std::clamp(factor * values[i], size.low, size.high);
-      FitPoint point = candidate->problem->At(values, candidate->point);
-      const double cost = CostAt(bench_, *candidate, point);
-      Try(candidate, {.point = std::move(point), .cost = cost}, Effort::kFinish);
+      TryWith(candidate, values, Effort::kFinish);
     }
   }
 }
@@ -210,9 +214,7 @@ void Ledger::StartFromOtherShapes(Candidate* candidate, const Candidate& from, E
                  of_shape = ScaleOf(shape->scale, scales->second);
     values[index(0)] = kLeft * size;
     values[index(s)] = std::clamp(values[index(s)] + size / of_size * of_shape, placed[s].low, placed[s].high);
-    FitPoint point = candidate->problem->At(values, candidate->point);
-    const double cost = CostAt(bench_, *candidate, point);
-    Try(candidate, {.point = std::move(point), .cost = cost}, std::max(effort, Effort::kTry));
+    TryWith(candidate, values, std::max(effort, Effort::kTry));
   }
 }
 

@@ -54,6 +54,8 @@ class Ledger {
   Start StartFromSubset(const Candidate& candidate, const Candidate& part) const;
   // From where another shape of the effects that `from` lacks makes their torque (EffectParameter::takes_over).
   void StartFromOtherShapes(Candidate* candidate, const Candidate& from, Effort effort);
+  // From where the candidate is, with other values.
+  void TryWith(Candidate* candidate, const std::vector<double>& values, Effort effort);
   void Try(Candidate* candidate, const Start& start, Effort effort, double reach = kInfinity);
   // Jacobians are large: only those of the last few fits are kept.
   void Remember(Candidate* candidate);

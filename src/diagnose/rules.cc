@@ -45,6 +45,15 @@ bool IsOnEach(const EffectUse& use, const Rig& rig) {
   return !all.empty() && PlacesOf(use, rig).size() == all.size();
 }
 
+// What the catalogue says of an effect in a richer one; null: it does not hold it. On the same place: a motor's
+// direction asymmetry is no joint's friction.
+const Contained* HeldBy(const EffectUse& richer, const EffectUse& simpler, const Rig& rig) {
+  if (richer.on != simpler.on) return nullptr;
+  const std::vector<Contained>& contains = EffectOf(richer, rig).contains;
+  const auto held = std::ranges::find(contains, simpler.effect, &Contained::effect);
+  return held == contains.end() ? nullptr : &*held;
+}
+
 }  // namespace
 
 bool IsFinding(const EffectUse& use, const Model& base) {
@@ -60,17 +69,13 @@ bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig,
     const std::vector<std::string> places = PlacesOf(richer, rig);
     return !exactly && places.size() > 1 && std::find(places.begin(), places.end(), simpler.on) != places.end();
   }
-  // On the same place: a motor's direction asymmetry is no joint's friction.
-  if (richer.on != simpler.on) return false;
-  const std::vector<Contained>& contains = EffectOf(richer, rig).contains;
-  return std::any_of(contains.begin(), contains.end(),
-                     [&](const Contained& c) { return simpler.effect == c.effect && (c.exactly || !exactly); });
+  const Contained* held = HeldBy(richer, simpler, rig);
+  return held && (held->exactly || !exactly);
 }
 
 bool IsUsual(const EffectUse& richer, const EffectUse& simpler, const Rig& rig) {
-  const std::vector<Contained>& contains = EffectOf(richer, rig).contains;
-  return richer.on == simpler.on &&
-         std::ranges::any_of(contains, [&](const Contained& c) { return c.usual && c.effect == simpler.effect; });
+  const Contained* held = HeldBy(richer, simpler, rig);
+  return held && held->usual;
 }
 
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {

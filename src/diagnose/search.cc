@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
@@ -253,9 +254,9 @@ class Searcher {
 
   // The cheapest set, its members charged.
   void Lead() {
-    result_.chosen = Leaders().front();
+    Candidate* before = std::exchange(result_.chosen, Leaders().front());
     result_.ledger.Continue(result_.chosen, Effort::kFinish);
-    result_.ledger.LookAside(result_.chosen);
+    if (result_.chosen != before) result_.ledger.LookAside(result_.chosen);
   }
 
   // The chosen set without a member, refitted from the leader's optimum, or an earlier fit that is better.

@@ -59,10 +59,10 @@ std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& 
   for (const EffectUse& use : candidate.effects) {
     for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales)) {
       for (std::size_t i = 0; i < uncertainty.tuned.size(); ++i) {
-        const TunedParameter &tuned = uncertainty.tuned[i], &wider = over_kinks.tuned[i];
+        const TunedParameter &tuned = uncertainty.tuned[i], &coarse = over_kinks.tuned[i];
         if (candidate.model->parameters()[tuned.index].name != p.name) continue;
-        EffectEstimate size{p.key, p.unit, tuned.value, std::min(tuned.low, wider.low),
-                            std::max(tuned.high, wider.high)};
+        EffectEstimate size{p.key, p.unit, tuned.value, std::min(tuned.low, coarse.low),
+                            std::max(tuned.high, coarse.high)};
         if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, tuned.index, &size);
         sizes[use].push_back(std::move(size));
       }

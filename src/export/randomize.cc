@@ -1,6 +1,5 @@
 #include "src/export/randomize.h"
 
-#include <fmt/format.h>
 #include <mujoco/mjxmacro.h>
 #include <mujoco/mujoco.h>
 
@@ -8,6 +7,7 @@
 #include <cmath>
 #include <random>
 #include <set>
+#include <string_view>
 #include <type_traits>
 
 #include "src/core/dense.h"
@@ -18,7 +18,7 @@ namespace {
 
 // An array of a compiled model.
 struct Array {
-  std::string name;
+  std::string_view name;  // a literal
   std::size_t rows = 0, columns = 0;
   std::span<const mjtNum> numbers;
 };
@@ -45,8 +45,8 @@ std::vector<Array> ArraysOf(const mjModel& model) {
 }
 
 // Made of other numbers by the compiler.
-bool FollowsFromOthers(const std::string& field) {
-  static const std::set<std::string> kFollow = {
+bool FollowsFromOthers(std::string_view field) {
+  static const std::set<std::string_view> kFollow = {
       "body_subtreemass", "body_invweight0",      "dof_invweight0",    "dof_M0",
       "dof_length",       "tendon_length0",       "tendon_invweight0", "actuator_acc0",
       "actuator_length0", "actuator_lengthrange", "cam_poscom0",       "cam_pos0",
@@ -76,26 +76,31 @@ double DeviationOf(const UncertainParameters& uncertain, Eigen::Index i) {
   return precision > 0 ? std::sqrt(1 / precision) : 0;
 }
 
-// The model's arrays at changed values; it must outlive them.
+// A compiled model and its arrays.
+struct Compiled {
+  ModelPtr model;
+  std::vector<Array> arrays;
+};
+Result<Compiled> CompileWith(const MakeExport& make, std::span<const double> values) {
+  GS_ASSIGN(ExportedModel exported, make(values));
+  Compiled compiled{.model = std::move(exported.compiled)};
+  compiled.arrays = ArraysOf(*compiled.model);
+  return compiled;
+}
+
+// The model at changed values; it and `make` must outlive them.
 class Exporter {
  public:
-  Exporter(const Model& model, std::span<const double> values, const MakeExport& make)
-      : model_(model), values_(values), make_(make) {}
+  Exporter(const Model& model, std::span<const double> values, const MakeExport& make, Compiled base)
+      : model_(model), values_(values), make_(make), base_(std::move(base)), varies_(base_.arrays.size(), false) {}
 
-  Status Begin() {
-    GS_ASSIGN(base_, make_(values_));
-    arrays_ = ArraysOf(*base_.compiled);
-    varies_.assign(arrays_.size(), false);
-    return Ok();
-  }
-  const std::vector<Array>& arrays() const { return arrays_; }
+  const std::vector<Array>& arrays() const { return base_.arrays; }
 
-  // The arrays with these values; the model that they are of is `kept`.
-  Result<std::vector<Array>> At(std::span<const double> values, ExportedModel* kept) const {
-    GS_ASSIGN(*kept, make_(values));
-    std::vector<Array> arrays = ArraysOf(*kept->compiled);
-    GS_RETURN_IF_ERROR(CheckSame(arrays_, arrays, model_.experiment().path));
-    return arrays;
+  // With these values.
+  Result<Compiled> At(std::span<const double> values) const {
+    GS_ASSIGN(Compiled there, CompileWith(make_, values));
+    GS_RETURN_IF_ERROR(CheckSame(base_.arrays, there.arrays, model_.experiment().path));
+    return there;
   }
 
   // Whether an array varies over the ranges that were asked for.
@@ -109,15 +114,14 @@ class Exporter {
                  b = Moved(uncertain, p, values_[k], kNormalQuantile * deviation);
     range.low = std::min(a, b), range.high = std::max(a, b);
     std::vector<double> values(values_.begin(), values_.end());
-    ExportedModel low, high;
     values[k] = range.low;
-    GS_ASSIGN(const std::vector<Array> at_low, At(values, &low));
+    GS_ASSIGN(const Compiled low, At(values));
     values[k] = range.high;
-    GS_ASSIGN(const std::vector<Array> at_high, At(values, &high));
-    for (std::size_t f = 0; f < arrays_.size(); ++f) {
-      if (std::ranges::equal(at_low[f].numbers, at_high[f].numbers)) continue;
+    GS_ASSIGN(const Compiled high, At(values));
+    for (std::size_t f = 0; f < arrays().size(); ++f) {
+      if (std::ranges::equal(low.arrays[f].numbers, high.arrays[f].numbers)) continue;
       varies_[f] = true;
-      if (!FollowsFromOthers(arrays_[f].name)) AddNumbers(arrays_[f], at_low[f], at_high[f], &range);
+      if (!FollowsFromOthers(arrays()[f].name)) AddNumbers(arrays()[f], low.arrays[f], high.arrays[f], &range);
     }
     return range;
   }
@@ -126,7 +130,7 @@ class Exporter {
   static void AddNumbers(const Array& base, const Array& low, const Array& high, ParameterRange* range) {
     for (std::size_t i = 0; i < base.numbers.size(); ++i) {
       if (low.numbers[i] == high.numbers[i]) continue;
-      range->numbers.push_back({.field = base.name,
+      range->numbers.push_back({.field = std::string(base.name),
                                 .row = i / base.columns,
                                 .column = i % base.columns,
                                 .value = base.numbers[i],
@@ -138,14 +142,13 @@ class Exporter {
   const Model& model_;
   std::span<const double> values_;
   const MakeExport& make_;
-  ExportedModel base_;
-  std::vector<Array> arrays_;
+  Compiled base_;
   std::vector<bool> varies_;
 };
 
 // Where a field's draws go.
 DrawnField FieldOf(const Array& base, std::size_t draws) {
-  DrawnField field{.name = base.name, .shape = {draws}, .values = {}};
+  DrawnField field{.name = std::string(base.name), .shape = {draws}, .values = {}};
   if (!base.name.starts_with("opt.")) field.shape.push_back(base.rows);
   if (base.columns > 1) field.shape.push_back(base.columns);
   field.values.reserve(draws * base.numbers.size());
@@ -157,8 +160,8 @@ DrawnField FieldOf(const Array& base, std::size_t draws) {
 Result<Randomization> Randomize(const Model& model, std::span<const double> values,
                                 const UncertainParameters& uncertain, const MakeExport& make, std::size_t draws,
                                 std::uint64_t seed) {
-  Exporter exporter(model, values, make);
-  GS_RETURN_IF_ERROR(exporter.Begin());
+  GS_ASSIGN(Compiled base, CompileWith(make, values));
+  Exporter exporter(model, values, make, std::move(base));
   Randomization result;
   const auto n = static_cast<Eigen::Index>(uncertain.parameters.size());
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -185,10 +188,9 @@ Result<Randomization> Randomize(const Model& model, std::span<const double> valu
       at[k] = Moved(p, model.parameters()[k], values[k], by[i]);
       result.drawn.push_back(at[k]);
     }
-    ExportedModel kept;
-    GS_ASSIGN(const std::vector<Array> arrays, exporter.At(at, &kept));
+    GS_ASSIGN(const Compiled there, exporter.At(at));
     for (std::size_t f = 0; f < varying.size(); ++f) {
-      const auto numbers = arrays[varying[f]].numbers;
+      const auto numbers = there.arrays[varying[f]].numbers;
       result.fields[f].values.insert(result.fields[f].values.end(), numbers.begin(), numbers.end());
     }
   }

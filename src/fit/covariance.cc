@@ -89,13 +89,6 @@ TunedParameter OfCoordinate(const FitProblem& problem, const FitPoint& point, co
   return tuned;
 }
 
-// How the value, or the logarithm of its magnitude, moves with its coordinate.
-double NaturalSlope(const Coordinate& c, double y) {
-  const double h = 1e-6 * (c.high - c.low);
-  const double below = c.ToValue(y - h), above = c.ToValue(y + h);
-  return (c.logarithmic ? std::log(above / below) : above - below) / (2 * h);
-}
-
 // How a parameter that coordinates give together (SearchSpace::Couple) moves with them, in units of their ranges.
 Eigen::VectorXd SlopeOf(const FitProblem& problem, const FitPoint& point, const SearchSpace::Couple& couple,
                         int index) {
@@ -115,13 +108,12 @@ Eigen::VectorXd SlopeOf(const FitProblem& problem, const FitPoint& point, const 
   return slope;
 }
 
-// Its deviation to first order.
+// Its deviation to first order. `slope`: as SlopeOf.
 TunedParameter OfCouple(const FitProblem& problem, const FitPoint& point, const Covariance& covariance,
-                        const SearchSpace::Couple& couple, int index) {
+                        const Eigen::VectorXd& slope, int index) {
   const auto k = static_cast<std::size_t>(index);
   const Parameter& p = problem.model().parameters()[k];
   TunedParameter tuned{.index = index, .value = problem.space().Values(point.y)[k]};
-  const Eigen::VectorXd slope = SlopeOf(problem, point, couple, index);
   const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
   const double half = HalfOf(covariance, slope);
   tuned.low = std::max(p.low, tuned.value - half);
@@ -224,27 +216,23 @@ Uncertainty EstimateUncertainty(const FitProblem& problem, const FitPoint& point
                                      [&](const auto& c) { return c.size == i || c.other == i; });
     const int index = coordinates[static_cast<std::size_t>(i)].parameter;
     const bool alone = couple == space.couples().end();
+    const Coordinate& c = coordinates[static_cast<std::size_t>(i)];
+    const double range = problem.layout().high[i] - problem.layout().low[i];
+    // Of ln |value| where that is the coordinate.
+    const Eigen::VectorXd slope = alone
+                                      ? (c.logarithmic ? 1 : c.scale) * range * Eigen::VectorXd::Unit(point.y.size(), i)
+                                      : SlopeOf(problem, point, *couple, index);
     TunedParameter tuned =
-        alone ? OfCoordinate(problem, point, covariance, i) : OfCouple(problem, point, covariance, *couple, index);
-    if (alone) {
-      slopes(i, i) = NaturalSlope(coordinates[static_cast<std::size_t>(i)], point.y[i]) *
-                     (problem.layout().high[i] - problem.layout().low[i]);
-    } else {
-      slopes.row(i) = SlopeOf(problem, point, *couple, index);
-    }
-    result.spread.parameters.push_back(index);
-    result.spread.logarithmic.push_back(alone && coordinates[static_cast<std::size_t>(i)].logarithmic ? 1 : 0);
+        alone ? OfCoordinate(problem, point, covariance, i) : OfCouple(problem, point, covariance, slope, index);
+    const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
+    slopes.row(i) = deviation > 0 ? HalfOf(covariance, slope) / (kNormalQuantile * deviation) * slope : slope;
+    result.spread.logarithmic.push_back(alone && c.logarithmic);
     if (!tuned.identifiable) {
       const Parameter& p = problem.model().parameters()[static_cast<std::size_t>(index)];
       tuned.low = p.low;
       tuned.high = p.high;
     }
     result.tuned.push_back(tuned);
-  }
-  for (Eigen::Index i = 0; i < space.size(); ++i) {
-    const Eigen::VectorXd slope = slopes.row(i);
-    const double deviation = std::sqrt(std::max(0.0, slope.dot(covariance.robust * slope)));
-    if (deviation > 0) slopes.row(i) *= HalfOf(covariance, slope) / (kNormalQuantile * deviation);
   }
   result.spread.covariance = slopes * covariance.robust * slopes.transpose();
   const Eigen::VectorXd range = problem.layout().high - problem.layout().low;

@@ -33,8 +33,7 @@ inline constexpr double kNormalQuantile = 1.959964;  // 95 % of a normal distrib
 // How parameters vary together: the covariance of ln |value| where `logarithmic`, of the value elsewhere. Few blocks
 // count: kNormalQuantile deviations are the 95 % interval.
 struct Spread {
-  std::vector<int> parameters;
-  std::vector<char> logarithmic;
+  std::vector<bool> logarithmic;
   Eigen::MatrixXd covariance;
 };
 
@@ -45,7 +44,7 @@ struct Uncertainty {
   Eigen::MatrixXd of_prior;                              // the part of it that what is known beforehand leaves
   double freedom = 1;                                    // of the part that the logs leave
   std::vector<std::tuple<int, int, double>> correlated;  // |correlation| above CovariancePolicy::correlated
-  Spread spread;                                         // of `tuned`
+  Spread spread;                                         // of `tuned`, in its order
 };
 
 // Half of the 95 % interval along a direction of y. What is known beforehand is no estimate from few blocks, so that

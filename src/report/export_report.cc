@@ -12,6 +12,24 @@ namespace gapscope {
 
 using nlohmann::ordered_json;
 
+namespace {
+
+std::string RangeLines(const ExportRun& run) {
+  std::string text = fmt::format("  {} draws of what the logs leave open, and 95 % ranges:\n", run.draws);
+  for (const ParameterRange& range : run.randomization.ranges) {
+    std::vector<std::string> fields;
+    for (const VaryingNumber& number : range.numbers) {
+      if (fields.empty() || fields.back() != number.field) fields.push_back(number.field);
+    }
+    text += fmt::format("  {:<36} {:.4g} .. {:.4g} {}{}: {}\n", range.name, range.low, range.high, range.unit,
+                        range.conditional ? ", the others as they are" : "",
+                        fields.empty() ? "no number of the MJCF, so the host's" : Join(fields));
+  }
+  return text;
+}
+
+}  // namespace
+
 ordered_json ToJson(const ExportRun& run) {
   ordered_json json = {{"schema", "gapscope.fidelity/1"},
                        {"result", run.result},
@@ -67,24 +85,6 @@ ordered_json RandomizationJson(const ExportRun& run) {
   for (const DrawnField& field : run.randomization.fields) json["fields"][field.name] = field.shape;
   return json;
 }
-
-namespace {
-
-std::string RangeLines(const ExportRun& run) {
-  std::string text = fmt::format("  {} draws of what the logs leave open, and 95 % ranges:\n", run.draws);
-  for (const ParameterRange& range : run.randomization.ranges) {
-    std::vector<std::string> fields;
-    for (const VaryingNumber& number : range.numbers) {
-      if (fields.empty() || fields.back() != number.field) fields.push_back(number.field);
-    }
-    text += fmt::format("  {:<36} {:.4g} .. {:.4g} {}{}: {}\n", range.name, range.low, range.high, range.unit,
-                        range.conditional ? ", the others as they are" : "",
-                        fields.empty() ? "no number of the MJCF, so the host's" : Join(fields));
-  }
-  return text;
-}
-
-}  // namespace
 
 std::string ToTable(const ExportRun& run) {
   constexpr double kMuch = 0.1;

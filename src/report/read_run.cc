@@ -59,12 +59,12 @@ void ReadKnowledge(const ordered_json& json, TuneRun* run) {
     run->correlated.push_back({names.at(0), names.at(1), NumberAt(entry, "correlation")});
   }
   if (!json.contains("spread")) return;
-  for (const bool logarithmic : json["spread"].at("logarithmic"))
-    run->spread.logarithmic.push_back(logarithmic ? 1 : 0);
-  for (const auto& row : json["spread"].at("covariance")) {
-    auto& numbers = run->spread.covariance.emplace_back();
-    for (const auto& number : row) numbers.push_back(NumberFrom(number));
-  }
+  const auto& spread = json["spread"];
+  run->spread.logarithmic = spread.at("logarithmic").get<std::vector<bool>>();
+  const auto n = static_cast<Eigen::Index>(run->spread.logarithmic.size());
+  run->spread.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
+    return NumberFrom(spread.at("covariance").at(static_cast<std::size_t>(a)).at(static_cast<std::size_t>(b)));
+  });
 }
 
 TuneRun TuneRunFrom(const ordered_json& json) {

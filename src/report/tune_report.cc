@@ -189,9 +189,7 @@ TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t 
     run.flat.push_back(std::move(entry));
   }
   for (const auto& [a, b, r] : summary.correlated) run.correlated.push_back({name(a), name(b), r});
-  run.spread.logarithmic = summary.spread.logarithmic;
-  for (const auto& row : summary.spread.covariance.rowwise())
-    run.spread.covariance.emplace_back(row.begin(), row.end());
+  run.spread = summary.spread;
   return run;
 }
 
@@ -236,8 +234,9 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
   json["correlated"] = ordered_json::array();
   for (const auto& [a, b, r] : run.correlated)
     json["correlated"].push_back({{"parameters", {a, b}}, {"correlation", r}});
-  json["spread"] = {{"logarithmic", ordered_json::array()}, {"covariance", run.spread.covariance}};
-  for (const char logarithmic : run.spread.logarithmic) json["spread"]["logarithmic"].push_back(logarithmic != 0);
+  json["spread"] = {{"logarithmic", run.spread.logarithmic}, {"covariance", ordered_json::array()}};
+  for (const auto& row : run.spread.covariance.rowwise())
+    json["spread"]["covariance"].push_back(std::vector<double>(row.begin(), row.end()));
   json["error"] = JsonErrors(run);
   json["held_out_by"] = run.held_out_by;
   json["train"] = Json(run.train);

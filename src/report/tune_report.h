@@ -30,11 +30,6 @@ struct TuneRun {
     std::string a, b;
     double correlation = 0;
   };
-  // How the parameters vary together, in their order (gapscope::Spread).
-  struct Spread {
-    std::vector<char> logarithmic;
-    std::vector<std::vector<double>> covariance;
-  };
   struct Log {
     std::string log;
     Outcome outcome = Outcome::kCompleted;
@@ -52,12 +47,12 @@ struct TuneRun {
   std::vector<std::string> left_frozen;  // parameters that would be tuned if the logs knew them
   std::vector<Flat> flat;
   std::vector<Correlated> correlated;
-  Spread spread;  // empty: a result of an earlier version
   double error_nominal = 0, error_train = 0, error_held_out = 0;
   std::string held_out_by;  // how logs were held out, for the user
   std::vector<Log> train, held_out;
   RunModel model;
   double time_step_s = 0, command_shift_s = 0, force_shift_s = 0;
+  Spread spread;  // of `parameters`; empty: a result of an earlier version
 };
 TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed);
 

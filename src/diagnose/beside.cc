@@ -113,13 +113,8 @@ double FreeFormShare(const ColumnTable& table, const TorquePrior& torques) {
   const std::size_t own = columns.size();
   columns.insert(columns.end(), table.torques.begin(), table.torques.end());
   double before = 0, after = 0;
-  for (const long fold : {0L, 1L}) {
-    std::vector<double> fitted, judged;
-    for (const GramPart& part : table.gram.parts) {
-      const bool in = (part.number + static_cast<long>(part.log)) % 2 == fold;
-      fitted.push_back(in ? 1 : 0), judged.push_back(in ? 0 : 1);
-    }
-    const Eigen::MatrixXd a = Sum(table.gram, fitted), b = Sum(table.gram, judged);
+  for (std::size_t fold = 0; fold < kFolds; ++fold) {
+    const Eigen::MatrixXd &a = table.gram.parts[fold], &b = table.gram.parts[kFolds - 1 - fold];
     Eigen::MatrixXd hessian = a(columns, columns);
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);
@@ -150,7 +145,7 @@ BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::ve
       if (auto bounds = BoundsOfEffect(bench, table, use, torques); !bounds.empty()) result.bounds[use] = bounds;
     }
   }
-  const ColumnTable free_form = MakeColumns(bench, final, {}, MakeFreeForm(bench));
+  const ColumnTable free_form = MakeFolds(bench, final, MakeFreeForm(bench));
   if (free_form.valid && !free_form.torques.empty())
     result.free_form = FreeFormShare(free_form, TorquesBeside(free_form, residuals));
   final.derivatives.reset();

@@ -221,14 +221,22 @@ Eigen::MatrixXd Reduce(const ColumnTable& table) {
   return reduced;
 }
 
-ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, const std::vector<ProbeTorque>& torques) {
+// Of all parts together; a single part is not kept beside it, since there may be thousands of columns.
+Eigen::MatrixXd TakeSum(GramSystem* gram) {
+  Eigen::MatrixXd sum = std::move(gram->parts.front());
+  if (gram->parts.size() > 1) gram->parts.front() = sum;
+  for (std::size_t p = 1; p < gram->parts.size(); ++p) sum += gram->parts[p];
+  if (gram->parts.size() == 1) gram->parts.clear();
+  return sum;
+}
+
+ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, const std::vector<ProbeTorque>& torques,
+                   const GramParts& parts = {}) {
   ColumnTable table{.trials = std::move(wanted.trials)};
   AddTorques(bench, parent, torques, &wanted, &table);
   const auto make = [&] {
-    // Not with the fit's own Jacobian, which is too fine to look ahead. Two parts of each log, by two seconds in turn.
-    constexpr long kHalfSeconds = 4;
-    return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01, .steps = StepKind::kQuick},
-                    [](long half_second) { return half_second / kHalfSeconds % 2; });
+    // Not with the fit's own Jacobian, which is too fine to look ahead.
+    return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01, .steps = StepKind::kQuick}, parts);
   };
   table.gram = bench.journal ? bench.journal->Gram("columns " + parent.Name(), parent.point,
                                                    ColumnNames(*parent.problem, wanted.columns), make)
@@ -239,7 +247,7 @@ ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, con
     return std::any_of(trial.columns.begin(), trial.columns.end(),
                        [&](Eigen::Index c) { return table.gram.failed[static_cast<std::size_t>(c - wanted.first)]; });
   });
-  table.sum = Sum(table.gram);
+  table.sum = TakeSum(&table.gram);
   TakeRestApart(table, &table.sum);
   table.bounds = BoundsOf(table, *parent.problem, parent.point);
   table.reduced = Reduce(table);
@@ -290,6 +298,14 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
     for (const std::size_t u : group) add({u});
   }
   return Finish(bench, parent, std::move(wanted), torques);
+}
+
+ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques) {
+  constexpr long kHalfSeconds = 4;
+  return Finish(bench, parent, WantedOf(parent), torques,
+                {.count = kFolds, .of = [](std::size_t log, long half_second) {
+                   return (static_cast<std::size_t>(half_second / kHalfSeconds) + log) % kFolds;
+                 }});
 }
 
 std::vector<Eigen::Index> ColumnTable::FreeCoordinates() const {

@@ -30,7 +30,7 @@ struct Trial {
 struct ColumnTable {
   std::vector<Trial> trials;
   std::vector<Eigen::Index> torques;  // columns of random torques
-  GramSystem gram;
+  GramSystem gram;                    // its parts are in `sum` alone, but those of MakeFolds
   Eigen::MatrixXd sum;
   ColumnBounds bounds;
   Eigen::MatrixXd reduced;  // of the columns beside y, and the residual: y, with what is known of it, taken out
@@ -45,6 +45,9 @@ struct ColumnTable {
 // there (SearchPolicy::scan).
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
                         const std::vector<ProbeTorque>& torques, const ColumnTable* scan = nullptr);
+// Columns of torques alone, their products apart by two folds of each log (GramSystem::parts): two seconds in turn.
+inline constexpr std::size_t kFolds = 2;
+ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques);
 // Values of an effect's parameters (in the order of PlacedParameters) at coefficients of its columns.
 std::vector<double> ValuesAt(const Workbench& bench, const Trial& trial, std::span<const double> coefficients);
 

@@ -70,15 +70,8 @@ std::vector<double> Pack(const GramSystem& g) {
   Put(out, g.work);
   out.push_back(static_cast<double>(g.failed.size()));
   out.insert(out.end(), g.failed.begin(), g.failed.end());
-  PutAll(out, g.of_priors);
   out.push_back(static_cast<double>(g.half_seconds));
-  out.push_back(static_cast<double>(g.parts.size()));
-  for (const GramPart& part : g.parts) {
-    for (const double n :
-         {static_cast<double>(part.log), static_cast<double>(part.number), static_cast<double>(part.rows)})
-      out.push_back(n);
-    Put(out, part.products);
-  }
+  PutAll(out, g.parts);
   return out;
 }
 
@@ -89,15 +82,8 @@ GramSystem UnpackGram(const std::vector<double>& numbers) {
   g.work = in.TakeWork();
   g.failed.resize(in.Count());
   for (char& failed : g.failed) failed = static_cast<char>(in.Number());
-  g.of_priors = TakeAll<Eigen::MatrixXd>(in);
   g.half_seconds = in.Count();
-  g.parts.resize(in.Count());
-  for (GramPart& part : g.parts) {
-    part.log = in.Count();
-    part.number = static_cast<long>(in.Number());
-    part.rows = in.Count();
-    part.products = in.Matrix();
-  }
+  g.parts = TakeAll<Eigen::MatrixXd>(in);
   return g;
 }
 

@@ -215,15 +215,16 @@ Derivatives FitProblem::Differentiate(const FitPoint& point, const DifferenceOpt
   Derivatives result{.residuals = std::move(base), .work = {}};
   result.work = WorkOf(options, !result.residuals.empty());
   if (options.steps == StepKind::kQuick && options_.steps == StepKind::kOwn && model_.HasQuickSteps()) {
-    Evaluation quick = Evaluate(point, Keep::kResiduals, {}, StepKind::kQuick);
+    Evaluation quick = Evaluate(point, Keep::kResiduals, options.mask, StepKind::kQuick);
     result.work += quick.work;
     if (std::isfinite(quick.cost)) result.quick = std::move(quick.residuals);
   }
   result.residuals.resize(windows_.size());
   result.jacobians.resize(windows_.size());
-  std::vector<char> good(windows_.size(), 0);
+  std::vector<char> good(windows_.size(), 1);
   const std::vector<double> values = Values(point);
   pool_.ForEach(windows_.size(), [&](std::size_t w, int index) {
+    if (!options.mask.empty() && !options.mask[w]) return;
     Differences differences(*this, GetWorker(index), w, point, values, options, result);
     good[w] = static_cast<char>(differences.Make());
   });

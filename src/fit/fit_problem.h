@@ -47,6 +47,7 @@ struct DifferenceOptions {
   // Columns that are left zero: of y (empty: none), and the first ones of a window's state.
   std::vector<char> known = {};
   Eigen::Index known_states = 0;
+  WindowMask mask = {};  // windows that are left out have no residuals and no Jacobian
 };
 
 // Residuals and Jacobian of a point.

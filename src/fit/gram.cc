@@ -3,10 +3,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "src/core/collect.h"
 #include "src/core/dense.h"
@@ -16,58 +16,60 @@
 namespace gapscope {
 namespace {
 
-// A window's columns with its state taken out of them, and the rows of its prior after that.
-struct StateFree {
-  Eigen::MatrixXd rows, prior;
+// Columns [y | extra | residual] of a window, below them the rows of its state's prior.
+class WindowColumns {
+ public:
+  // Room for `size` columns; all but the extra ones are there. Takes the window's Jacobian.
+  void Begin(const Eigen::VectorXd& residual, Eigen::MatrixXd jacobian, const FitWindow& window,
+             const Eigen::VectorXd& state, Eigen::Index size) {
+    const Eigen::Index rows = residual.size(), m = state.size(), n = jacobian.cols() - m;
+    columns_.setZero(rows + m, size);
+    columns_.topLeftCorner(rows, n) = jacobian.leftCols(n);
+    columns_.col(size - 1) << residual, window.prior.cwiseProduct(state);
+    states_.resize(rows + m, m);
+    states_ << jacobian.rightCols(m), Eigen::MatrixXd(window.prior.asDiagonal());
+  }
+  void Set(Eigen::Index column, const Eigen::VectorXd& values) { columns_.col(column).head(values.size()) = values; }
+  // Robust weights, then the state out of all columns.
+  void Finish(const Huber& huber) {
+    const Eigen::Index m = states_.cols(), rows = columns_.rows() - m;
+    Eigen::VectorXd residual = columns_.col(columns_.cols() - 1).head(rows);
+    if (!huber.plain()) {
+      Eigen::MatrixXd all(rows, columns_.cols() + m);
+      all << columns_.topRows(rows), states_.topRows(rows);
+      huber.Weigh(residual, all);
+      columns_.topRows(rows) = all.leftCols(columns_.cols());
+      states_.topRows(rows) = all.rightCols(m);
+    }
+    if (m == 0) return;
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(states_);
+    columns_.applyOnTheLeft(qr.householderQ().adjoint());
+    columns_.topRows(m).setZero();
+    columns_.applyOnTheLeft(qr.householderQ());
+  }
+  const Eigen::MatrixXd& columns() const { return columns_; }
+  Eigen::Index priors() const { return states_.cols(); }
+
+ private:
+  Eigen::MatrixXd columns_, states_;
 };
 
-StateFree TakeStateOut(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& states, const Eigen::VectorXd& prior,
-                       const Eigen::VectorXd& state) {
-  const Eigen::Index rows = columns.rows(), m = prior.size();
-  if (m == 0) return {.rows = columns, .prior = Eigen::MatrixXd(0, columns.cols())};
-  Eigen::MatrixXd basis(rows + m, m), all = Eigen::MatrixXd::Zero(rows + m, columns.cols());
-  basis.topRows(rows) = states;
-  basis.bottomRows(m) = prior.asDiagonal();
-  all.topRows(rows) = columns;
-  all.rightCols(1).bottomRows(m) = prior.cwiseProduct(state);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
-  all.applyOnTheLeft(qr.householderQ().adjoint());
-  all.topRows(m).setZero();
-  all.applyOnTheLeft(qr.householderQ());
-  return {.rows = all.topRows(rows), .prior = all.bottomRows(m)};
-}
-
-// Columns [y | extra | residual] of one window, with robust weights. `extra`: what they add to the residuals.
-StateFree WindowColumns(const FitProblem& problem, std::size_t w, const FitPoint& point, const Derivatives& at,
-                        const std::vector<Residuals>& extra) {
-  const Eigen::Index n = problem.layout().low.size(), m = point.states[w].size();
-  Eigen::VectorXd residual = at.residuals[w];
-  const auto k = static_cast<Eigen::Index>(extra.size());
-  Eigen::MatrixXd columns(residual.size(), n + m + k);
-  columns.leftCols(n) = at.jacobians[w].leftCols(n);
-  columns.rightCols(m) = at.jacobians[w].rightCols(m);
-  for (Eigen::Index e = 0; e < k; ++e) columns.col(n + e) = extra[static_cast<std::size_t>(e)][w];
-  problem.huber().Weigh(residual, columns);
-  Eigen::MatrixXd wanted(residual.size(), n + k + 1);
-  wanted << columns.leftCols(n + k), residual;
-  return TakeStateOut(wanted, columns.rightCols(m), problem.windows()[w].prior, point.states[w]);
-}
-
 // What the residuals at a point have beyond `base`; none: it cannot be simulated.
-std::optional<Residuals> Added(FitProblem& problem, const FitPoint& point, const Residuals& base, StepKind steps,
-                               Work* work) {
-  Evaluation there = problem.Evaluate(point, Keep::kResiduals, {}, steps);
+std::optional<Residuals> Added(FitProblem& problem, const FitPoint& point, const Residuals& base,
+                               const WindowMask& mask, StepKind steps, Work* work) {
+  Evaluation there = problem.Evaluate(point, Keep::kResiduals, mask, steps);
   *work += there.work;
   if (!std::isfinite(there.cost)) return std::nullopt;
   for (std::size_t w = 0; w < base.size(); ++w) there.residuals[w] -= base[w];
   return std::move(there.residuals);
 }
 
-// Makes columns at a point, those in one replay that may share it.
+// Makes columns at a point, those in one replay that may share it; of some windows, the others have none.
 class ExtraColumns {
  public:
-  ExtraColumns(const FitProblem& parent, const FitPoint& point, const Derivatives& at, Work* work)
-      : parent_(parent), point_(point), at_(at), work_(*work) {}
+  ExtraColumns(const FitProblem& parent, const FitPoint& point, const Derivatives& at, const WindowMask& mask,
+               Work* work)
+      : parent_(parent), point_(point), at_(at), mask_(mask), work_(*work) {}
 
   // What the column adds to the residuals; none: it cannot be simulated.
   std::optional<Residuals> Make(const ExtraColumn& column) {
@@ -87,14 +89,15 @@ class ExtraColumns {
     child.SetProbes(probes);
     std::optional<Residuals> added;
     if (at_.steps() == StepKind::kQuick && child.model().HasQuickSteps())
-      added = Added(child, there, at_.base(), StepKind::kQuick, &work_);
-    if (!added) added = Added(child, there, at_.residuals, StepKind::kOwn, &work_);
+      added = Added(child, there, at_.base(), mask_, StepKind::kQuick, &work_);
+    if (!added) added = Added(child, there, at_.residuals, mask_, StepKind::kOwn, &work_);
     child.SetProbes({});
     return added;
   }
   // Zero on the other signals.
   Residuals Own(Residuals added, const MovedSignals& moved) const {
     for (std::size_t w = 0; w < added.size(); ++w) {
+      if (!mask_[w]) continue;
       const FitWindow& window = parent_.windows()[w];
       KeepMoved(parent_.recordings()[window.log], window, moved, added[w]);
     }
@@ -104,40 +107,83 @@ class ExtraColumns {
   const FitProblem& parent_;
   const FitPoint& point_;
   const Derivatives& at_;
+  const WindowMask& mask_;
   Work& work_;
   const ExtraColumn* last_ = nullptr;
   std::optional<Residuals> together_;
 };
 
-Residuals Zero(const Residuals& like) {
-  return Collect(like, [](const Eigen::VectorXd& of) { return Eigen::VectorXd(Eigen::VectorXd::Zero(of.size())); });
-}
-
-// Scored rows of a window that belong to a part.
+// Rows of a window's columns that belong to a part.
 struct PartRows {
   std::size_t window = 0;
-  RowBlock rows;
+  Eigen::Index begin = 0, count = 0;
+  double weight = 1;
 };
 
-// Products of the part's rows, of all signals: the lower half stripe by stripe, so that the sums are the same on any
-// number of workers, and no worker holds a matrix of its own.
-Eigen::MatrixXd Products(const FitProblem& problem, const std::vector<StateFree>& columns,
-                         const std::vector<PartRows>& part) {
+Eigen::Index ResidualsOf(const FitProblem& problem, std::size_t w) {
+  const FitWindow& window = problem.windows()[w];
+  return window.scored() * static_cast<Eigen::Index>(problem.recordings()[window.log].measured.size());
+}
+
+// Which rows belong to which part.
+std::vector<std::vector<PartRows>> RowsOfParts(const FitProblem& problem, const GramParts& parts,
+                                               std::size_t* half_seconds) {
+  std::vector<std::vector<PartRows>> rows(parts.count);
+  std::set<std::pair<std::size_t, long>> seen;
+  std::vector<std::vector<double>> of_log(problem.recordings().size(), std::vector<double>(parts.count, 0.0));
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) {
+    const FitWindow& window = problem.windows()[w];
+    for (const RowBlock& block : RowBlocks(problem.recordings()[window.log], window)) {
+      seen.insert({window.log, block.half_second});
+      const std::size_t part = parts.of(window.log, block.half_second);
+      of_log[window.log][part] += static_cast<double>(block.count);
+      for (Eigen::Index signal = 0; signal < ResidualsOf(problem, w); signal += window.scored())
+        rows[part].push_back({.window = w, .begin = signal + block.begin, .count = block.count});
+    }
+  }
+  *half_seconds = seen.size();
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) {
+    const FitWindow& window = problem.windows()[w];
+    const std::vector<double>& of = of_log[window.log];
+    const double all = std::accumulate(of.begin(), of.end(), 0.0);
+    for (std::size_t part = 0; part < parts.count && window.prior.size() > 0 && all > 0; ++part)
+      rows[part].push_back({w, ResidualsOf(problem, w), window.prior.size(), of[part] / all});
+  }
+  return rows;
+}
+
+// Windows in turn whose columns are together no more than a quarter of a gigabyte, or one window.
+std::vector<WindowMask> Batches(const FitProblem& problem, Eigen::Index columns) {
+  constexpr Eigen::Index kNumbers = 32 << 20;
+  std::vector<WindowMask> batches;
+  Eigen::Index numbers = kNumbers;
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) {
+    const Eigen::Index own = ResidualsOf(problem, w) * columns;
+    if (numbers + own > kNumbers) {
+      batches.emplace_back(problem.windows().size(), static_cast<char>(false));
+      numbers = 0;
+    }
+    numbers += own;
+    batches.back()[w] = static_cast<char>(true);
+  }
+  return batches;
+}
+
+// Adds weighted products of the rows that are there: the lower half stripe by stripe, so that the sums are the same on
+// any number of workers, and no worker holds a matrix of its own.
+void AddProducts(const FitProblem& problem, const std::vector<WindowColumns>& windows,
+                 const std::vector<PartRows>& part, Eigen::MatrixXd* products) {
   constexpr Eigen::Index kStripe = 64;
-  const Eigen::Index size = columns.front().rows.cols();
-  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(size, size);
+  const Eigen::Index size = products->cols();
   problem.pool().ForEach(static_cast<std::size_t>((size + kStripe - 1) / kStripe), [&](std::size_t k, int) {
     const Eigen::Index first = static_cast<Eigen::Index>(k) * kStripe, width = std::min(kStripe, size - first);
-    for (const auto& [window, block] : part) {
-      const Eigen::MatrixXd& all = columns[window].rows;
-      for (Eigen::Index row = block.begin; row < all.rows(); row += problem.windows()[window].scored()) {
-        const auto rows = all.middleRows(row, block.count);
-        products.block(first, first, size - first, width).noalias() +=
-            rows.rightCols(size - first).transpose() * rows.middleCols(first, width);
-      }
+    for (const PartRows& of : part) {
+      if (windows[of.window].columns().size() == 0) continue;
+      const auto rows = windows[of.window].columns().middleRows(of.begin, of.count);
+      products->block(first, first, size - first, width).noalias() +=
+          of.weight * rows.rightCols(size - first).transpose() * rows.middleCols(first, width);
     }
   });
-  return products.selfadjointView<Eigen::Lower>();
 }
 
 }  // namespace
@@ -162,62 +208,61 @@ std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const 
   return names;
 }
 
-GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options, const std::function<long(long)>& part_of) {
-  GramSystem gram{.columns = ColumnNames(parent, extra), .parameters = parent.layout().low.size()};
-  const Derivatives at = parent.Differentiate(point, options);
-  gram.work = at.work;
-  if (!at.valid) return gram;
-  ExtraColumns columns(parent, point, at, &gram.work);
-  std::vector<Residuals> others;
-  for (const ExtraColumn& column : extra) {
-    std::optional<Residuals> added = columns.Make(column);
-    gram.failed.push_back(static_cast<char>(!added));
-    others.push_back(added ? *std::move(added) : Zero(at.residuals));
+namespace {
+
+// The columns of some windows, none of the others; nothing: they cannot be simulated at the point.
+std::optional<std::vector<WindowColumns>> ColumnsOf(FitProblem& parent, const FitPoint& point,
+                                                    std::span<const ExtraColumn> extra,
+                                                    const DifferenceOptions& options, GramSystem* gram) {
+  Derivatives at = parent.Differentiate(point, options);
+  gram->work += at.work;
+  if (!at.valid) return std::nullopt;
+  std::vector<WindowColumns> windows(parent.windows().size());
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    if (!options.mask[w]) continue;
+    windows[w].Begin(at.residuals[w], std::exchange(at.jacobians[w], {}), parent.windows()[w], point.states[w],
+                     static_cast<Eigen::Index>(gram->columns.size()));
   }
-  const std::size_t count = parent.windows().size();
-  std::vector<StateFree> state_free(count);
-  parent.pool().ForEach(count,
-                        [&](std::size_t w, int) { state_free[w] = WindowColumns(parent, w, point, at, others); });
-  const auto size = static_cast<Eigen::Index>(gram.columns.size());
-  gram.of_priors.assign(parent.recordings().size(), Eigen::MatrixXd::Zero(size, size));
-  std::map<std::pair<std::size_t, long>, std::vector<PartRows>> parts;
-  std::set<std::pair<std::size_t, long>> half_seconds;
-  for (std::size_t w = 0; w < count; ++w) {
-    const FitWindow& window = parent.windows()[w];
-    gram.of_priors[window.log].noalias() += state_free[w].prior.transpose() * state_free[w].prior;
-    for (const RowBlock& block : RowBlocks(parent.recordings()[window.log], window)) {
-      half_seconds.insert({window.log, block.half_second});
-      parts[{window.log, part_of ? part_of(block.half_second) : 0}].push_back({w, block});
+  ExtraColumns columns(parent, point, at, options.mask, &gram->work);
+  for (std::size_t e = 0; e < extra.size(); ++e) {
+    const std::optional<Residuals> added = columns.Make(extra[e]);
+    if (!added) gram->failed[e] = static_cast<char>(true);
+    for (std::size_t w = 0; w < windows.size() && added; ++w) {
+      if (options.mask[w]) windows[w].Set(gram->parameters + static_cast<Eigen::Index>(e), (*added)[w]);
     }
   }
-  gram.half_seconds = half_seconds.size();
-  for (const auto& [key, rows] : parts) {
-    GramPart part{.log = key.first, .number = key.second, .products = Products(parent, state_free, rows)};
-    for (const PartRows& of : rows)
-      part.rows += static_cast<std::size_t>(of.rows.count) * parent.recordings()[part.log].measured.size();
-    gram.parts.push_back(std::move(part));
+  parent.pool().ForEach(windows.size(), [&](std::size_t w, int) {
+    if (options.mask[w]) windows[w].Finish(parent.huber());
+  });
+  return windows;
+}
+
+}  // namespace
+
+GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
+                    const DifferenceOptions& options, const GramParts& parts) {
+  GramSystem gram{.columns = ColumnNames(parent, extra),
+                  .parameters = parent.layout().low.size(),
+                  .failed = std::vector<char>(extra.size(), static_cast<char>(false))};
+  const auto size = static_cast<Eigen::Index>(gram.columns.size());
+  const auto rows = RowsOfParts(parent, parts, &gram.half_seconds);
+  gram.parts.assign(parts.count, Eigen::MatrixXd::Zero(size, size));
+  DifferenceOptions of_batch = options;
+  for (WindowMask& batch : Batches(parent, size)) {
+    of_batch.mask = std::move(batch);
+    const auto windows = ColumnsOf(parent, point, extra, of_batch, &gram);
+    if (!windows) return gram;
+    for (std::size_t p = 0; p < parts.count; ++p) AddProducts(parent, *windows, rows[p], &gram.parts[p]);
+  }
+  for (Eigen::MatrixXd& products : gram.parts) {
+    for (std::size_t e = 0; e < extra.size(); ++e) {
+      const Eigen::Index column = gram.parameters + static_cast<Eigen::Index>(e);
+      if (gram.failed[e]) products.row(column).setZero(), products.col(column).setZero();
+    }
+    products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
   }
   gram.valid = true;
   return gram;
-}
-
-Eigen::MatrixXd Sum(const GramSystem& gram, std::span<const double> weights) {
-  GS_CHECK(weights.empty() || weights.size() == gram.parts.size());
-  const auto size = static_cast<Eigen::Index>(gram.columns.size());
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size, size);
-  std::vector<double> weight_of_log(gram.of_priors.size(), 0.0), rows_of_log(gram.of_priors.size(), 0.0);
-  for (std::size_t b = 0; b < gram.parts.size(); ++b) {
-    const GramPart& part = gram.parts[b];
-    const double weight = weights.empty() ? 1 : weights[b];
-    sum += weight * part.products;
-    weight_of_log[part.log] += weight * static_cast<double>(part.rows);
-    rows_of_log[part.log] += static_cast<double>(part.rows);
-  }
-  for (std::size_t l = 0; l < gram.of_priors.size(); ++l) {
-    if (rows_of_log[l] > 0) sum += weight_of_log[l] / rows_of_log[l] * gram.of_priors[l];
-  }
-  return sum;
 }
 
 ColumnBounds BoundsAt(const FitProblem& parent, const FitPoint& point, const GramSystem& gram, double most_extra) {

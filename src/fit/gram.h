@@ -4,7 +4,8 @@
 // Columns are [y | extra | residual]: the Jacobian of y at a point, what an effect at a trial value adds to the
 // residuals there, and the residuals. Each window's state is taken out of all of them by an orthogonal projection (its
 // columns and its prior's rows), so that sums of parts are the normal equations with the states eliminated (Reduce;
-// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the parts.
+// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the parts. The states' priors of a log belong
+// to each part by the share of the log's rows that lie in it.
 #ifndef GAPSCOPE_FIT_GRAM_H_
 #define GAPSCOPE_FIT_GRAM_H_
 
@@ -17,22 +18,13 @@
 
 namespace gapscope {
 
-// Products of one part of one log, all windows there together.
-struct GramPart {
-  std::size_t log = 0;
-  long number = 0;
-  std::size_t rows = 0;      // residuals
-  Eigen::MatrixXd products;  // columns x columns
-};
-
 struct GramSystem {
-  std::vector<std::string> columns;  // "arm.mass", "offset arm_rad log 0", "shift", the extra ones' names, "residual"
-  Eigen::Index parameters = 0;       // y's part of them
-  std::vector<GramPart> parts;       // in the order of logs and numbers
-  std::size_t half_seconds = 0;      // of the logs that have residuals
-  std::vector<Eigen::MatrixXd> of_priors;  // per log: the rows of its states' priors
-  std::vector<char> failed;                // per extra column: cannot be simulated, and is zero
-  bool valid = false;                      // false: the point cannot be simulated
+  std::vector<std::string> columns;    // "arm.mass", "offset arm_rad log 0", "shift", the extra ones' names, "residual"
+  Eigen::Index parameters = 0;         // y's part of them
+  std::vector<Eigen::MatrixXd> parts;  // products of the columns over each part's rows
+  std::size_t half_seconds = 0;        // of the logs that have residuals
+  std::vector<char> failed;            // per extra column: cannot be simulated, and is zero
+  bool valid = false;                  // false: the point cannot be simulated
   Work work;
 };
 
@@ -54,13 +46,13 @@ struct ExtraColumn {
 // GramSystem::columns of a problem with these.
 std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra);
 
-// `part_of`: the part to which a half second of a log belongs; null: each log is one part.
+// Parts of the logs, and to which of them a half second of a log belongs.
+struct GramParts {
+  std::size_t count = 1;
+  std::function<std::size_t(std::size_t log, long half_second)> of = [](std::size_t, long) { return 0; };
+};
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options, const std::function<long(long half_second)>& part_of = {});
-
-// Weighted sum over parts; a fold that is left out weighs 0. `weights`: one per part, or empty for all ones. The
-// states' priors of a log weigh as much as its parts do on average.
-Eigen::MatrixXd Sum(const GramSystem& gram, std::span<const double> weights = {});
+                    const DifferenceOptions& options, const GramParts& parts = {});
 
 // The best of a set of columns by arithmetic.
 struct BoundedSolution {

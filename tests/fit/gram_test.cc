@@ -55,7 +55,7 @@ TEST(GramTest, SumsAreTheReducedNormalEquations) {
     const Linearization at = Linearize(problem, point, {});
     const GramSystem gram = MakeGram(problem, point, {}, {});
     ASSERT_TRUE(at.valid && gram.valid);
-    const Eigen::MatrixXd sum = Sum(gram);
+    const Eigen::MatrixXd& sum = gram.parts[0];
     const Eigen::Index n = gram.parameters;
     Eigen::MatrixXd hessian = sum.topLeftCorner(n, n);
     hessian.diagonal() += problem.prior().weight;
@@ -69,15 +69,14 @@ TEST(GramTest, SumsAreTheReducedNormalEquations) {
   }
 }
 
-TEST(GramTest, LogThatWeighsNothingIsNotThere) {
+TEST(GramTest, PartOfOneLogIsWhatItIsAlone) {
   Bench bench;
   FitProblem both(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
   const std::vector<Recording> one = {bench.logs[0]};
   FitProblem alone(*bench.rig.model, one, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
-  const GramSystem gram = MakeGram(both, both.Start(), {}, {}), wanted = MakeGram(alone, alone.Start(), {}, {});
-  std::vector<double> weights;
-  for (const GramPart& part : gram.parts) weights.push_back(part.log == 0 ? 1 : 0);
-  const Eigen::MatrixXd sum = Sum(gram, weights), expected = Sum(wanted);
+  const GramParts by_log{.count = 2, .of = [](std::size_t log, long) { return log; }};
+  const GramSystem gram = MakeGram(both, both.Start(), {}, {}, by_log), wanted = MakeGram(alone, alone.Start(), {}, {});
+  const Eigen::MatrixXd &sum = gram.parts[0], &expected = wanted.parts[0];
   const Eigen::Index r = gram.parameters, q = wanted.parameters;
   for (Eigen::Index i = 0; i < 3; ++i) {
     for (Eigen::Index j = 0; j < 3; ++j) EXPECT_NEAR(sum(i, j), expected(i, j), 1e-10 * std::abs(expected(i, i)));
@@ -86,6 +85,21 @@ TEST(GramTest, LogThatWeighsNothingIsNotThere) {
   EXPECT_NEAR(sum(r, r), expected(q, q), 1e-10 * expected(q, q));
   EXPECT_EQ(gram.columns.back(), "residual");
   EXPECT_EQ(gram.columns[0], "motor.kt");
+}
+
+TEST(GramTest, PartsAddUpToTheWhole) {
+  Bench bench;
+  FitProblem problem(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
+  FitPoint point = problem.Start();
+  for (auto& state : point.states) state.setConstant(1e-3);
+  const GramParts thirds{.count = 3,
+                         .of = [](std::size_t, long half_second) { return static_cast<std::size_t>(half_second % 3); }};
+  const GramSystem whole = MakeGram(problem, point, {}, {}), parts = MakeGram(problem, point, {}, {}, thirds);
+  ASSERT_EQ(parts.parts.size(), 3U);
+  for (const auto& part : parts.parts) EXPECT_GT(part.norm(), 0.01 * whole.parts[0].norm());
+  const Eigen::MatrixXd sum = parts.parts[0] + parts.parts[1] + parts.parts[2];
+  EXPECT_LT((sum - whole.parts[0]).norm(), kRounding * whole.parts[0].norm());
+  EXPECT_EQ(parts.half_seconds, whole.half_seconds);
 }
 
 // At the same point: a child's inherited columns are the parent's, and those that it lacks are differenced anew. Taken
@@ -137,7 +151,7 @@ TEST(GramTest, ExtraColumnDropsWhatTheDenseProblemDrops) {
   const ExtraColumn friction{.name = "friction", .child = &child, .values = values};
   const GramSystem gram = MakeGram(parent, point, {&friction, 1}, {.step = 0.01});
   ASSERT_TRUE(gram.valid);
-  const Eigen::MatrixXd sum = Sum(gram);
+  const Eigen::MatrixXd& sum = gram.parts[0];
   const ColumnBounds bounds = BoundsAt(parent, point, gram, 2);
   const Eigen::Index n = gram.parameters;
   const BoundedSolution with = SolveBounded(sum, First(n + 1), bounds);
@@ -201,7 +215,7 @@ TEST(GramTest, BoundedStepOfALinearProblemIsItsSolution) {
   FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
   const FitPoint start = problem.Start();
   const GramSystem gram = MakeGram(problem, start, {}, {});
-  const Eigen::MatrixXd sum = Sum(gram);
+  const Eigen::MatrixXd& sum = gram.parts[0];
   const BoundedSolution solution = SolveBounded(sum, First(gram.parameters), BoundsAt(problem, start, gram, 1));
   // The gain's bound is below its solution; the zero offset is the best one for that.
   ASSERT_EQ(solution.at_bound, std::vector<Eigen::Index>{0});

@@ -68,7 +68,7 @@ TEST(ExtraColumnTest, SeesADelayBeyondTheNuisanceShift) {
     const ExtraColumn delay{
         .name = "delay", .child = &child, .values = truth.Values({{"command_delay@motor.delay_s", delay_s}})};
     const GramSystem gram = MakeGram(parent, point, {&delay, 1}, {.step = 0.01});
-    const Eigen::MatrixXd sum = Sum(gram);
+    const Eigen::MatrixXd& sum = gram.parts[0];
     const ColumnBounds bounds = BoundsAt(parent, point, gram, 2);
     std::vector<Eigen::Index> all(static_cast<std::size_t>(gram.parameters) + 1);
     std::iota(all.begin(), all.end(), 0);

@@ -13,11 +13,12 @@ namespace gapscope::cli {
 namespace {
 
 struct FeedbackFlags {
+  CommonFlags common;
   std::string experiment;
   std::vector<std::string> at, set, params, value, poles;
   std::vector<double> q;
   double r = 1;
-  bool json = false, lqr = true;
+  bool lqr = true;
 };
 
 // "-3.5", "-3.5+8.4i", "-3.5-8.4i".
@@ -81,7 +82,7 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
                         .gain = {feedback.gain.data(), feedback.gain.data() + n},  // one row
                         .open_poles = SortedPoles(system.a),
                         .closed_poles = feedback.poles};
-  fmt::print("{}", flags.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
   return kDone;
 }
 
@@ -99,8 +100,8 @@ std::vector<Option> OptionsOf(FeedbackFlags& flags) {
                ValueOptions(flags.set, flags.params),
                {{.flag = "--value",
                  .value = &flags.value,
-                 .help = "A number that a log would bring: NAME=VALUE, more than once"},
-                {.flag = "--json", .value = &flags.json, .help = "Print the result as JSON on stdout, nothing else"}}});
+                 .help = "A number that a log would bring: NAME=VALUE, more than once"}},
+               PrintOptions(flags.common)});
 }
 
 Command LqrCommand() {

@@ -278,6 +278,10 @@ def test_identify_design_and_apply(experiment: str, demo: str, tmp_path: Path) -
         gs.identify("cable", experiment, demo, options={"signal": "pendulum_rad"})
     sweep = gs.design("sweep", experiment, out=tmp_path / "sweep.csv", options={"duration": 2})
     assert (tmp_path / "sweep.csv").is_file() and sweep["schema"].startswith("gapscope.design")
+    upright = {"at": "pendulum=3.141592653589793", "q": "10,10,1,10"}
+    assert len(gs.design("lqr", experiment, options=upright)["gain"]) == 4
+    poles = {"at": upright["at"], "poles": "-8,-9,-10,-11"}
+    assert len(gs.design("poles", experiment, options=poles)["gain"]) == 4
     result = gs.replay(experiment, demo, with_="coulomb_friction@arm", set={"coulomb_friction@arm.friction_n_m": 6e-4})
     changed = result.apply(tmp_path / "robot.xml")
     assert changed["changes"] and "frictionloss" in (tmp_path / "robot.xml").read_text()

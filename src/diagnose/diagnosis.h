@@ -116,6 +116,7 @@ struct Statement {
   std::shared_ptr<const ComparedSets> sets = {};  // null: it was not refitted
   std::vector<Rival> rivals = {};                 // the nearest first
   std::string rule;
+  std::string caveat = {};  // what the logs' clocks leave open of it; empty: nothing
 };
 
 // Shares of the refitted base model's squared misfit, held out. NaN: these logs do not say.

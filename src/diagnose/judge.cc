@@ -31,6 +31,9 @@ class Judging {
     for (Statement& s : result.statements)
       s.answer = s.probability >= kDiagnosePolicy.probability.present ? Answer::kPresent : Answer::kAbsent;
     AddOthers(&result);
+    for (Statement& s : result.statements) {
+      if (EffectOf(s.use, *bench_.rig).of_time) s.caveat = CaveatOf(found_.logged.clocks);
+    }
     std::stable_sort(result.statements.begin(), result.statements.end(),
                      [](const Statement& a, const Statement& b) { return a.probability > b.probability; });
     Conclude(&result);

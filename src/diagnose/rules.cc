@@ -45,6 +45,21 @@ bool IsOnEach(const EffectUse& use, const Rig& rig) {
   return !all.empty() && PlacesOf(use, rig).size() == all.size();
 }
 
+Clocks ClocksOf(const std::vector<Recording>& recordings) {
+  Clocks worst = Clocks::kOne;
+  for (const Recording& recording : recordings) {
+    std::set<std::string> of_commands, of_measured;
+    for (const auto& command : recording.commands) {
+      if (command.column) of_commands.insert(command.clock);
+    }
+    for (const auto& measured : recording.measured) of_measured.insert(measured.clock);
+    if (of_commands.contains("synthetic") || of_measured.contains("synthetic")) return Clocks::kMadeUp;
+    for (auto* clocks : {&of_commands, &of_measured}) clocks->erase("");  // not known
+    if (!of_commands.empty() && !of_measured.empty() && of_commands != of_measured) worst = Clocks::kMixed;
+  }
+  return worst;
+}
+
 // What the catalogue says of an effect in a richer one; null: it does not hold it. On the same place: a motor's
 // direction asymmetry is no joint's friction.
 const Contained* HeldBy(const EffectUse& richer, const EffectUse& simpler, const Rig& rig) {
@@ -78,6 +93,18 @@ bool IsUsual(const EffectUse& richer, const EffectUse& simpler, const Rig& rig) 
   return held && held->usual;
 }
 
+std::string CaveatOf(Clocks clocks) {
+  switch (clocks) {
+    case Clocks::kOne:
+      break;
+    case Clocks::kMixed:
+      return "includes transport, since commands and measurements have different clocks";
+    case Clocks::kMadeUp:
+      return "may be the recording's own, since the log's stamps are made up from a frame rate";
+  }
+  return "";
+}
+
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
   const auto changes = [](const Recording::Command& command) {
     return std::any_of(command.values.begin(), command.values.end(),
@@ -100,7 +127,8 @@ LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
           .torque = std::any_of(
               recordings.begin(), recordings.end(),
               [&](const Recording& r) { return std::any_of(r.measured.begin(), r.measured.end(), of_force); }),
-          .signals = std::move(signals)};
+          .signals = std::move(signals),
+          .clocks = ClocksOf(recordings)};
 }
 
 bool IsOfMissingSensor(const EffectUse& use, const Rig& rig, const LoggedSignals& logged) {

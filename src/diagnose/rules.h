@@ -20,11 +20,21 @@ bool Contains(const EffectUse& richer, const EffectUse& simpler, const Rig& rig,
 // Whether, where `simpler` is, `richer` mostly is too, which holds it.
 bool IsUsual(const EffectUse& richer, const EffectUse& simpler, const Rig& rig);
 
-// What the logs hold, as far as it makes effects one.
+// What the stamps of a log's columns are: one clock, or they say less of delays.
+enum class Clocks {
+  kOne,
+  kMixed,   // commands by another clock than measurements: what a message takes on its way is in between
+  kMadeUp,  // a frame's number over the frame rate
+};
+// What an effect of time must be told with; empty: nothing.
+std::string CaveatOf(Clocks clocks);
+
+// What the logs hold, as far as it bears on what can be said.
 struct LoggedSignals {
   bool one = false;                    // one command that changes (a constant supply does not) and one signal are all
   bool torque = false;                 // a drive's torque is measured: a constant load on a servo shows
   std::set<std::string> signals = {};  // that are scored in any log
+  Clocks clocks = Clocks::kOne;        // the worst of any log
 };
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings);
 // Whether the effect is a sensor's whose signal no log has, or none that is scored.

@@ -130,10 +130,14 @@ Status BindMeasured(const Experiment& experiment, const Log& log, const Timeline
       if (spec.element > 0) continue;  // bound with the first
       GS_ASSIGN(auto turns, BindOrientation(experiment, index, log, timeline,
                                             {columns[0], columns[1], columns[2], columns[3]}, &recording->findings));
-      for (auto& turn : turns) recording->measured.push_back(std::move(turn));
+      for (auto& turn : turns) {
+        turn.clock = columns.front()->clock;
+        recording->measured.push_back(std::move(turn));
+      }
       continue;
     }
-    Recording::Measured measured{.spec = spec, .index = index, .column = columns.front()->name, .values = {}};
+    Recording::Measured measured{
+        .spec = spec, .index = index, .column = columns.front()->name, .values = {}, .clock = columns.front()->clock};
     const ColumnOptions options{.factor = spec.factor,
                                 .offset = spec.offset,
                                 .missing = experiment.timeline.missing,
@@ -182,6 +186,7 @@ Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
     Recording::Command command{.actuator = spec.actuator};
     if (const Column* column = FindFirst(log, spec.columns)) {
       command.column = column->name;
+      command.clock = column->clock;
       const MissingRepair missing = experiment.timeline.missing;
       const ColumnOptions options{.factor = spec.factor,
                                   .offset = spec.offset,

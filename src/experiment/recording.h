@@ -18,6 +18,7 @@ struct Recording {
     std::string actuator;
     std::optional<std::string> column = {};  // the log's; nothing: it has none, and the command is a constant
     std::vector<double> values;              // one per stamp, held to the next stamp
+    std::string clock = {};                  // Column::clock
   };
   struct Measured {
     MeasuredSpec spec;
@@ -25,6 +26,7 @@ struct Recording {
     std::string column;
     std::vector<double> values;          // one per stamp; NaN where the log has no value and the policy keeps that
     Quaternion reference = kNoRotation;  // of an orientation (orientation.h): the values are the turn from here
+    std::string clock = {};              // Column::clock
   };
 
   std::string log_path;

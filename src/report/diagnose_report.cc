@@ -106,6 +106,7 @@ ordered_json Json(const Statement& s) {
                         {"group", s.group < 0 ? ordered_json() : ordered_json(s.group)},
                         {"rule", s.rule}};
   if (s.beside) entry["seen_beside"] = s.beside->Text();
+  if (!s.caveat.empty()) entry["caveat"] = s.caveat;
   for (const auto& bound : s.bounds) entry["bound"][bound.key] = JsonNumber(bound.value);
   AddComparison(s, &entry);
   return entry;

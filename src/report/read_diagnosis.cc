@@ -51,7 +51,8 @@ Statement StatementFrom(const ordered_json& json) {
                       .prior = json.at("prior"),
                       .evidence = json.at("evidence"),
                       .group = json.at("group").is_null() ? -1 : json.at("group").get<int>(),
-                      .rule = json.at("rule")};
+                      .rule = json.at("rule"),
+                      .caveat = json.value("caveat", "")};
   for (const auto& [key, size] : json.at("parameters").items())
     statement.parameters.push_back({.key = key,
                                     .value = NumberFrom(size.at("value")),

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "src/core/collect.h"
 #include "src/report/words.h"
@@ -41,7 +42,12 @@ Sentence SentenceOf(const std::vector<const Statement*>& members) {
     const std::string name = members.size() > 1 ? EffectTitle(s->use.effect) + " " : "";
     sentence.size += (sentence.size.empty() ? "" : "; ") + name + SizeText(s->parameters.front());
   }
-  if (first.beside) sentence.caveat = "seen only beside " + Words(*first.beside);
+  std::set<std::string> caveats;
+  if (first.beside) caveats.insert("seen only beside " + Words(*first.beside));
+  for (const Statement* s : members) {
+    if (!s->caveat.empty()) caveats.insert(s->caveat);
+  }
+  sentence.caveat = fmt::format("{}", fmt::join(caveats, "; "));
   return sentence;
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
 #include <tuple>
 
 #include "src/diagnose/candidate.h"
@@ -49,6 +50,35 @@ TEST(RulesTest, ALateSensorIsALateCommandOnOneSignal) {
   const EffectUse sensor{"sensor_delay", "arm_rad"}, command{"command_delay", "motor"};
   EXPECT_TRUE(AreOneMotion(sensor, command, *rig.model, {.one = true}));
   EXPECT_FALSE(AreOneMotion(sensor, command, *rig.model, {.one = false}));
+}
+
+// A log of one command and one signal, by these clocks.
+Recording LoggedBy(const std::string& command, const std::string& measured) {
+  Recording log;
+  log.commands.push_back({.actuator = "motor", .column = "u", .values = {0, 1}, .clock = command});
+  log.measured.push_back({.values = {0, 1}, .clock = measured});
+  return log;
+}
+
+TEST(RulesTest, TheWorstClockOfAnyLogIsToldWithWhatIsLate) {
+  const auto clocks = [](const std::vector<Recording>& logs) { return WhatIsLogged(logs).clocks; };
+  EXPECT_EQ(clocks({LoggedBy("", "")}), Clocks::kOne) << "a CSV file says nothing";
+  EXPECT_EQ(clocks({LoggedBy("header", "header"), LoggedBy("receive", "receive")}), Clocks::kOne);
+  EXPECT_EQ(clocks({LoggedBy("header", "header"), LoggedBy("receive", "header")}), Clocks::kMixed);
+  EXPECT_EQ(clocks({LoggedBy("receive", "header"), LoggedBy("synthetic", "synthetic")}), Clocks::kMadeUp);
+  Recording constant = LoggedBy("receive", "header");
+  constant.commands.front().column.reset();
+  EXPECT_EQ(clocks({constant}), Clocks::kOne) << "a command without a column has no clock";
+  EXPECT_EQ(CaveatOf(Clocks::kOne), "");
+  EXPECT_NE(CaveatOf(Clocks::kMixed), CaveatOf(Clocks::kMadeUp));
+}
+
+TEST(RulesTest, EffectsOfTimeAreThoseThatAClockImitates) {
+  std::set<std::string> of_time;
+  for (const Effect& effect : Catalogue()) {
+    if (effect.of_time) of_time.insert(effect.name);
+  }
+  EXPECT_EQ(of_time, (std::set<std::string>{"actuator_lag", "command_delay", "sensor_delay", "torque_delay"}));
 }
 
 // A rig of two drives on separate joints, servos or motors.

@@ -26,6 +26,7 @@ nlohmann::ordered_json Written() {
                    .without = {.values = {{"arm.damping", 0.2}}},
                    .blocks = {{"a.csv", 1.5, 2, 0.7}}});
   friction.rivals = {{{"load_friction", "arm"}, 0.4}};
+  friction.caveat = "may be the recording's own";
   d.statements = {friction, {.use = {"backlash", "arm"}, .bounds = {{"gap_rad", "rad", 0.01, 0.01, 0.01}}}};
   d.train_logs = {"a.csv", "b.csv"}, d.held_out_logs = {"c.csv"};
   auto json = ToJson(DiagnoseRun{.info = {}, .diagnosis = d});
@@ -53,6 +54,8 @@ TEST(ReadDiagnosisTest, IsWhatWasWritten) {
   EXPECT_EQ(friction.sets->without.values, (std::vector<std::pair<std::string, double>>{{"arm.damping", 0.2}}));
   EXPECT_EQ(friction.sets->blocks[0].from_s, 1.5);
   EXPECT_EQ(friction.rivals[0].behind, 0.4);
+  EXPECT_EQ(friction.caveat, "may be the recording's own");
+  EXPECT_EQ(d.statements[1].caveat, "");
   EXPECT_FALSE(d.statements[1].sets);
   EXPECT_EQ(d.statements[1].bounds[0].value, 0.01);
 }

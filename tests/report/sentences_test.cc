@@ -44,6 +44,12 @@ TEST(SentencesTest, OneForEachFindingTheLargestShareFirst) {
             "arm");
 }
 
+TEST(SentencesTest, WhatTheClocksLeaveOpenIsToldWithIt) {
+  Diagnosis d = Made();
+  d.statements[0].caveat = "includes transport";
+  EXPECT_TRUE(SentencesOf(d)[1].Text().ends_with("P 0.68, includes transport; seen only beside load friction on arm"));
+}
+
 TEST(SentencesTest, PlacesThatDifferAreEachNamed) {
   Diagnosis d = Made();
   d.statements[2].use.on = "pendulum";

@@ -30,6 +30,7 @@ Effect Effect_actuator_lag() {
       .signature = "phase saturates, gain rolls off",
       .told_apart = "steps, high frequency",
       .partners = {"command_delay", "torque_delay"},
+      .of_time = true,
       .actuator_stage = 2,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "time_constant_s", names[0] + "*(1-" + names[1] + ")"));

@@ -22,6 +22,7 @@ Effect Effect_sensor_delay() {
       .signature = "measured late, motion right",
       .told_apart = "two sensors, torque log",
       .partners = {"command_delay"},
+      .of_time = true,
       .same_on_one_signal = "command_delay",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         structure.signal_delay[on] = names[0];

@@ -22,6 +22,7 @@ Effect Effect_torque_delay() {
       .signature = "the same phase around the servo's own loop",
       .told_apart = "loop gain, ringing",
       .partners = {"command_delay", "actuator_lag"},
+      .of_time = true,
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddMotorTerm(on, "torque_delay_s", names[0]));
         return Ok();

@@ -99,6 +99,15 @@ double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint
   return candidate.problem->CostOfAnyVariance(there.cost, point.y);
 }
 
+void SplitTrainCost(const Workbench& bench, Candidate* candidate) {
+  FitProblem& problem = *candidate->problem;
+  candidate->train_limbs = {{candidate->train_cost, 0.5 * static_cast<double>(problem.residuals())}};
+  if (bench.coupling->limb_count() == 1 || !std::isfinite(candidate->train_cost)) return;
+  const Evaluation there = problem.Evaluate(candidate->point, Keep::kResiduals);
+  *bench.work += there.work;
+  candidate->train_limbs = ScaledTo(candidate->train_cost, CostsByLimb(problem, there.residuals, *bench.coupling));
+}
+
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, const FitLimits& limits,
                   GiveUp give_up, const Candidate* from) {
   candidate->problem->CountKnown(VarianceAt(*candidate->problem, limits.least_known));
@@ -131,6 +140,7 @@ void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& 
   candidate->converged = solved.termination == Termination::kConverged;
   candidate->values = candidate->problem->Values(solved.point);
   candidate->stamps = candidate->problem->Stamps(solved.point);
+  SplitTrainCost(bench, candidate);
 }
 
 void PolishCandidate(const Workbench& bench, Candidate* candidate) {
@@ -161,6 +171,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   candidate->train_cost = candidate->problem->CostOfAnyVariance(solved.cost, solved.point.y);
   candidate->values = candidate->problem->Values(solved.point);
   candidate->stamps = candidate->problem->Stamps(solved.point);
+  SplitTrainCost(bench, candidate);
 }
 
 namespace {
@@ -194,10 +205,13 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate) {
   if (std::exchange(candidate->scored, true)) return;
   candidate->held_out.clear();
   candidate->held_out_cost = candidate->held_out_error = candidate->held_out_floors = kInfinity;
+  candidate->held_out_limbs = {{kInfinity, 0}};
   FitPoint point;
   const auto problem = OnHeldOut(bench, *candidate, bench.Options(*candidate->model, false), &point);
   if (!problem) return;
-  candidate->held_out_cost = problem->Evaluate(point, Keep::kCost).cost;
+  const Evaluation there = problem->Evaluate(point, Keep::kResiduals);
+  candidate->held_out_cost = there.cost;
+  candidate->held_out_limbs = ScaledTo(there.cost, CostsByLimb(*problem, there.residuals, *bench.coupling));
   const double rows = static_cast<double>(std::max<std::size_t>(1, problem->residuals()));
   candidate->held_out_floors = std::sqrt(2 * candidate->held_out_cost / rows);
   const std::vector<LogReplay> predicted = problem->Predict(point);

@@ -13,7 +13,7 @@
 
 #include "src/diagnose/block_errors.h"
 #include "src/diagnose/diagnosis_journal.h"
-#include "src/fit/coupling.h"
+#include "src/diagnose/limb_cost.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {
@@ -25,22 +25,19 @@ struct Candidate {
   FitPoint point;
   std::shared_ptr<const Derivatives> derivatives;  // there, as far as they were kept up; null: not at hand
   double train_cost = 0;
+  std::vector<LimbCost> train_limbs;  // the same by limbs
   bool converged = false;
   bool scored = false;
   std::vector<double> values;
   StampShift stamps;
   double held_out_cost = 0;
+  std::vector<LimbCost> held_out_limbs;
   double held_out_floors = 0;  // root mean square of residual over noise
   double held_out_error = 0;   // normalised: see ReplayError; in windows
   BlockErrors held_out;
   FitPoint held_out_point;     // of the problem there: initial states and offsets
   std::size_t parameters = 0;  // of the effects
   std::string Name() const;
-  // Costs on the training and the held-out logs, none below the sensors' noise: what lies under that says nothing.
-  double TrainAboveNoise() const { return std::max(train_cost, 0.5 * static_cast<double>(problem->residuals())); }
-  double HeldOutAboveNoise() const {
-    return held_out_floors < 1 ? held_out_cost / (held_out_floors * held_out_floors) : held_out_cost;
-  }
 };
 
 // Finite differences of a fit's Jacobians, in search coordinates. The first ones look ahead as far as steps go. The
@@ -95,6 +92,8 @@ bool Has(const std::vector<EffectUse>& set, const EffectUse& use);
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects);
+// Fills train_limbs. Of one limb that needs no replay.
+void SplitTrainCost(const Workbench& bench, Candidate* candidate);
 // Cost on the training logs.
 double CostAt(const Workbench& bench, const Candidate& candidate, const FitPoint& point);
 // How far a fit goes.

@@ -11,6 +11,26 @@
 #include "src/diagnose/policy.h"
 
 namespace gapscope {
+
+// y taken out of all other columns; coordinates on a bound stay there.
+Eigen::MatrixXd Reduce(const ColumnTable& table, const Eigen::MatrixXd& products) {
+  const Eigen::Index n = table.gram.parameters, rest = products.cols() - n;
+  const std::vector<Eigen::Index> free = table.FreeCoordinates();
+  const auto f = static_cast<Eigen::Index>(free.size());
+  Eigen::MatrixXd own(f, f), cross(f, rest);
+  for (Eigen::Index a = 0; a < f; ++a) {
+    const Eigen::Index i = free[static_cast<std::size_t>(a)];
+    for (Eigen::Index b = 0; b < f; ++b) own(a, b) = products(i, free[static_cast<std::size_t>(b)]);
+    own(a, a) += table.bounds.prior_weight[i];
+    cross.row(a) = products.row(i).tail(rest);
+    cross(a, rest - 1) += table.bounds.prior_weight[i] * table.bounds.prior_gone[i];
+  }
+  Eigen::MatrixXd reduced = products.bottomRightCorner(rest, rest);
+  reduced(rest - 1, rest - 1) += table.bounds.prior_weight.cwiseProduct(table.bounds.prior_gone.cwiseAbs2()).sum();
+  if (f > 0) reduced -= cross.transpose() * Ldlt(own).Solve(cross);
+  return reduced;
+}
+
 namespace {
 
 constexpr double kMostSize = 2.5, kMostPart = 4;  // times the trial value
@@ -202,25 +222,6 @@ ColumnBounds BoundsOf(const ColumnTable& table, const FitProblem& problem, const
   return bounds;
 }
 
-// y taken out of all other columns; coordinates on a bound stay there.
-Eigen::MatrixXd Reduce(const ColumnTable& table) {
-  const Eigen::Index n = table.gram.parameters, rest = table.sum.cols() - n;
-  const std::vector<Eigen::Index> free = table.FreeCoordinates();
-  const auto f = static_cast<Eigen::Index>(free.size());
-  Eigen::MatrixXd own(f, f), cross(f, rest);
-  for (Eigen::Index a = 0; a < f; ++a) {
-    const Eigen::Index i = free[static_cast<std::size_t>(a)];
-    for (Eigen::Index b = 0; b < f; ++b) own(a, b) = table.sum(i, free[static_cast<std::size_t>(b)]);
-    own(a, a) += table.bounds.prior_weight[i];
-    cross.row(a) = table.sum.row(i).tail(rest);
-    cross(a, rest - 1) += table.bounds.prior_weight[i] * table.bounds.prior_gone[i];
-  }
-  Eigen::MatrixXd reduced = table.sum.bottomRightCorner(rest, rest);
-  reduced(rest - 1, rest - 1) += table.bounds.prior_weight.cwiseProduct(table.bounds.prior_gone.cwiseAbs2()).sum();
-  if (f > 0) reduced -= cross.transpose() * Ldlt(own).Solve(cross);
-  return reduced;
-}
-
 // Of all parts together; a single part is not kept beside it, since there may be thousands of columns.
 Eigen::MatrixXd TakeSum(GramSystem* gram) {
   Eigen::MatrixXd sum = std::move(gram->parts.front());
@@ -250,7 +251,7 @@ ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, con
   table.sum = TakeSum(&table.gram);
   TakeRestApart(table, &table.sum);
   table.bounds = BoundsOf(table, *parent.problem, parent.point);
-  table.reduced = Reduce(table);
+  table.reduced = Reduce(table, table.sum);
   table.cost = 0.5 * table.reduced(table.reduced.rows() - 1, table.reduced.cols() - 1);
   table.valid = true;
   return table;
@@ -303,9 +304,16 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
 ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques) {
   constexpr long kHalfSeconds = 4;
   return Finish(bench, parent, WantedOf(parent), torques,
-                {.count = kFolds, .of = [](std::size_t log, long half_second) {
+                {.count = kFolds, .of = [](std::size_t log, long half_second, std::size_t) {
                    return (static_cast<std::size_t>(half_second / kHalfSeconds) + log) % kFolds;
                  }});
+}
+
+ColumnTable MakeByLimb(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques) {
+  const Coupling& coupling = *bench.coupling;
+  return Finish(bench, parent, WantedOf(parent), torques,
+                {.count = coupling.limb_count(),
+                 .of = [&](std::size_t, long, std::size_t signal) { return coupling.LimbOf(signal); }});
 }
 
 std::vector<Eigen::Index> ColumnTable::FreeCoordinates() const {

@@ -30,7 +30,7 @@ struct Trial {
 struct ColumnTable {
   std::vector<Trial> trials;
   std::vector<Eigen::Index> torques;  // columns of random torques
-  GramSystem gram;                    // its parts are in `sum` alone, but those of MakeFolds
+  GramSystem gram;                    // its parts are in `sum` alone, but those of MakeFolds and MakeByLimb
   Eigen::MatrixXd sum;
   ColumnBounds bounds;
   Eigen::MatrixXd reduced;  // of the columns beside y, and the residual: y, with what is known of it, taken out
@@ -48,6 +48,10 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
 // Columns of torques alone, their products apart by two folds of each log (GramSystem::parts): two seconds in turn.
 inline constexpr std::size_t kFolds = 2;
 ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques);
+// Likewise apart by limbs (Coupling::limbs); of one limb there are no parts.
+ColumnTable MakeByLimb(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques);
+// ColumnTable::reduced of a part's products.
+Eigen::MatrixXd Reduce(const ColumnTable& table, const Eigen::MatrixXd& products);
 // Values of an effect's parameters (in the order of PlacedParameters) at coefficients of its columns.
 std::vector<double> ValuesAt(const Workbench& bench, const Trial& trial, std::span<const double> coefficients);
 

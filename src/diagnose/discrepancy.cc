@@ -31,12 +31,28 @@ TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double sh
   return best;
 }
 
-TorquePrior TorquesBeside(const ColumnTable& table, std::size_t residuals) {
+namespace {
+
+TorquePrior TorquesIn(const ColumnTable& table, const Eigen::MatrixXd& reduced, std::size_t residuals) {
   const double numbers = kDiagnosePolicy.evidence.per_block * static_cast<double>(table.gram.half_seconds),
                share = numbers / static_cast<double>(std::max<std::size_t>(1, residuals));
   std::vector<Eigen::Index> kept = Collect(table.torques, [&](Eigen::Index c) { return table.Reduced(c); });
-  kept.push_back(table.reduced.cols() - 1);
-  return LikeliestTorques(table.reduced(kept, kept), numbers, share);
+  kept.push_back(reduced.cols() - 1);
+  return LikeliestTorques(reduced(kept, kept), numbers, share);
+}
+
+}  // namespace
+
+TorquePrior TorquesBeside(const ColumnTable& table, std::size_t residuals) {
+  return TorquesIn(table, table.reduced, residuals);
+}
+
+double LikelihoodByLimb(const ColumnTable& table, std::size_t residuals) {
+  if (table.gram.parts.empty()) return TorquesBeside(table, residuals).likelihood;
+  double sum = 0;
+  for (const Eigen::MatrixXd& limb : table.gram.parts)
+    sum += TorquesIn(table, Reduce(table, limb), residuals).likelihood;
+  return sum;
 }
 
 }  // namespace gapscope

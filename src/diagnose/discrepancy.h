@@ -19,6 +19,8 @@ struct TorquePrior {
 TorquePrior LikeliestTorques(const Eigen::MatrixXd& m, double numbers, double share);
 // The same of a table. `residuals`: numbers of the logs.
 TorquePrior TorquesBeside(const ColumnTable& table, std::size_t residuals);
+// Log likelihood of a table of MakeByLimb, each limb with torques and noise of its own size.
+double LikelihoodByLimb(const ColumnTable& table, std::size_t residuals);
 
 }  // namespace gapscope
 

@@ -14,16 +14,17 @@
 namespace gapscope {
 namespace {
 
-double LogRatio(double before, double after) {
+// Of logarithms of costs.
+double GainOf(double before, double after) {
   const double most = kDiagnosePolicy.evidence.most_gain;
-  if (std::isinf(after)) return std::isinf(before) ? kNaN : -most;
-  return std::isinf(before) ? most : std::log(before / std::max(after, 1e-300));
+  if (after == kInfinity) return before == kInfinity ? kNaN : -most;
+  return before == kInfinity ? most : before - after;
 }
 
 // Errors of free runs as a gain; both beyond their signal: the motion was lost either way.
 double FreeGain(double before, double after) {
   constexpr double kLost = 1;
-  return std::min(before, after) > kLost ? kNaN : 2 * LogRatio(before, after);
+  return std::min(before, after) > kLost ? kNaN : 2 * GainOf(std::log(before), std::log(std::max(after, 1e-300)));
 }
 
 // What each half second of the held-out logs gains.
@@ -106,20 +107,21 @@ void Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without, Statem
       ComparedSets{.with = RunModelOf(*found_.chosen->model, found_.chosen->values),
                    .without = RunModelOf(*without->model, without->values),
                    .blocks = Carriers(bench_, gains)});
-  numbers.gain = LogRatio(without->TrainAboveNoise(), found_.chosen->TrainAboveNoise());
-  numbers.gain_held_out = LogRatio(without->HeldOutAboveNoise(), found_.chosen->HeldOutAboveNoise());
+  numbers.gain = GainOf(LogCostAboveNoise(without->train_limbs), LogCostAboveNoise(found_.chosen->train_limbs));
+  numbers.gain_held_out =
+      GainOf(LogCostAboveNoise(without->held_out_limbs), LogCostAboveNoise(found_.chosen->held_out_limbs));
   numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
   numbers.clear = ClearBy(gains);
   SetCharacter(uses, &numbers);
   if (torques_.empty()) return;
-  const ColumnTable table = MakeColumns(bench_, *without, {}, torques_);
+  const ColumnTable table = MakeByLimb(bench_, *without, torques_);
   if (!table.valid || !Left().valid) return;
   const std::size_t residuals = without->problem->residuals();
-  numbers.discrepancy = TorquesBeside(Left(), residuals).likelihood - TorquesBeside(table, residuals).likelihood;
+  numbers.discrepancy = LikelihoodByLimb(Left(), residuals) - LikelihoodByLimb(table, residuals);
 }
 
 const ColumnTable& Evidence::Left() {
-  if (left_of_ != found_.chosen) left_ = MakeColumns(bench_, *found_.chosen, {}, torques_);
+  if (left_of_ != found_.chosen) left_ = MakeByLimb(bench_, *found_.chosen, torques_);
   left_of_ = found_.chosen;
   return left_;
 }

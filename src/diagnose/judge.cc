@@ -88,7 +88,7 @@ class Judging {
     const Told told = ToldBeyond(beyond.probability);
     if (told == Told::kRicher) return;
     const bool open = members.size() == 1 && (told == Told::kTogether || IsUsual(members.front(), simple, *bench_.rig));
-    const double rise = std::log(simpler->train_cost / found_.chosen->train_cost);
+    const double rise = Gain(*simpler, *found_.chosen);
     Member joined{.use = simple};
     for (const EffectUse& use : members) {
       beyond.use = use;
@@ -239,8 +239,7 @@ class Judging {
     if (!own || !other) return kInfinity;
     const Candidate* without = found_.ledger.Find(rest);
     if (!without) without = found_.ledger.Refit(rest, *own, {}, {}, Effort::kTry);
-    const bool gains = without && std::log(without->train_cost / own->train_cost) >= kDiagnosePolicy.search.tie;
-    return gains ? std::log(other->train_cost / own->train_cost) : kInfinity;
+    return without && Gain(*without, *own) >= kDiagnosePolicy.search.tie ? Gain(*other, *own) : kInfinity;
   }
 
   // What was tried in a member's place: by the search, or where the ledger has that set by another way. `present`: the

@@ -85,6 +85,7 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   const double known = candidate->train_cost;
   const FitPoint before = candidate->point;
   const std::vector<double> values = candidate->values;
+  const auto limbs = candidate->train_limbs;
   const bool converged = candidate->converged, scored = candidate->scored;
   const StampShift stamps = candidate->stamps;
   const auto derivatives = candidate->derivatives;
@@ -106,6 +107,7 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   candidate->point = before;
   candidate->values = values;
   candidate->train_cost = known;
+  candidate->train_limbs = limbs;
   candidate->converged = converged;
   candidate->scored = scored;
   candidate->stamps = stamps;
@@ -136,6 +138,7 @@ Candidate* Ledger::Refit(const EffectSet& set, const Candidate& from, const std:
     if (!made.ok()) return nullptr;
     *place = std::move(made).value();
     place->train_cost = kInfinity;
+    place->train_limbs = {{kInfinity, 0}};
   }
   if (!place->problem) return nullptr;
   Candidate& candidate = *place;

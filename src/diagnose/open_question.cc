@@ -57,9 +57,7 @@ class Asking {
     }
     if (tried.size() < 2) return std::nullopt;
     question.next.probability = of.probability / static_cast<double>(tried.size());
-    question.numbers = {.gain = std::log(tried[1]->train_cost / tried[0]->train_cost),
-                        .smooth = of.numbers.smooth,
-                        .dry = of.numbers.dry};
+    question.numbers = {.gain = Gain(*tried[1], *tried[0]), .smooth = of.numbers.smooth, .dry = of.numbers.dry};
     return question;
   }
 

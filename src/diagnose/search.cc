@@ -17,16 +17,14 @@ namespace {
 
 constexpr const SearchPolicy& kPolicy = kDiagnosePolicy.search;
 
-double Gain(const Candidate& without, const Candidate& with) { return std::log(without.train_cost / with.train_cost); }
-
 // Of an effect, none below the noise.
 double GainAboveNoise(const Candidate& without, const Candidate& with) {
-  return std::log(without.TrainAboveNoise() / with.TrainAboveNoise());
+  return LogCostAboveNoise(without.train_limbs) - LogCostAboveNoise(with.train_limbs);
 }
 
 // A set's cost with what each of its effects must gain; of sets that are at the noise alike, the cost itself decides.
 std::pair<double, double> Charged(const Candidate& candidate) {
-  return {std::log(candidate.TrainAboveNoise()) + kPolicy.member * static_cast<double>(candidate.effects.size()),
+  return {LogCostAboveNoise(candidate.train_limbs) + kPolicy.member * static_cast<double>(candidate.effects.size()),
           candidate.train_cost};
 }
 
@@ -67,6 +65,7 @@ class Searcher {
   void Find() {
     say_("columns of all effects");
     FindCoupling(*result_.base);
+    SplitTrainCost(bench_, result_.base);
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
@@ -129,14 +128,39 @@ class Searcher {
     return widened;
   }
 
+  // By limb, whether it can move by the effects.
+  std::vector<char> LimbsOf(const std::vector<EffectUse>& uses) const {
+    std::vector<char> limbs(bench_.coupling->limb_count(), static_cast<char>(false));
+    for (const EffectUse& use : uses) {
+      const auto of_use = bench_.coupling->LimbsOf(bench_.coupling->OfPlace(use.on, *bench_.rig));
+      for (std::size_t l = 0; l < limbs.size(); ++l) limbs[l] = static_cast<char>(limbs[l] || of_use[l]);
+    }
+    return limbs;
+  }
+
+  // What effects gain that bring a cost down to another one, in the limbs that they move: the others stay as they are.
+  double GainInLimbs(const Candidate& parent, const std::vector<EffectUse>& uses, double from, double to) const {
+    const std::vector<char> limbs = LimbsOf(uses);
+    double moved = 0, all = 0;
+    for (std::size_t l = 0; l < limbs.size(); ++l) {
+      all += parent.train_limbs[l].cost;
+      if (limbs[l]) moved += parent.train_limbs[l].cost;
+    }
+    const double own = all > 0 ? from * moved / all : from;
+    return from - to < own ? std::log(own / (own - (from - to))) : kDiagnosePolicy.evidence.most_gain;
+  }
+
+  std::vector<EffectUse> UsesOf(const ColumnTable& table, const TrialSet& set) const {
+    return Collect(set.trials, [&](std::size_t trial) { return table.trials[trial].use; });
+  }
+
   // Takes out the sets that cost as much with a simpler effect in a richer one's place: they come in by exchange.
-  void GiveWay(const ColumnTable& table, std::vector<TrialSet>* level) const {
-    const auto use = [&](std::size_t trial) { return table.trials[trial].use; };
+  void GiveWay(const Candidate& parent, const ColumnTable& table, std::vector<TrialSet>* level) const {
     const auto is_simpler = [&](const TrialSet& a, const TrialSet& b) {
-      if (std::log(a.cost / b.cost) >= kPolicy.simpler) return false;
-      const std::vector<EffectUse> of_a = Collect(a.trials, use), of_b = Collect(b.trials, use);
+      const std::vector<EffectUse> of_a = UsesOf(table, a), of_b = UsesOf(table, b);
       const std::vector<EffectUse> only_a = Without(of_a, of_b), only_b = Without(of_b, of_a);
-      return only_a.size() == 1 && only_b.size() == 1 && Contains(only_b.front(), only_a.front(), *bench_.rig);
+      return only_a.size() == 1 && only_b.size() == 1 && Contains(only_b.front(), only_a.front(), *bench_.rig) &&
+             GainInLimbs(parent, only_b, a.cost, b.cost) < kPolicy.simpler;
     };
     const std::vector<TrialSet> all = *level;
     std::erase_if(*level, [&](const TrialSet& rich) {
@@ -147,21 +171,45 @@ class Searcher {
   // Refits the best sets of each size on top of the parent, where arithmetic promises enough.
   void RefitSets(const Candidate& parent, const ColumnTable& table, const std::vector<std::size_t>& counts) {
     auto levels = BeamSearch(table, counts.size(), kPolicy.beam);
-    for (auto& level : levels) GiveWay(table, &level);
+    for (auto& level : levels) GiveWay(parent, table, &level);
     double best = table.cost;
     std::vector<Candidate*> tasted;
+    if (const TrialSet set = OneInEachLimb(parent, table, levels.front());
+        !parent.effects.empty() && set.trials.size() > 1) {
+      if (Candidate* candidate = RefitTrials(parent, table, set)) tasted.push_back(candidate);
+    }
     for (std::size_t size = 0; size < levels.size(); ++size) {
       for (std::size_t i = 0; i < std::min(counts[size], levels[size].size()); ++i) {
         const TrialSet& set = levels[size][i];
         // More effects than the best smaller set must promise something. A single one need not: where an effect sets in
         // suddenly (a limit, a gap) its columns say little between their trial values.
-        if ((size > 0 || !parent.effects.empty()) && std::log(best / set.cost) < kPolicy.promise) break;
+        if ((size > 0 || !parent.effects.empty()) &&
+            GainInLimbs(parent, UsesOf(table, set), best, set.cost) < kPolicy.promise)
+          continue;
         if (Late(until_, "sets of effects")) return;
         if (Candidate* candidate = RefitTrials(parent, table, set)) tasted.push_back(candidate);
       }
       if (!levels[size].empty()) best = std::min(best, levels[size].front().cost);
     }
     GoOn(std::move(tasted), counts.size() > 2 ? kPolicy.go_on : 1);
+  }
+
+  // Of each limb the best single effect that moves it alone and promises enough: they do not touch, so that one fit
+  // serves them all. `singles`: the cheapest first.
+  TrialSet OneInEachLimb(const Candidate& parent, const ColumnTable& table,
+                         const std::vector<TrialSet>& singles) const {
+    TrialSet together{.trials = {}, .cost = table.cost};
+    std::vector<char> taken(bench_.coupling->limb_count(), static_cast<char>(false));
+    for (const TrialSet& set : singles) {
+      const std::vector<char> limbs = LimbsOf(UsesOf(table, set));
+      const auto limb = static_cast<std::size_t>(std::ranges::find(limbs, static_cast<char>(true)) - limbs.begin());
+      if (std::ranges::count(limbs, static_cast<char>(true)) != 1 || taken[limb]) continue;
+      taken[limb] = static_cast<char>(true);
+      if (GainInLimbs(parent, UsesOf(table, set), table.cost, set.cost) < kPolicy.promise) continue;
+      together.trials.push_back(set.trials.front());
+      together.cost -= table.cost - set.cost;
+    }
+    return together;
   }
 
   // The cheapest of those that were begun.
@@ -235,8 +283,8 @@ class Searcher {
     for (std::size_t round = 0; round < kPolicy.most_effects; ++round) {
       bool again = false;
       for (Candidate* leader : leaders) {
-        if (leader->effects.size() >= kPolicy.most_effects || AtNoise(*leader) || grown_.contains(leader->effects))
-          continue;
+        const std::size_t most = kPolicy.most_effects * bench_.coupling->limb_count();
+        if (leader->effects.size() >= most || AtNoise(*leader) || grown_.contains(leader->effects)) continue;
         if (Late(until_, "additions")) return;
         grown_.insert(leader->effects);
         say_("what could be added to " + NameOfSet(leader->effects));
@@ -372,6 +420,10 @@ class Searcher {
 };
 
 }  // namespace
+
+double Gain(const Candidate& without, const Candidate& with) {
+  return LogCost(without.train_limbs) - LogCost(with.train_limbs);
+}
 
 double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(kPolicy.far_behind); }
 

@@ -34,6 +34,8 @@ struct SearchResult {
   std::vector<std::string> cut;  // what the budget left out
 };
 
+// What `with` has and `without` lacks gains: ln(cost without / cost with), limb by limb.
+double Gain(const Candidate& without, const Candidate& with);
 // The cost above which a set is so far behind the chosen one that it matters little how far.
 double FarBehind(const Candidate& chosen);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "src/fit/policy.h"
 
@@ -103,8 +104,36 @@ Coupling Coupling::Measure(FitProblem& problem, const FitPoint& point, std::span
       AddSquares(problem, windows[w], Eigen::VectorXd(there.residuals[w] - at.base()[w]), &squares);
     coupling.of_joint_[name] = Moved(squares);
   }
+  coupling.FindLimbs(signals);
   return coupling;
 }
+
+void Coupling::FindLimbs(std::size_t signals) {
+  std::vector<std::size_t> limbs(signals);
+  std::iota(limbs.begin(), limbs.end(), std::size_t{0});
+  for (const auto& [joint, moved] : of_joint_) {
+    std::size_t first = signals;
+    for (std::size_t s = 0; s < signals; ++s) {
+      if (!moved.empty() && !moved[s]) continue;
+      if (first == signals) first = limbs[s];
+      std::ranges::replace(limbs, std::size_t{limbs[s]}, first);
+    }
+  }
+  // Numbered in the order of their first signals.
+  std::map<std::size_t, std::size_t> numbers;
+  for (std::size_t& limb : limbs) limb = numbers.try_emplace(limb, numbers.size()).first->second;
+  if (numbers.size() > 1) limbs_ = std::move(limbs);
+}
+
+std::vector<char> Coupling::LimbsOf(const MovedSignals& moved) const {
+  std::vector<char> limbs(limb_count(), static_cast<char>(moved.empty()));
+  for (std::size_t s = 0; s < moved.size(); ++s) {
+    if (moved[s]) limbs[LimbOf(s)] = static_cast<char>(true);
+  }
+  return limbs;
+}
+
+std::size_t Coupling::limb_count() const { return limbs_.empty() ? 1 : *std::ranges::max_element(limbs_) + 1; }
 
 MovedSignals Coupling::OfPlace(const std::string& place, const Rig& rig) const {
   if (of_joint_.empty()) return {};

@@ -35,10 +35,18 @@ class Coupling {
   MovedSignals OfParameter(const std::string& name, const Rig& rig) const;
   // Of the initial angle and speed of the joint that a signal measures.
   MovedSignals OfState(std::size_t signal) const;
+  // Limbs, numbered from 0: no joint moves signals of two of them. Where nothing is known there is one.
+  std::size_t limb_count() const;
+  std::size_t LimbOf(std::size_t signal) const { return limbs_.empty() ? 0 : limbs_[signal]; }
+  // By limb, whether a place or what these signals are of moves it.
+  std::vector<char> LimbsOf(const MovedSignals& moved) const;
 
  private:
+  void FindLimbs(std::size_t signals);
+
   std::map<std::string, MovedSignals> of_joint_, of_parameter_;
   std::map<std::size_t, MovedSignals> of_state_;
+  std::vector<std::size_t> limbs_;  // by signal; empty: one
 };
 
 }  // namespace gapscope

@@ -125,29 +125,47 @@ Eigen::Index ResidualsOf(const FitProblem& problem, std::size_t w) {
   return window.scored() * static_cast<Eigen::Index>(problem.recordings()[window.log].measured.size());
 }
 
+// The signal whose joint starts in a state; where none does, the number of signals.
+std::size_t SignalOfState(const std::vector<SignalLayout>& signals, Eigen::Index state) {
+  const auto found = std::ranges::find_if(signals, [&](const SignalLayout& signal) {
+    return signal.joint_state >= 0 && (state == signal.joint_state || state == signal.joint_state + 1);
+  });
+  return static_cast<std::size_t>(found - signals.begin());
+}
+
 // Which rows belong to which part.
 std::vector<std::vector<PartRows>> RowsOfParts(const FitProblem& problem, const GramParts& parts,
                                                std::size_t* half_seconds) {
   std::vector<std::vector<PartRows>> rows(parts.count);
   std::set<std::pair<std::size_t, long>> seen;
-  std::vector<std::vector<double>> of_log(problem.recordings().size(), std::vector<double>(parts.count, 0.0));
+  // By log, its signals and all of them, and part.
+  std::vector<std::vector<std::vector<double>>> counts;
+  for (const Recording& log : problem.recordings())
+    counts.emplace_back(log.measured.size() + 1, std::vector<double>(parts.count, 0.0));
   for (std::size_t w = 0; w < problem.windows().size(); ++w) {
     const FitWindow& window = problem.windows()[w];
+    const auto& measured = problem.recordings()[window.log].measured;
     for (const RowBlock& block : RowBlocks(problem.recordings()[window.log], window)) {
       seen.insert({window.log, block.half_second});
-      const std::size_t part = parts.of(window.log, block.half_second);
-      of_log[window.log][part] += static_cast<double>(block.count);
-      for (Eigen::Index signal = 0; signal < ResidualsOf(problem, w); signal += window.scored())
-        rows[part].push_back({.window = w, .begin = signal + block.begin, .count = block.count});
+      for (std::size_t s = 0; s < measured.size(); ++s) {
+        const std::size_t part = parts.of(window.log, block.half_second, measured[s].index);
+        for (const std::size_t of : {s, measured.size()})
+          counts[window.log][of][part] += static_cast<double>(block.count);
+        const Eigen::Index first = static_cast<Eigen::Index>(s) * window.scored();
+        rows[part].push_back({.window = w, .begin = first + block.begin, .count = block.count});
+      }
     }
   }
   *half_seconds = seen.size();
   for (std::size_t w = 0; w < problem.windows().size(); ++w) {
     const FitWindow& window = problem.windows()[w];
-    const std::vector<double>& of = of_log[window.log];
-    const double all = std::accumulate(of.begin(), of.end(), 0.0);
-    for (std::size_t part = 0; part < parts.count && window.prior.size() > 0 && all > 0; ++part)
-      rows[part].push_back({w, ResidualsOf(problem, w), window.prior.size(), of[part] / all});
+    for (Eigen::Index state = 0; state < window.prior.size(); ++state) {
+      const auto& of = counts[window.log][SignalOfState(problem.layout().signals[window.log], state)];
+      const double all = std::accumulate(of.begin(), of.end(), 0.0);
+      for (std::size_t part = 0; part < parts.count; ++part) {
+        if (of[part] > 0) rows[part].push_back({w, ResidualsOf(problem, w) + state, 1, of[part] / all});
+      }
+    }
   }
   return rows;
 }

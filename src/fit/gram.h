@@ -4,8 +4,8 @@
 // Columns are [y | extra | residual]: the Jacobian of y at a point, what an effect at a trial value adds to the
 // residuals there, and the residuals. Each window's state is taken out of all of them by an orthogonal projection (its
 // columns and its prior's rows), so that sums of parts are the normal equations with the states eliminated (Reduce;
-// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the parts. The states' priors of a log belong
-// to each part by the share of the log's rows that lie in it.
+// Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), for any weights of the parts. What is known of a state belongs
+// to each part by the share that it has of the log's rows of the signal whose joint starts there.
 #ifndef GAPSCOPE_FIT_GRAM_H_
 #define GAPSCOPE_FIT_GRAM_H_
 
@@ -46,10 +46,11 @@ struct ExtraColumn {
 // GramSystem::columns of a problem with these.
 std::vector<std::string> ColumnNames(const FitProblem& problem, std::span<const ExtraColumn> extra);
 
-// Parts of the logs, and to which of them a half second of a log belongs.
+// Parts of the logs, and to which of them a half second of a log belongs, or one of the experiment's signals there.
 struct GramParts {
   std::size_t count = 1;
-  std::function<std::size_t(std::size_t log, long half_second)> of = [](std::size_t, long) { return 0; };
+  std::function<std::size_t(std::size_t log, long half_second, std::size_t signal)> of = [](std::size_t, long,
+                                                                                            std::size_t) { return 0; };
 };
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
                     const DifferenceOptions& options, const GramParts& parts = {});

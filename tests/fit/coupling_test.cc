@@ -62,6 +62,10 @@ TEST(CouplingTest, CartsThatStandApartMoveTheirOwnSignals) {
   EXPECT_EQ(coupling->OfParameter("coulomb_friction@c.friction_n_m", rig), (MovedSignals{0, 0, 1}));
   EXPECT_EQ(coupling->OfState(1), (MovedSignals{0, 1, 0}));
   EXPECT_TRUE(coupling->OfPlace("all", rig).empty());
+  EXPECT_EQ(coupling->limb_count(), 3U);
+  EXPECT_EQ(coupling->LimbOf(2), 2U);
+  EXPECT_EQ(coupling->LimbsOf({0, 1, 0}), (std::vector<char>{0, 1, 0}));
+  EXPECT_EQ(coupling->LimbsOf({}), (std::vector<char>{1, 1, 1}));
 }
 
 // A force on the lower cart moves the upper one relative to it, and the other way round.
@@ -72,6 +76,42 @@ TEST(CouplingTest, ACartOnAnotherTouchesIt) {
   EXPECT_EQ(coupling->OfPlace("a", rig), (MovedSignals{1, 0, 0}));
   EXPECT_EQ(coupling->OfPlace("b", rig), (MovedSignals{0, 1, 1}));
   EXPECT_EQ(coupling->OfPlace("c", rig), (MovedSignals{0, 1, 1}));
+  EXPECT_EQ(coupling->limb_count(), 2U);
+  EXPECT_EQ(coupling->LimbOf(1), coupling->LimbOf(2));
+  EXPECT_NE(coupling->LimbOf(0), coupling->LimbOf(1));
+}
+
+TEST(CouplingTest, WhereNothingIsKnownThereIsOneLimb) {
+  const Coupling coupling;
+  EXPECT_EQ(coupling.limb_count(), 1U);
+  EXPECT_EQ(coupling.LimbOf(7), 0U);
+  EXPECT_EQ(coupling.LimbsOf({1, 0}), (std::vector<char>{1}));
+}
+
+// What parts by limbs say is what each cart's own signals say, its states' priors with it.
+TEST(CouplingTest, PartsByLimbAreTheLimbsOwnProducts) {
+  Bench bench(false);
+  FitProblem problem = bench.Problem();
+  const auto coupling = bench.Measured();
+  FitPoint point = problem.Start();
+  for (auto& state : point.states) state.setConstant(1e-3);
+  const GramParts by_limb{.count = 3,
+                          .of = [&](std::size_t, long, std::size_t signal) { return coupling->LimbOf(signal); }};
+  const GramSystem whole = MakeGram(problem, point, {}, kQuick), limbs = MakeGram(problem, point, {}, kQuick, by_limb);
+  const Eigen::MatrixXd sum = limbs.parts[0] + limbs.parts[1] + limbs.parts[2];
+  EXPECT_LT((sum - whole.parts[0]).norm(), 1e-9 * sum.norm());
+  for (std::size_t i = 0; i < whole.columns.size(); ++i) {
+    const std::string& column = whole.columns[i];
+    const auto at = static_cast<Eigen::Index>(i);
+    for (std::size_t limb = 0; limb < 3; ++limb) {
+      const std::string name(1, static_cast<char>('a' + limb));
+      if (!column.starts_with(name + ".") && column != "offset " + name + "_m log 0") continue;
+      for (std::size_t other = 0; other < 3; ++other) {
+        const double expected = other == limb ? whole.parts[0](at, at) : 0;
+        EXPECT_NEAR(limbs.parts[other](at, at), expected, 1e-6 * whole.parts[0](at, at)) << column << " " << other;
+      }
+    }
+  }
 }
 
 TEST(CouplingTest, AJacobianMadeTogetherIsTheOneMadeColumnByColumn) {

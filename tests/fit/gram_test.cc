@@ -74,7 +74,7 @@ TEST(GramTest, PartOfOneLogIsWhatItIsAlone) {
   FitProblem both(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
   const std::vector<Recording> one = {bench.logs[0]};
   FitProblem alone(*bench.rig.model, one, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
-  const GramParts by_log{.count = 2, .of = [](std::size_t log, long) { return log; }};
+  const GramParts by_log{.count = 2, .of = [](std::size_t log, long, std::size_t) { return log; }};
   const GramSystem gram = MakeGram(both, both.Start(), {}, {}, by_log), wanted = MakeGram(alone, alone.Start(), {}, {});
   const Eigen::MatrixXd &sum = gram.parts[0], &expected = wanted.parts[0];
   const Eigen::Index r = gram.parameters, q = wanted.parameters;
@@ -92,8 +92,9 @@ TEST(GramTest, PartsAddUpToTheWhole) {
   FitProblem problem(*bench.rig.model, bench.logs, bench.Options(bench.rig), bench.rig.model->Nominal(), bench.pool);
   FitPoint point = problem.Start();
   for (auto& state : point.states) state.setConstant(1e-3);
-  const GramParts thirds{.count = 3,
-                         .of = [](std::size_t, long half_second) { return static_cast<std::size_t>(half_second % 3); }};
+  const GramParts thirds{.count = 3, .of = [](std::size_t, long half_second, std::size_t) {
+                           return static_cast<std::size_t>(half_second % 3);
+                         }};
   const GramSystem whole = MakeGram(problem, point, {}, {}), parts = MakeGram(problem, point, {}, {}, thirds);
   ASSERT_EQ(parts.parts.size(), 3U);
   for (const auto& part : parts.parts) EXPECT_GT(part.norm(), 0.01 * whole.parts[0].norm());

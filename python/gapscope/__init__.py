@@ -11,6 +11,7 @@ from gapscope._commands import design, diagnose, identify, inspect, render, repl
 from gapscope._errors import Bug, InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._log import Log, read, read_all
+from gapscope._many import diagnose_many
 from gapscope._plugins import load_plugins, plugin_library
 from gapscope._program import Progress, bar
 from gapscope._results import (
@@ -65,6 +66,7 @@ __all__ = [
     "bar",
     "design",
     "diagnose",
+    "diagnose_many",
     "identify",
     "inspect",
     "load_plugins",

@@ -63,14 +63,14 @@ def _job(command: str, exp: Source, out: Folder) -> _Job:
     return _Job(folder, keep, [command, str(experiment.file(folder))], {}, experiment)
 
 
-def _list(logs: Logs) -> list[OneLog]:
+def as_list(logs: Logs) -> list[OneLog]:
     return [logs] if isinstance(logs, (Log, str, os.PathLike)) else list(logs)
 
 
 def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
     """The logs' files; those in memory are written beside the result."""
     files = []
-    for log in _list(logs):
+    for log in as_list(logs):
         if isinstance(log, (str, os.PathLike)) and format_of(log) is None:
             files.append(os.fspath(log))
             continue
@@ -96,7 +96,7 @@ def _search(command: str, exp: Source, out: Folder, logs: Logs, hold_out: Logs) 
     """A job with logs, some of them held out by name."""
     job = _job(command, exp, out)
     job.arguments += _files(job, logs)
-    _add(job, "--hold-out", _files(job, hold_out) if _list(hold_out) else None)
+    _add(job, "--hold-out", _files(job, hold_out) if as_list(hold_out) else None)
     return job
 
 

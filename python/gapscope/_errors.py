@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from gapscope._results import Diagnosis, Tune
 
 
@@ -40,8 +42,14 @@ class Bug(RuntimeError):
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a search. ``partial`` is the best so far; None where there was nothing to save."""
+    """Ctrl-C during a search. ``partial`` is the best so far; None where there was nothing to save.
 
-    def __init__(self, partial: "Tune | Diagnosis | None" = None) -> None:
-        super().__init__("interrupted" if partial is None else "interrupted; .partial holds the best so far")
+    Of `diagnose_many` a mapping, as the call would have returned.
+    """
+
+    def __init__(self, partial: "Tune | Diagnosis | Mapping[str, Diagnosis | Exception] | None" = None) -> None:
+        super().__init__(partial)
         self.partial: Any = partial
+
+    def __str__(self) -> str:
+        return "interrupted" if self.partial is None else "interrupted; .partial holds the best so far"

@@ -15,7 +15,7 @@ class Experiment:
     """What binds a log to a model: the experiment file (docs/experiment.md), or a mapping with the same keys.
 
     ``base`` is the folder that the mapping's ``model`` is relative to; without it the working folder. ``model`` may be
-    an MjSpec of the mujoco that is installed.
+    an MjSpec of the mujoco that is installed, as it is now.
     """
 
     def __init__(
@@ -23,6 +23,7 @@ class Experiment:
     ) -> None:
         self.path: Path | None = None
         self._keys: dict[str, Any] = {}
+        self._mjcf = ""  # of an MjSpec
         if isinstance(source, Mapping):
             self._keys = dict(source)
             model = self._keys.get("model")
@@ -30,6 +31,9 @@ class Experiment:
                 raise InputError("an experiment without a model", "Experiment", cure="model: a path or an MjSpec")
             if isinstance(model, (str, os.PathLike)):
                 self._keys["model"] = str((Path(base or ".") / model).resolve())
+            elif hasattr(model, "to_xml"):
+                model.compile()
+                self._mjcf, self._keys["model"] = model.to_xml(), "experiment_model.xml"
             return
         if base is not None:
             raise InputError("a file says itself where its model is", "base", str(base), "base for a mapping")
@@ -41,15 +45,11 @@ class Experiment:
         """Its file; of a mapping one that is written into ``folder``, as JSON, which YAML contains."""
         if self.path is not None:
             return self.path
-        keys = dict(self._keys)
-        if hasattr(keys["model"], "to_xml"):
-            model = folder / "experiment_model.xml"
-            keys["model"].compile()
-            model.write_text(keys["model"].to_xml(), encoding="utf-8")
-            keys["model"] = str(model.resolve())
+        if self._mjcf:
+            (folder / self._keys["model"]).write_text(self._mjcf, encoding="utf-8")
         target = folder / "experiment.yaml"
         try:
-            target.write_text(json.dumps(keys, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+            target.write_text(json.dumps(self._keys, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         except (TypeError, ValueError) as failure:
             raise InputError(
                 "an experiment that cannot be written",
@@ -59,6 +59,10 @@ class Experiment:
                 "numpy numbers: float(x), x.tolist()",
             ) from failure
         return target
+
+    def anywhere(self) -> Experiment:
+        """The same in any working folder."""
+        return self if self.path is None else Experiment(self.path.absolute())
 
     def log_source(self) -> dict[str, Any]:
         """What ``log: {source: {...}}`` says, as it stands; empty where it says nothing.

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -52,6 +55,21 @@ class Finished:
     interrupted: bool
 
 
+# A folder whose removal is a Ctrl-C to the children of this thread: it reaches those on other machines too.
+_wanted: ContextVar[Path | None] = ContextVar("_wanted", default=None)
+_LOOK_S = 0.2  # between looks whether it is there
+
+
+@contextlib.contextmanager
+def while_there(folder: Path) -> Iterator[None]:
+    """Interrupts what `run` runs in this block once ``folder`` is gone."""
+    before = _wanted.set(folder)
+    try:
+        yield
+    finally:
+        _wanted.reset(before)
+
+
 def home() -> Path:
     """The package's folder in a wheel; in a checkout its build folder."""
     package = Path(__file__).resolve().parent
@@ -91,9 +109,10 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
             errors="replace",
             start_new_session=True,
         ) as child:
+            listener = _Listener(child, progress)
             try:
-                listener = _Listener(progress)
-                interrupted = _listen(child, listener)
+                with listener.watching(_wanted.get()):
+                    listener.listen()
                 status = child.wait()
             except BaseException:
                 child.kill()
@@ -101,8 +120,8 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
         stdout.seek(0)
         text = stdout.read()
     if status in (_DONE, _BELOW_THRESHOLD):
-        return Finished(text, tuple(listener.messages), interrupted)
-    if interrupted:
+        return Finished(text, tuple(listener.messages), listener.interrupted)
+    if listener.interrupted:
         return Finished("", tuple(listener.messages), True)
     if status == _BAD_INPUT and listener.error is not None:
         raise listener.error
@@ -110,14 +129,58 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
 
 
 class _Listener:
-    """Lines of stderr: progress, the error, and messages."""
+    """Lines of a child's stderr: progress, the error, and messages; and the child's one interruption."""
 
-    def __init__(self, progress: ProgressCallback | None) -> None:
+    def __init__(self, child: subprocess.Popen[str], progress: ProgressCallback | None) -> None:
+        self._child = child
         self._progress = progress
+        self._lock = threading.Lock()
+        self.interrupted = False
         self.messages: list[str] = []
         self.error: InputError | None = None
 
-    def take(self, line: str) -> None:
+    def listen(self) -> None:
+        """To the end of stderr. A second Ctrl-C is raised."""
+        assert self._child.stderr is not None
+        before = False
+        while True:
+            try:
+                for line in self._child.stderr:
+                    self._take(line)
+                return
+            except KeyboardInterrupt:
+                if before:
+                    raise
+                before = True
+                self._interrupt()
+
+    @contextlib.contextmanager
+    def watching(self, wanted: Path | None) -> Iterator[None]:
+        """Interrupts the child once ``wanted`` is gone."""
+        if wanted is None:
+            yield
+            return
+        over = threading.Event()
+
+        def look() -> None:
+            while wanted.exists():
+                if over.wait(_LOOK_S):
+                    return
+            self._interrupt()
+
+        threading.Thread(target=look, daemon=True).start()
+        try:
+            yield
+        finally:
+            over.set()
+
+    def _interrupt(self) -> None:
+        with self._lock:
+            if not self.interrupted:
+                self.interrupted = True
+                self._child.send_signal(signal.SIGINT)
+
+    def _take(self, line: str) -> None:
         line = line.rstrip("\n")
         try:
             data = json.loads(line) if line.startswith("{") else None
@@ -132,19 +195,3 @@ class _Listener:
             self.error = InputError(**data["error"])
         elif line:
             self.messages.append(line)
-
-
-def _listen(child: subprocess.Popen[str], listener: _Listener) -> bool:
-    """To the end of the child's stderr; whether it was interrupted on the way."""
-    assert child.stderr is not None
-    interrupted = False
-    while True:
-        try:
-            for line in child.stderr:
-                listener.take(line)
-            return interrupted
-        except KeyboardInterrupt:
-            if interrupted:
-                raise
-            interrupted = True
-            child.send_signal(signal.SIGINT)

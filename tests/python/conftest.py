@@ -1,6 +1,11 @@
 """Paths of the checkout; its own program and package."""
 
+import os
+import signal
 import sys
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,3 +23,19 @@ def experiment() -> str:
 @pytest.fixture
 def demo() -> str:
     return str(ROOT / "demo" / "qube.csv")
+
+
+def interrupt_when(ready: Callable[[], bool]) -> None:
+    """Ctrl-C in a notebook: SIGINT for this process, from a thread of its own."""
+
+    def kill() -> None:
+        while not ready():
+            time.sleep(0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=kill, daemon=True).start()
+
+
+def interrupt_after(seconds: float) -> None:
+    then = time.monotonic() + seconds
+    interrupt_when(lambda: time.monotonic() >= then)

@@ -8,7 +8,6 @@ import os
 import pickle
 import signal
 import threading
-import time
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,8 @@ import gapscope as gs
 import numpy as np
 import pytest
 from gapscope._json import from_json
+
+from conftest import interrupt_after
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {
@@ -166,18 +167,6 @@ def _named(result: gs.Tune) -> dict[str, Any]:
     text = json.dumps(result.json).replace(str(result.out / "logs" / "half.npz"), "half")
     data: dict[str, Any] = json.loads(text)
     return data
-
-
-def interrupt_after(seconds: float) -> threading.Thread:
-    """Ctrl-C in a notebook: SIGINT for this process."""
-
-    def kill() -> None:
-        time.sleep(seconds)
-        os.kill(os.getpid(), signal.SIGINT)
-
-    thread = threading.Thread(target=kill, daemon=True)
-    thread.start()
-    return thread
 
 
 def test_ctrl_c_gives_the_best_so_far(experiment: str, demo: str) -> None:

@@ -50,7 +50,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/gapscope-config-versi
 install(FILES ${CMAKE_BINARY_DIR}/cmake/gapscope-config.cmake ${CMAKE_BINARY_DIR}/cmake/gapscope-config-version.cmake
         DESTINATION ${_package})
 
-install(DIRECTORY models DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope COMPONENT program)
+install(DIRECTORY models schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope COMPONENT program)
 install(FILES cmake/gapscope.bash RENAME gapscope DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 
 # The manual page says what the program says.

@@ -25,7 +25,9 @@ TRUTH = {
 repaired = gs.replay(experiment, log, with_=["cable_spring@arm", "coulomb_friction@arm"], set=TRUTH)
 print(f"  {said.strip()}: error {nominal.error:.4g}, with spring and friction {repaired.error:.4g}")
 assert nominal.error > 1 and repaired.error < 0.01
-assert (site / "share" / "gapscope" / "models" / "qube" / "experiment.yaml").is_file()
+shared = site / "share" / "gapscope"
+assert (shared / "models" / "qube" / "experiment.yaml").is_file()
+assert (shared / "schemas" / "replay.schema.json").is_file()
 
 if not version:
     try:

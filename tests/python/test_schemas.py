@@ -1,0 +1,219 @@
+"""schemas/: every result of the program is described, and the dataclasses know what is described."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+import re
+import subprocess
+import typing
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import gapscope as gs
+import jsonschema
+import pytest
+from gapscope._program import program
+from gapscope._results import Open
+from referencing import Registry, Resource
+
+from conftest import ROOT
+
+Schema: typing.TypeAlias = dict[str, Any]
+FILES = {path.name: path for path in sorted((ROOT / "schemas").iterdir())}
+COMMON = "common.schema.json"
+PLUGINS = {path.name for path in (ROOT / "src" / "plugins").iterdir()}  # gapscope.motor and so on are not results
+NOT_DESCRIBED = {"experiment", "log", "plan", "merge"}  # docs/experiment.md; files between commands of one version
+
+
+def read(name: str) -> Schema:
+    schema: Schema = json.loads(FILES[name].read_text(encoding="utf-8"))
+    return schema
+
+
+def closed(schema: Any) -> Any:
+    """The schema without room for keys that it does not name: what is published has it, for newer programs."""
+    if isinstance(schema, list):
+        return [closed(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    strict = {key: closed(value) for key, value in schema.items()}
+    if isinstance(schema.get("properties"), dict) and schema.get("type") == "object":
+        strict["additionalProperties"] = False
+    return strict
+
+
+@cache
+def validator(name: str) -> jsonschema.Draft202012Validator:
+    registry = Registry().with_resource(COMMON, Resource.from_contents(closed(read(COMMON))))
+    return jsonschema.Draft202012Validator(closed(read(name)), registry=registry)
+
+
+def name_of(result: Mapping[str, Any]) -> str:
+    """The file that describes a result, by what the result calls itself."""
+    name = str(result["schema"]).removeprefix("gapscope.").removesuffix("/1")
+    return ("identify" if name.startswith("identify.") else name) + ".schema.json"
+
+
+def check(result: Mapping[str, Any], name: str) -> None:
+    assert name_of(result) == f"{name}.schema.json"
+    problems = [f"{error.json_path}: {error.message}" for error in validator(name_of(result)).iter_errors(result)]
+    assert not problems
+
+
+def ask(*words: str) -> dict[str, Any]:
+    done = subprocess.run([program(), *words, "--json"], check=True, capture_output=True, text=True, timeout=300)
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+@pytest.fixture
+def short(demo: str, tmp_path: Path) -> str:
+    """The first 300 rows of the demo's log, of which a diagnosis takes seconds."""
+    path = tmp_path / "short.csv"
+    path.write_text("".join(Path(demo).read_text().splitlines(keepends=True)[:301]))
+    return str(path)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_schema_is_one(name: str) -> None:
+    schema = read(name)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for target in re.findall(r'"\$ref": "([^"]*)"', FILES[name].read_text()):
+        file, _, place = target.partition("#/$defs/")
+        assert place in (read(file) if file else schema)["$defs"], target
+    assert name == COMMON or "schema" in schema["required"]
+
+
+def test_every_result_has_its_schema() -> None:
+    """What the sources write under "schema"."""
+    text = "".join(path.read_text() for folder in ("src", "replay") for path in (ROOT / folder).rglob("*.cc"))
+    text += "".join(path.read_text() for path in (ROOT / "src").rglob("*.h"))
+    written = set(re.findall(r'"gapscope\.([a-z_.]+?)\.?(?:/1)?"', text)) - {"", *PLUGINS}
+    assert {f"{name}.schema.json" for name in written - NOT_DESCRIBED} == set(FILES) - {COMMON}
+
+
+def test_a_replay_of_each_kind(experiment: str, demo: str, tmp_path: Path) -> None:
+    upright = str(tmp_path / "upright.csv")
+    rows = "".join(f"{0.002 * k},0,0,0.01,0.005,0,0\n" for k in range(800))
+    Path(upright).write_text("t,target_theta,target_alpha,theta,alpha,feedforward,plant_input\n" + rows)
+    friction = ("--with", "coulomb_friction@arm", "--set", "coulomb_friction@arm.friction_n_m=6e-4")
+    check(ask("replay", experiment, demo, *friction), "replay")
+    check(ask("replay", experiment, demo, "--mode", "windows"), "replay")
+    loop = ask("replay", str(ROOT / "models/qube_koopman/experiment.yaml"), upright, "--mode", "closed_loop")
+    assert loop["logs"][0]["statistics"]
+    check(loop, "replay")
+    diverges = ask("replay", experiment, demo, "--with", "torque_bias@arm", "--set", "torque_bias@arm.torque_n_m=1e6")
+    assert diverges["logs"][0]["outcome"] == "diverged"
+    check(diverges, "replay")
+
+
+def test_what_a_result_becomes(experiment: str, short: str, tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    freeze = [word for name in ("motor.resistance", "motor.km", "arm.mass") for word in ("--freeze", name)]
+    check(ask("tune", experiment, short, *freeze, "--starts", "1", "--out", out), "tune")
+    check(json.loads((tmp_path / "out" / "result.json").read_text()), "tune")
+    native = tmp_path / "native"
+    check(ask("export", out, "--to", "mujoco_native", "--draws", "5", "--out", str(native)), "fidelity")
+    check(json.loads((native / "fidelity.json").read_text()), "fidelity")
+    check(json.loads((native / "randomization.json").read_text()), "randomization")
+    check(ask("apply", out, "--out", str(tmp_path / "robot.xml")), "apply")
+
+
+def test_a_diagnosis_and_its_evidence(experiment: str, short: str, tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    found = ask("diagnose", experiment, short, "--effort", "quick", "--out", out)
+    check(found, "diagnosis")
+    told = [statement for statement in found["statements"] if "numbers" in statement]
+    assert told  # else the evidence is not looked at
+    for number in {1, len(found["statements"])}:
+        check(ask("explain", out, str(number)), "explain")
+
+
+def test_logs(experiment: str, demo: str, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("time_s,voltage_v,arm_rad,pendulum_rad\n0,1,0,0\n0,1,0,0\n0.1,1,,0\n0.3,1,0,0\n")
+    check(ask("inspect", experiment, demo, str(bad)), "inspect")
+    check(ask("inspect", demo), "inspect")
+    check(ask("convert", demo, "--out", str(tmp_path)), "convert")
+    check(ask("identify", "cable", experiment, demo), "identify")
+    check(ask("render", experiment, demo, "--out", str(tmp_path / "still.png")), "render")
+
+
+def test_designs(experiment: str, tmp_path: Path) -> None:
+    short = ("--duration", "1", "--out", str(tmp_path / "input.csv"))
+    check(ask("design", "sweep", experiment, *short), "design.input")
+    effects = ("--separate", "cable_spring@arm", "--separate", "torque_bias@arm")
+    check(ask("design", "optimal", experiment, *effects, *short), "design.optimal")
+    check(ask("design", "lqr", experiment, "--q", "1,1,1,1"), "design.feedback")
+    servo = ("--inertia-kg-m2", "0.16", "--natural-frequency-hz", "5", "--damping-ratio", "0.7,2")
+    check(ask("design", "chirp", *servo, "--speed-limit-rpm", "116"), "design.chirp")
+
+
+def test_what_is_not_as_described_is_seen(experiment: str, demo: str) -> None:
+    whole = ask("inspect", experiment, demo)
+    for change in ({"new": 1}, {"fit": "yes"}, {"log": None}):
+        other = copy.deepcopy(whole)
+        other["logs"][0].update(change)
+        assert not validator("inspect.schema.json").is_valid(other)
+    del whole["logs"][0]["time"]["rate_hz"]
+    assert not validator("inspect.schema.json").is_valid(whole)
+
+
+# What the dataclasses leave in `extra`: of the search and of files, for programs rather than for people.
+OWN = {"out", "messages", "_keep", "extra"}  # not of the JSON
+MADE_BY = {"experiment", "seed", "versions"}
+EXTRA = {
+    "Replay": {*MADE_BY, "cost", "effects", "error_free_run", "error_nominal", "model"},
+    "LogResult": {"diverged_at_s", "statistics", "windows"},
+    "Tune": {*MADE_BY, "command_shift_s", "correlated", "cost", "effects", "force_shift_s", "left_frozen", "model"}
+    | {"replays", "solve_s", "spread", "starts", "starts_agree", "time_step_s"},
+    "Diagnosis": {*MADE_BY, "at_bounds", "budget", "candidates", "evidence", "left_out", "logs", "model", "policy"}
+    | {"refit_model", "remainder", "remains", "while"},
+    "Interval": {"ratio"},
+    "Gap": {"held_out"},
+    "Statement": {"blocks", "evidence", "group", "numbers", "prior", "rivals", "seen_beside", "with", "without"},
+    "NextExperiment": {"file", "if_absent", "if_present", "probability", "problem", "separates", "why"},
+    "Exported": {"logs", "of_each_log", "result", "schema", "versions"},
+    "Inspection": {"coverage", "delays", "excitation"},
+    "Finding": {"first_row"},
+}
+
+
+def test_the_dataclasses_know_what_is_described() -> None:
+    known: dict[type[Open], set[str]] = {}
+    kinds = {"replay": gs.Replay, "tune": gs.Tune, "diagnosis": gs.Diagnosis, "fidelity": gs.Exported}
+    for name, kind in kinds.items():
+        whole = read(f"{name}.schema.json")
+        gather(kind, whole, whole, known)
+    inspect = read("inspect.schema.json")
+    gather(gs.Inspection, inspect["$defs"]["log"], inspect, known)
+    left = {}
+    for kind, keys in known.items():
+        fields = {field.name for field in dataclasses.fields(kind)} - OWN
+        assert fields <= keys, kind
+        left[kind.__name__] = keys - fields
+    assert {name: keys for name, keys in left.items() if keys} == EXTRA
+
+
+def gather(kind: type[Open], described: Schema, whole: Schema, known: dict[type[Open], set[str]]) -> None:
+    """The keys that are described of each dataclass: one may stand for several places."""
+    described, whole = resolved(described, whole)
+    properties = described["properties"]
+    known.setdefault(kind, set()).update(properties)
+    for name, hint in typing.get_type_hints(kind).items():
+        for inner in (hint, *typing.get_args(hint)):
+            if isinstance(inner, type) and issubclass(inner, Open) and name in properties:
+                value, place = resolved(properties[name], whole)
+                gather(inner, value.get("items") or value.get("additionalProperties") or value, place, known)
+
+
+def resolved(schema: Schema, whole: Schema) -> tuple[Schema, Schema]:
+    while "$ref" in schema:
+        file, _, name = schema["$ref"].partition("#/$defs/")
+        whole = read(file) if file else whole
+        schema = whole["$defs"][name]
+    return schema, whole

@@ -15,6 +15,14 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 
 
+@pytest.fixture(autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of its own for each test."""
+    folder = tmp_path_factory.mktemp("cache")
+    monkeypatch.setenv("GAPSCOPE_CACHE_DIR", str(folder))
+    return folder
+
+
 @pytest.fixture
 def experiment() -> str:
     return str(ROOT / "models" / "qube" / "experiment.yaml")

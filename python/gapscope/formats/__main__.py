@@ -15,7 +15,8 @@ from pathlib import Path
 
 from gapscope._errors import InputError
 from gapscope._log import Log
-from gapscope.formats import Source, read_table, read_tables
+from gapscope.formats import Source, format_of, read_table, read_tables
+from gapscope.formats._cache import through_cache
 
 _MOST_BYTES = 16 << 30  # of memory, and no more than the machine has, and of a file: a small one may unpack to more
 
@@ -34,6 +35,17 @@ def _options(text: str) -> object:
         raise InputError("options that are not JSON", "--options", str(error), '{"topics": [...]}') from None
 
 
+def _convert(file: str, source: Source, out: Path) -> None:
+    def write(target: Path) -> None:
+        Log.of_table(read_table(file, source)).save(target)
+
+    form, place = format_of(file), Path(file)
+    if form is not None and form.slow and (place.is_file() or place.is_dir()):
+        through_cache(place, source, form.slow, out, write)
+    else:
+        write(out)
+
+
 def main() -> int:
     """The status: 0, or 2 where the file is refused."""
     parser = argparse.ArgumentParser(prog="gapscope-convert", description="A log of another tool as one NPZ table.")
@@ -50,7 +62,7 @@ def main() -> int:
             for k, table in enumerate(read_tables(given.file, source)):
                 Log.of_table(table).save(Path(given.out) / f"{k:06d}.npz")
         else:
-            Log.of_table(read_table(given.file, source)).save(given.out)
+            _convert(given.file, source, Path(given.out))
     except (InputError, MemoryError) as failure:
         error = InputError("not enough memory for this log", given.file, cure="take a part of it")
         if isinstance(failure, InputError):

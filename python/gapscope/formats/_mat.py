@@ -82,4 +82,4 @@ def _of_struct(name: str, value: Any, alone: bool) -> dict[str, Floats]:
     return columns
 
 
-FORMAT = Format("MAT file", _EXTRA, _knows, _read)
+FORMAT = Format("MAT file", _EXTRA, _knows, _read, slow=("scipy", "h5py"))

@@ -73,4 +73,11 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
     return (topics.table(source.topics),)
 
 
-FORMAT = Format("MCAP file", _EXTRA, _knows, _read, cure="mcap recover FILE, if it was cut")
+FORMAT = Format(
+    "MCAP file",
+    _EXTRA,
+    _knows,
+    _read,
+    cure="mcap recover FILE, if it was cut",
+    slow=("mcap", "mcap-protobuf-support", "rosbags"),
+)

@@ -57,4 +57,4 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
     return (topics.table(source.topics),)
 
 
-FORMAT = Format("ROS bag", _EXTRA, _knows, _read)
+FORMAT = Format("ROS bag", _EXTRA, _knows, _read, slow=("rosbags",))

@@ -90,6 +90,7 @@ class Format:
     knows: Callable[[Path], bool]
     read: Callable[[Path, Source], tuple[Table, ...]]
     cure: str = "record it again"  # of a file that cannot be read
+    slow: tuple[str, ...] = ()  # by these libraries, so that the table is kept (_cache.py)
 
 
 def library(module: str, what: str, extra: str) -> Any:

@@ -54,7 +54,9 @@ def diagnose_many(
     root.mkdir(parents=True, exist_ok=True)
     batch = _Batch(tuple(groups), keep, progress)
     with contextlib.ExitStack() as stack:
-        pool = executor or stack.enter_context(ThreadPoolExecutor(len(os.sched_getaffinity(0))))
+        pool = executor
+        if pool is None:
+            pool = stack.enter_context(ThreadPoolExecutor(len(os.sched_getaffinity(0))))
         wanted = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".wanted_", dir=root)))
         try:
             for name, given in work.items():

@@ -156,13 +156,17 @@ class ExportError(Open):
 
 @dataclass(frozen=True)
 class Exported(Open):
-    """A model for another engine: ``model`` is the MJCF's path. ``unmeasured``: why there are no errors."""
+    """A model for another engine: ``model`` is the MJCF's path, ``files`` those that the engine has beside it.
+
+    ``unmeasured``: why there are no errors.
+    """
 
     target: str
     model: str
     time_step_s: float
     effects: tuple[ExportedEffect, ...]
     held_out_error: ExportError
+    files: tuple[str, ...] = ()
     unmeasured: str = ""
 
 
@@ -178,7 +182,7 @@ class _WithModel(Run):
         seed: int | None = None,
         experiment: str | None = None,
     ) -> Exported:
-        """Writes OUT/model.xml and OUT/fidelity.json: "mujoco", "mujoco_native", "mujoco_warp" or "mjx".
+        """Writes OUT/model.xml, what ``target`` has beside it (docs/export.md) and OUT/fidelity.json.
 
         ``timestep``, s: of the written MJCF. ``draws``, of a tune: also OUT/randomization.json and
         OUT/randomization.npz, whose arrays of (draws, ...) are named as MuJoCo's (docs/export.md). ``experiment``:

@@ -6,6 +6,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
+#include "src/core/collect.h"
 #include "src/core/file.h"
 #include "src/export/randomize.h"
 #include "src/export/target.h"
@@ -19,11 +20,11 @@ namespace {
 struct ExportFlags {
   CommonFlags common;
   ResultSource source;
-  TargetName target = TargetName::kMujoco;
+  std::string target = "mujoco";
   double time_step_s = 0;
   int draws = 0;
 
-  std::string Path(const char* file) const { return (std::filesystem::path(common.out) / file).string(); }
+  std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
 
 // The logs that the result was judged by; of a replay all of its logs.
@@ -55,7 +56,8 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
     return Ok();
   }
   GS_ASSIGN(const auto recordings, LoadRecordings(model.experiment(), run->logs, pool));
-  ExportedFile file{.path = run->out, .host = {}};
+  ExportedFile file{.path = run->out, .host = {}, .delays_s = {}};
+  for (const auto& [drive, steps] : run->delay_steps) file.delays_s[drive] = steps * run->time_step_s;
   for (const NativeEffect& effect : run->effects) {
     if (effect.fidelity == Fidelity::kHost) file.host.push_back(effect.use);
   }
@@ -93,16 +95,35 @@ Result<UncertainParameters> UncertainOf(const Model& model, const nlohmann::orde
 }
 
 // randomization.json and .npz.
-Status WriteRandomization(const ExportFlags& flags, const Model& model, const std::vector<double>& values,
-                          const UncertainParameters& uncertain, const MakeExport& make, ExportRun* run) {
-  const auto draws = static_cast<std::size_t>(flags.draws);
-  GS_ASSIGN(run->randomization, Randomize(model, values, uncertain, make, draws, flags.common.seed));
-  run->draws = draws;
+Status WriteRandomization(const ExportFlags& flags, const ExportRun& run) {
   NpzArchive archive;
-  archive.Add("parameters", {draws, uncertain.parameters.size()}, run->randomization.drawn);
-  for (const DrawnField& field : run->randomization.fields) archive.Add(field.name, field.shape, field.values);
+  archive.Add("parameters", {run.draws, run.randomization.ranges.size()}, run.randomization.drawn);
+  for (const DrawnField& field : run.randomization.fields) archive.Add(field.name, field.shape, field.values);
   GS_RETURN_IF_ERROR(WriteFile(flags.Path("randomization.npz"), archive.Finish()));
-  return WriteFile(flags.Path("randomization.json"), RandomizationJson(*run).dump(2) + "\n");
+  return WriteFile(flags.Path("randomization.json"), RandomizationJson(run).dump(2) + "\n");
+}
+
+// What is written beside fidelity.json: all of it is made before any of it is written.
+Status WriteFiles(const ExportFlags& flags, const TargetInput& input, ExportRun* run) {
+  const ExportTarget& target = TargetOf(flags.target);
+  if (target.mujoco_3_11) SayAsMujoco311(input.exported.spec.get());
+  GS_ASSIGN(const std::string xml, SpecToXml(*input.exported.spec, input.model.experiment().model_path));
+  std::vector<TargetFile> files;
+  if (target.files) {
+    GS_ASSIGN(files, target.files(input));
+  }
+  GS_RETURN_IF_ERROR(WriteFile(run->out, xml));
+  for (const TargetFile& file : files) {
+    GS_RETURN_IF_ERROR(WriteFile(flags.Path(file.name), file.text));
+    run->files.push_back(flags.Path(file.name));
+  }
+  return run->draws > 0 ? WriteRandomization(flags, *run) : Ok();
+}
+
+Choice TargetChoice(std::string* target) {
+  return {.names = Collect(Targets(), &ExportTarget::name),
+          .set = [target](const std::string& name) { *target = name; },
+          .get = [target] { return *target; }};
 }
 
 Result<int> RunExport(const ExportFlags& flags) {
@@ -121,22 +142,28 @@ Result<int> RunExport(const ExportFlags& flags) {
   }
   GS_ASSIGN(const ExportedModel exported, make(loaded.values));
   if (target.plugins && flags.time_step_s > 0) exported.spec->option.timestep = flags.time_step_s;
-  GS_ASSIGN(const std::string xml, SpecToXml(*exported.spec, model.experiment().model_path));
   ExportRun run{.info = {.seed = flags.common.seed},
                 .result = flags.source.path,
-                .target = NameOf(flags.target),
+                .target = flags.target,
                 .what = target.what,
                 .out = flags.Path("model.xml"),
                 .time_step_s = exported.spec->option.timestep,
                 .effects = exported.native,
+                .delay_steps = exported.delay_steps,
                 .left_out = exported.left_out,
                 .logs = JudgedBy(json)};
-  GS_RETURN_IF_ERROR(WriteFile(run.out, xml));
+  if (flags.draws > 0) {
+    run.draws = static_cast<std::size_t>(flags.draws);
+    GS_ASSIGN(run.randomization, Randomize(model, loaded.values, uncertain, make, run.draws, flags.common.seed));
+  }
+  GS_RETURN_IF_ERROR(WriteFiles(flags,
+                                {.model = model,
+                                 .exported = exported,
+                                 .randomization = run.draws > 0 ? &run.randomization : nullptr,
+                                 .mjcf = "model.xml"},
+                                &run));
   ThreadPool pool(WorkersOf(flags.common));
   GS_RETURN_IF_ERROR(Measure(model, loaded.values, &run, pool));
-  if (flags.draws > 0) {
-    GS_RETURN_IF_ERROR(WriteRandomization(flags, model, loaded.values, uncertain, make, &run));
-  }
   const std::string text = ToJson(run).dump(2) + "\n";
   GS_RETURN_IF_ERROR(WriteFile(flags.Path("fidelity.json"), text));
   fmt::print("{}", flags.common.json ? text : ToTable(run));
@@ -152,7 +179,7 @@ Command ExportCommand() {
        .value = &flags->source.path,
        .required = true,
        .help = "Folder that diagnose, tune or replay wrote with --out, or its result.json"},
-      {.flag = "--to", .value = ChoiceOf(flags->target), .help = "The engine that is to run it"},
+      {.flag = "--to", .value = TargetChoice(&flags->target), .help = "The engine that is to run it"},
       {.flag = "--out",
        .value = &flags->common.out,
        .required = true,

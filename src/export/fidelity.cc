@@ -42,10 +42,19 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
   FidelityErrors errors;
   GS_ASSIGN(const auto nominal, Model::Build(model.rig()));
   GS_ASSIGN(std::shared_ptr<const Rig> rig, Rig::Load(Bare(model.experiment(), file.path)));
-  GS_ASSIGN(const auto exported, Model::Build(std::move(rig), file.host, {}));
+  std::vector<EffectUse> beside = file.host;
+  std::map<std::string, double> late;
+  for (const auto& [drive, delay_s] : file.delays_s) {
+    beside.push_back({"command_delay", drive});
+    late[beside.back().Text() + ".delay_s"] = delay_s;
+  }
+  GS_ASSIGN(const auto exported, Model::Build(std::move(rig), beside, {}));
   std::vector<double> of_exported = exported->Nominal();
   for (std::size_t i = 0; i < of_exported.size(); ++i) {
-    if (const int same = model.IndexOf(exported->parameters()[i].name); same >= 0)
+    const std::string& name = exported->parameters()[i].name;
+    if (const auto by_steps = late.find(name); by_steps != late.end())
+      of_exported[i] = by_steps->second;
+    else if (const int same = model.IndexOf(name); same >= 0)
       of_exported[i] = values[static_cast<std::size_t>(same)];
   }
   errors.nominal = ErrorOf(*nominal, nominal->Nominal(), logs, pool);

@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_EXPORT_FIDELITY_H_
 #define GAPSCOPE_EXPORT_FIDELITY_H_
 
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -20,10 +21,11 @@ struct FidelityErrors {
   double Lost() const;
 };
 
-// An exported file, and the effects that the host does beside it.
+// An exported file, and what is done beside it: effects by the host, late commands by the engine's configuration.
 struct ExportedFile {
   std::string path;
   std::vector<EffectUse> host;
+  std::map<std::string, double> delays_s;  // by drive
 };
 
 // The file is read back as any program would, and driven by the experiment's commands. Errors: it does not load; a

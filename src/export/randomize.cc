@@ -23,8 +23,9 @@ struct Array {
   std::span<const mjtNum> numbers;
 };
 
-std::vector<Array> ArraysOf(const mjModel& model) {
+std::vector<Array> ArraysOf(const mjModel& model, std::span<const mjtNum> delay_steps) {
   std::vector<Array> arrays = {{"opt.gravity", 1, 3, model.opt.gravity}};
+  if (!delay_steps.empty()) arrays.push_back({kDelaySteps, delay_steps.size(), 1, delay_steps});
   const auto add = [&]<class T>(const char* name, const T* data, mjtSize rows, mjtSize columns) {
     if constexpr (std::is_same_v<T, mjtNum>) {
       if (rows > 0 && columns > 0)
@@ -79,12 +80,14 @@ double DeviationOf(const UncertainParameters& uncertain, Eigen::Index i) {
 // A compiled model and its arrays.
 struct Compiled {
   ModelPtr model;
+  std::vector<mjtNum> delay_steps;
   std::vector<Array> arrays;
 };
 Result<Compiled> CompileWith(const MakeExport& make, std::span<const double> values) {
   GS_ASSIGN(ExportedModel exported, make(values));
   Compiled compiled{.model = std::move(exported.compiled)};
-  compiled.arrays = ArraysOf(*compiled.model);
+  for (const auto& [drive, steps] : exported.delay_steps) compiled.delay_steps.push_back(steps);
+  compiled.arrays = ArraysOf(*compiled.model, compiled.delay_steps);
   return compiled;
 }
 

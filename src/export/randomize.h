@@ -24,6 +24,9 @@ struct UncertainParameters {
   Eigen::MatrixXd covariance;
 };
 
+// An array beside mjModel's: ExportedModel::delay_steps, a row per drive in its order.
+inline constexpr char kDelaySteps[] = "delay_steps";
+
 // One number of an array of mjModel ("dof_damping", "opt.gravity") at both ends of a parameter's range.
 struct VaryingNumber {
   std::string field;

@@ -5,37 +5,24 @@
 #include "src/core/result.h"
 
 namespace gapscope {
-namespace {
+#include "targets_table.inc"
 
-// Sources: MuJoCo 4.0.1 XML reference; mujoco_warp 4.0 _src/types.py and io.py (put_model refuses plugins of bodies,
-// actuators and sensors); mujoco-mjx 3.17 _src/types.py (no DCMOTOR), passive.py and forward.py (delay and polynomials
-// are stored and never read).
-const ExportTarget kTargets[] = {
-    {TargetName::kMujoco, "MuJoCo 4 with the plugin library", true, {}},
-    {TargetName::kMujocoNative, "MuJoCo 4 without plugins", false, {}},
-    {TargetName::kMujocoWarp, "MuJoCo Warp 4 (float32)", false, {}},
-    {TargetName::kMjx,
-     "MJX 3.17 and Playground",
-     false,
-     {.passive_motors = false, .delays = false, .polynomials = false}},
-};
-
-}  // namespace
-
-const ExportTarget& TargetOf(TargetName name) {
-  const auto found =
-      std::find_if(std::begin(kTargets), std::end(kTargets), [&](const auto& target) { return target.name == name; });
-  GS_CHECK(found != std::end(kTargets));
-  return *found;
+void SayAsMujoco311(mjSpec* spec) {
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_ACTUATOR); e; e = mjs_nextElement(spec, e))
+    mjs_asActuator(e)->ctrlspec = 0;
+  const ModelPtr written(mj_compile(spec, nullptr));  // what is written is what was compiled
+  GS_CHECK(written != nullptr);
 }
 
-template <>
-std::span<const EnumName<TargetName>> EnumNames<TargetName>() {
-  static constexpr EnumName<TargetName> kNames[] = {{TargetName::kMujoco, "mujoco"},
-                                                    {TargetName::kMujocoNative, "mujoco_native"},
-                                                    {TargetName::kMujocoWarp, "mujoco_warp"},
-                                                    {TargetName::kMjx, "mjx"}};
-  return kNames;
+const std::vector<ExportTarget>& Targets() {
+  static const std::vector<ExportTarget> targets = MakeTargets();
+  return targets;
+}
+
+const ExportTarget& TargetOf(const std::string& name) {
+  const auto found = std::ranges::find(Targets(), name, &ExportTarget::name);
+  GS_CHECK(found != Targets().end());
+  return *found;
 }
 
 }  // namespace gapscope

@@ -1,28 +1,45 @@
-// Where a result can be taken to: engines that read MJCF, each with what it acts on.
+// Where a result can be taken to. Each target is a file of targets/, which says what it acts on and what it writes.
 #ifndef GAPSCOPE_EXPORT_TARGET_H_
 #define GAPSCOPE_EXPORT_TARGET_H_
 
-#include <span>
 #include <string>
+#include <vector>
 
-#include "src/core/options.h"
+#include "src/export/randomize.h"
+#include "src/model/model.h"
 #include "src/model/native.h"
 
 namespace gapscope {
 
-enum class TargetName { kMujoco, kMujocoNative, kMujocoWarp, kMjx };
-
-struct ExportTarget {
-  TargetName name;
-  std::string what;    // for people
-  bool plugins;        // it runs our plugin library
-  NativeFeatures has;  // where it does not
+// What a target's own files are made of.
+struct TargetInput {
+  const Model& model;
+  const ExportedModel& exported;
+  const Randomization* randomization;  // null: none was asked for
+  std::string mjcf;                    // the name of the written MJCF
+};
+struct TargetFile {
+  std::string name, text;
 };
 
-const ExportTarget& TargetOf(TargetName name);
+struct ExportTarget {
+  std::string name;          // of --to
+  std::string what;          // for people
+  bool plugins = false;      // it runs our plugin library
+  NativeFeatures has = {};   // where it does not
+  bool mujoco_3_11 = false;  // it reads that version's MJCF
+  // Files beside the MJCF; null: none. Errors: the model has no form there.
+  Result<std::vector<TargetFile>> (*files)(const TargetInput& input) = nullptr;
+};
 
-template <>
-std::span<const EnumName<TargetName>> EnumNames<TargetName>();
+// Leaves out of a compiled spec what no MJCF of MuJoCo 3.11 says: the `input` of actuators of one control, whose law
+// stands in their gain and bias.
+void SayAsMujoco311(mjSpec* spec);
+
+// All, by name.
+const std::vector<ExportTarget>& Targets();
+// One of their names.
+const ExportTarget& TargetOf(const std::string& name);
 
 }  // namespace gapscope
 

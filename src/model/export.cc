@@ -136,7 +136,9 @@ Result<ExportedModel> Model::ExportNative(std::span<const double> values,
   Structure structure(*rig_);
   structure.form = Structure::Form::kNative;
   structure.features = features;
-  if (features.time_step_s > 0) structure.spec->option.timestep = features.time_step_s;
+  mjOption& option = structure.spec->option;
+  if (features.time_step_s > 0) option.timestep = features.time_step_s;
+  if (!features.runge_kutta && option.integrator == mjINT_RK4) option.integrator = mjINT_IMPLICITFAST;
   std::map<std::string, double> numbers;
   for (const auto& value : experiment().values) numbers[value.name] = value.fallback.value_or(1);
   for (const auto& [name, value] : log_values ? *log_values : std::map<std::string, double>{}) numbers[name] = value;
@@ -181,6 +183,8 @@ Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const do
       result.origins.push_back({"joint/" + joint + "/armature", Read({split.share}, names)});
   }
   result.native = WhatBecame(*this, structure.told);
+  for (const auto& [drive, delay_s] : structure.delays_s)
+    result.delay_steps[drive] = static_cast<int>(std::lround(delay_s / structure.spec->option.timestep));
   result.spec = std::move(structure.spec);
   result.compiled = std::move(exported.compiled_);
   return result;

@@ -43,6 +43,8 @@ struct ExportedModel {
   std::vector<Origin> origins;
   std::vector<std::string> left_out;  // fields that each log sets anew, where none was given
   std::vector<NativeEffect> native;   // what became of each effect
+  // Steps that the engine's own configuration delays commands by, by drive: the MJCF does not.
+  std::map<std::string, int> delay_steps;
 };
 
 class Model {

@@ -24,12 +24,22 @@ struct NativeEffect {
   std::string how = "";  // what stands for it, or why nothing does
 };
 
+// Torques that an angle or nothing makes, by a motor: with `input="none"`, or with an input that nobody drives. Else a
+// host may send them with the drive's own.
+enum class PassiveMotors { kNone, kHost, kIdleInput, kNoInput };
+// An actuator's `delay`; or whole steps, in the engine's own configuration (ExportedModel::delay_steps).
+enum class CommandDelays { kNone, kWholeSteps, kExact };
+
 // Which of MuJoCo's elements an engine that reads MJCF acts on. What it does not, it may ignore without a word.
 struct NativeFeatures {
-  bool passive_motors = true;  // <dcmotor input="none">: torques that an angle or nothing makes
-  bool delays = true;          // an actuator's `delay`
-  bool polynomials = true;     // of a joint's stiffness and damping
-  double time_step_s = 0;      // 0: the MJCF's own
+  PassiveMotors passive_motors = PassiveMotors::kNoInput;
+  CommandDelays delays = CommandDelays::kExact;
+  bool polynomials = true;        // of a joint's stiffness and damping
+  bool springs_on_drives = true;  // a spring of a joint that is driven
+  bool tendons = true;            // stops, gaps and springs between two joints
+  bool lags = true;               // an actuator's activation
+  bool runge_kutta = true;        // else the implicitfast integrator in its place
+  double time_step_s = 0;         // 0: the MJCF's own
 };
 
 }  // namespace gapscope

@@ -97,6 +97,7 @@ Status Structure::AddSplit(Split split) {
                    .allowed = "backlash or joint_compliance, not both"};
     }
   }
+  Enter(kSplitTerms, split.joint, "");
   splits.push_back(std::move(split));
   return Ok();
 }

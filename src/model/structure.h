@@ -84,6 +84,7 @@ class Structure {
   NativeFeatures features;
   std::function<double(const std::string&)> value_of;
   std::vector<NativeEffect> told;
+  std::map<std::string, double> delays_s;  // by drive, where the engine's own configuration delays
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
   std::map<std::string, std::string> command_delay;  // drive -> parameter
@@ -108,7 +109,8 @@ class Structure {
   void FinishSpring(const std::string& joint, const Terms& terms);
   void FinishOwnTorque(const OwnTorque& torque);
   // The same without plugins. Groups of terms, by which Enter and Tell know them:
-  static constexpr const char *kMotorTerms = "motor", *kFrictionTerms = "friction", *kSpringTerms = "spring";
+  static constexpr const char *kMotorTerms = "motor", *kFrictionTerms = "friction", *kSpringTerms = "spring",
+                              *kSplitTerms = "split";
   Status FinishNative();
   // A term's number (0: there is no such term), and a field's as the experiment sets it, else the MJCF's own.
   double ValueIn(const Terms& terms, const std::string& key) const;
@@ -117,7 +119,7 @@ class Structure {
   void Tell(const std::string& group, const std::string& place, const std::string& key, Fidelity fidelity,
             const std::string& how);
   void TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how);
-  bool AddPassive(const std::string& joint, double amplitude, double per_rad, double phase);
+  Fidelity AddPassive(const std::string& joint, double amplitude, double per_rad, double phase);
   void NativeSpring(const std::string& joint, const Terms& terms);
   void NativeElastic(const std::string& joint, const Terms& terms);
   Status NativeFriction(const std::string& joint, const Terms& terms);

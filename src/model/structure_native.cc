@@ -76,6 +76,11 @@ Status Structure::FinishNative() {
                  .allowed = "native elements",
                  .cure = "export it with them: --to mujoco"};
   }
+  if (!features.tendons) {
+    for (const Split& split : splits)
+      Tell(kSplitTerms, split.joint, "", Fidelity::kDropped, "nothing links two joints there: motor and load are one");
+    splits.clear();
+  }
   for (const Split& split : splits) FinishSplit(split);
   for (const auto& [joint, terms] : motor_) NativeMotor(joint, terms);
   for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(NativeFriction(joint, terms));
@@ -85,21 +90,26 @@ Status Structure::FinishNative() {
   return Ok();
 }
 
-// amplitude sin(per_rad q + phase) on a joint, by a motor without an input; false: the engine has none.
-bool Structure::AddPassive(const std::string& joint, double amplitude, double per_rad, double phase) {
-  if (amplitude == 0) return true;
+// amplitude sin(per_rad q + phase) on a joint, by a motor without an input.
+Fidelity Structure::AddPassive(const std::string& joint, double amplitude, double per_rad, double phase) {
+  if (amplitude == 0) return Fidelity::kExact;
+  if (features.passive_motors == PassiveMotors::kHost)
+    return ActuatorsOn(joint).empty() ? Fidelity::kDropped : Fidelity::kHost;
   mjsActuator* actuator = nullptr;
-  if (features.passive_motors) {
+  if (features.passive_motors != PassiveMotors::kNone) {
+    const bool idle = features.passive_motors == PassiveMotors::kIdleInput;
+    constexpr double kLeast = 1e-9;  // a motor with an input must have a constant
     actuator = mjs_addActuator(spec.get(), nullptr);
-    double none[2] = {0, 0}, ripple[3] = {amplitude, per_rad, phase};
-    mjs_setToDCMotor(actuator, none, 1, nullptr, nullptr, nullptr, ripple, nullptr, nullptr, nullptr, mjINPUT_NONE);
+    double constants[2] = {idle ? kLeast : 0, idle ? kLeast : 0}, ripple[3] = {amplitude, per_rad, phase};
+    mjs_setToDCMotor(actuator, constants, 1, nullptr, nullptr, nullptr, ripple, nullptr, nullptr, nullptr,
+                     idle ? mjINPUT_VOLTAGE : mjINPUT_NONE);
   } else if (per_rad == 0) {
     actuator = mjs_addActuator(spec.get(), nullptr);
     actuator->gainprm[0] = 0;
     actuator->biastype = mjBIAS_AFFINE;
     actuator->biasprm[0] = amplitude * std::sin(phase);
   } else {
-    return false;
+    return Fidelity::kDropped;
   }
   int count = 0;
   std::string name;
@@ -108,7 +118,7 @@ bool Structure::AddPassive(const std::string& joint, double amplitude, double pe
   mjs_setName(actuator->element, name.c_str());
   actuator->trntype = mjTRN_JOINT;
   mjs_setString(actuator->target, joint.c_str());
-  return true;
+  return Fidelity::kExact;
 }
 
 void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
@@ -117,15 +127,20 @@ void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
     Tell(kSpringTerms, joint, key, fidelity, how);
   };
   const auto passive = [&](const char* key, double amplitude, double per_rad, double phase) {
-    const bool done = AddPassive(joint, amplitude, per_rad, phase);
-    tell(key, done ? Fidelity::kExact : Fidelity::kDropped,
-         done ? "a motor without an input, its torque a sine of the angle" : "no torque of an angle but a spring's");
+    const Fidelity done = AddPassive(joint, amplitude, per_rad, phase);
+    tell(key, done,
+         done == Fidelity::kExact ? "a motor that nobody drives, its torque a sine of the angle"
+         : done == Fidelity::kHost
+             ? fmt::format("add {:.4g} sin({:.4g} q + {:.4g}) N m to the drive's torque", amplitude, per_rad, phase)
+             : "no torque of an angle there");
   };
   NativeElastic(joint, terms);
   passive("gravity_n_m", value("gravity_n_m"), 1, std::numbers::pi - value("gravity_rest_rad"));
   passive("bias_n_m", value("bias_n_m"), 0, 0.5 * std::numbers::pi);
   passive("cogging_n_m", value("cogging_n_m"), value("cogging_periods_per_rev"), value("cogging_phase_rad"));
-  if (const double stiffness = value("stop_n_m_per_rad"); stiffness > 0) {
+  if (const double stiffness = value("stop_n_m_per_rad"); stiffness > 0 && !features.tendons) {
+    tell("stop_n_m_per_rad", Fidelity::kDropped, "no soft stop there");
+  } else if (stiffness > 0) {
     constexpr double kFar = 1e6;  // the other end of the free way
     const mjsJoint* element = FindJoint(joint);
     const double stop = value("stop_rad"), middle = 0.5 * (element->range[0] + element->range[1]);
@@ -144,6 +159,14 @@ void Structure::NativeElastic(const std::string& joint, const Terms& terms) {
   const char* keys[] = {"stiffness_n_m_per_rad", "rest_rad", "cubic_n_m_per_rad3"};
   if (std::none_of(std::begin(keys), std::end(keys), [&](const char* key) { return terms.contains(key); })) return;
   const auto value = [&](const char* key) { return ValueIn(terms, key); };
+  if (!features.springs_on_drives && !ActuatorsOn(joint).empty()) {
+    for (const char* key : keys) {
+      Tell(kSpringTerms, joint, key, Fidelity::kHost,
+           fmt::format("add -{:.4g} x - {:.4g} x^3 N m, x = q - {:.4g} rad, to the drive's torque", value(keys[0]),
+                       value(keys[2]), value(keys[1])));
+    }
+    return;
+  }
   mjsJoint* element = FindJoint(joint);
   const std::string field = "joint/" + joint + "/";
   const double own = ValueOf(field + "stiffness", element->stiffness[0]);
@@ -177,9 +200,10 @@ Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
   if (terms.contains("friction_n_m") || level > 0)
     GS_RETURN_IF_ERROR(FinishFriction(joint, {{"friction_n_m", ExactText(level)}}));
   // While it slides, friction by direction is constant friction and a constant torque.
-  AddPassive(on, -0.5 * (positive - negative), 0, 0.5 * std::numbers::pi);
+  const bool both = AddPassive(on, -0.5 * (positive - negative), 0, 0.5 * std::numbers::pi) == Fidelity::kExact;
   for (const char* key : {"friction_positive_n_m", "friction_negative_n_m"})
-    tell(key, Fidelity::kExact, "dry friction of the mean, and a constant torque");
+    tell(key, both ? Fidelity::kExact : Fidelity::kApproximated,
+         both ? "dry friction of the mean, and a constant torque" : "dry friction of the mean");
   tell("breakaway_n_m", Fidelity::kApproximated, "dry friction of its level at speed: it breaks away at that");
   tell("load_coefficient", Fidelity::kDropped, "friction in proportion to a load has no native form");
   if (terms.contains("quadratic_n_m_s2_per_rad2")) {
@@ -195,26 +219,34 @@ Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
 void Structure::NativeDelay(const std::string& joint, const std::string& key, double delay_s,
                             const std::vector<mjsActuator*>& inputs) {
   const double step_s = spec->option.timestep, steps = delay_s / step_s;
+  const bool counted = features.delays == CommandDelays::kWholeSteps;
+  if (counted) delays_s[mjs_getString(mjs_getName(inputs.front()->element))] += delay_s;
   if (delay_s <= 0) return;
   const std::string in_steps = fmt::format("{:.4g} ms, {:.3g} steps of {:.4g} ms", 1e3 * delay_s, steps, 1e3 * step_s);
-  if (!features.delays || steps < 1) {
+  if (features.delays == CommandDelays::kNone || (!counted && steps < 1)) {
     Tell(kMotorTerms, joint, key, Fidelity::kHost,
-         fmt::format("send commands {} later: {}", in_steps,
-                     features.delays ? "less than a step is none" : "actuators have no delay there"));
+         fmt::format(
+             "send commands {} later: {}", in_steps,
+             features.delays == CommandDelays::kNone ? "actuators have no delay there" : "less than a step is none"));
     return;
   }
   const bool whole = std::abs(steps - std::round(steps)) < 1e-6;
+  const bool late_feedback = FeedsBack(inputs) && key == "torque_delay_s";
+  if (late_feedback) MakeFeedbackLate(joint, delay_s, inputs);
+  const char* how_late = late_feedback ? "; that of its feedback by less damping and other inertia" : "";
+  if (counted) {
+    Tell(kMotorTerms, joint, key, whole && !late_feedback ? Fidelity::kExact : Fidelity::kApproximated,
+         fmt::format("commands {} steps late for {}{}", std::lround(steps), in_steps, how_late));
+    return;
+  }
   for (mjsActuator* input : inputs) {
     input->delay += delay_s;
     input->nsample = std::max(input->nsample, static_cast<int>(std::ceil(input->delay / step_s - 1e-6)) + 1);
     input->interp = whole ? 0 : 1;
   }
-  const bool late_feedback = FeedsBack(inputs) && key == "torque_delay_s";
-  if (late_feedback) MakeFeedbackLate(joint, delay_s, inputs);
   const bool early = spec->option.integrator == mjINT_RK4;  // whose last stage is at the end of a step
   Tell(kMotorTerms, joint, key, late_feedback || early ? Fidelity::kApproximated : Fidelity::kExact,
-       "the actuator's own delay of " + in_steps + (early ? ", by RK4 up to a step less" : "") +
-           (late_feedback ? "; that of its feedback by less damping and other inertia" : ""));
+       "the actuator's own delay of " + in_steps + (early ? ", by RK4 up to a step less" : "") + how_late);
 }
 
 void Structure::Put(const std::string& field, double number) {
@@ -243,7 +275,9 @@ void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
   };
   const std::vector<mjsActuator*> inputs = ActuatorsOn(joint);
   const bool feeds_back = FeedsBack(inputs);
-  for (const char* key : {"command_delay_s", "torque_delay_s"}) NativeDelay(joint, key, value(key), inputs);
+  for (const char* key : {"command_delay_s", "torque_delay_s"}) {
+    if (terms.contains(key)) NativeDelay(joint, key, value(key), inputs);
+  }
   if (const double limit = value("torque_limit_n_m"); limit > 0 && std::isfinite(limit)) {
     const double most = limit * (inputs.size() == 1 ? std::abs(inputs.front()->gear[0]) : 1);
     mjsJoint* element = FindJoint(joint);
@@ -256,7 +290,9 @@ void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
          "the joint's own limit of actuator forces" +
              (softness > 0.02 ? fmt::format(", its corner sharp where {:.2g} of it is round", softness) : ""));
   }
-  if (const double lag = value("time_constant_s"); lag > 0) {
+  if (const double lag = value("time_constant_s"); lag > 0 && !features.lags) {
+    tell("time_constant_s", Fidelity::kDropped, "actuators have no lag there");
+  } else if (lag > 0) {
     for (mjsActuator* input : inputs) {
       input->dyntype = mjDYN_FILTEREXACT;
       input->dynprm[0] = lag + value("second_time_constant_s");

@@ -35,7 +35,9 @@ ordered_json ToJson(const ExportRun& run) {
                        {"result", run.result},
                        {"target", run.target},
                        {"model", run.out},
+                       {"files", run.files},
                        {"time_step_s", run.time_step_s},
+                       {"delay_steps", run.delay_steps},
                        {"effects", ordered_json::array()},
                        {"of_each_log", run.left_out},
                        {"held_out_error",
@@ -89,9 +91,11 @@ ordered_json RandomizationJson(const ExportRun& run) {
 std::string ToTable(const ExportRun& run) {
   constexpr double kMuch = 0.1;
   std::string text;
+  std::vector<std::string> files = {run.out};
+  files.insert(files.end(), run.files.begin(), run.files.end());
   if (const double lost = run.errors.Lost(); lost > kMuch)
     text += fmt::format("{:.0f} % of what the model closes is open again in {}\n", 100 * std::min(lost, 1.0), run.out);
-  text += fmt::format("{}: {} for {}, steps of {:.4g} ms\n", run.out, run.result, run.what, 1e3 * run.time_step_s);
+  text += fmt::format("{}: {} for {}, steps of {:.4g} ms\n", Join(files), run.result, run.what, 1e3 * run.time_step_s);
   for (const NativeEffect& effect : run.effects)
     text += fmt::format("  {:<36} {:<13} {}\n", effect.use.Text(), FidelityName(effect.fidelity), effect.how);
   if (!run.left_out.empty()) text += fmt::format("  as it was, since each log sets it anew: {}\n", Join(run.left_out));

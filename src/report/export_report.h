@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_REPORT_EXPORT_REPORT_H_
 #define GAPSCOPE_REPORT_EXPORT_REPORT_H_
 
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -18,9 +19,11 @@ struct ExportRun {
   std::string result, target, what, out;  // what: the target in words; out: the written MJCF
   double time_step_s = 0;
   std::vector<NativeEffect> effects;
-  std::vector<std::string> left_out;  // fields that each log sets anew
-  std::vector<std::string> logs;      // that the errors are of; empty: none could be read
-  std::string unmeasured;             // why there are no errors; empty: there are
+  std::map<std::string, int> delay_steps;  // of ExportedModel
+  std::vector<std::string> files;          // beside the MJCF
+  std::vector<std::string> left_out;       // fields that each log sets anew
+  std::vector<std::string> logs;           // that the errors are of; empty: none could be read
+  std::string unmeasured;                  // why there are no errors; empty: there are
   FidelityErrors errors;
   std::size_t draws = 0;  // 0: no randomisation was asked for
   Randomization randomization;

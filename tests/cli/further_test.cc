@@ -101,6 +101,13 @@ TEST_F(CliTest, ExportTellsAndMeasuresWhatAnotherEngineLoses) {
   // With what the host does the file moves as the model does.
   EXPECT_NEAR(json["held_out_error"]["exported"], json["held_out_error"]["model"], 1e-4);
   EXPECT_EQ(ReadAll(to + "/model.xml").find("plugin"), std::string::npos);
+  const std::string lab = scratch_.Path("mjlab");
+  const auto counted =
+      nlohmann::json::parse(Run("export '" + out + "' --to mjlab --timestep 0.0005 --out '" + lab + "' --json").out);
+  EXPECT_EQ(counted["delay_steps"]["motor"], 20);
+  EXPECT_EQ(counted["files"][0], lab + "/gapscope_mjlab.py");
+  EXPECT_NE(ReadAll(lab + "/gapscope_mjlab.py").find("_lag(20, 20)"), std::string::npos);
+  EXPECT_NEAR(counted["held_out_error"]["exported"], counted["held_out_error"]["model"], 0.01);
   std::filesystem::remove(log);
   EXPECT_NE(Run("export '" + out + "' --to mjx --out '" + to + "'").out.find("not measured"), std::string::npos);
 }

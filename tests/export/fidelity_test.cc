@@ -15,11 +15,12 @@ struct Case {
   std::map<std::string, double> values;  // of the effect, by key
   Fidelity fidelity;
   double most;  // normalised error of the exported file; XML keeps six digits
-  TargetName target = TargetName::kMujocoNative;
+  std::string target = "mujoco_native";
+  double step_s = 0;  // 0: the rig's own
 };
 
 std::ostream& operator<<(std::ostream& out, const Case& c) {
-  return out << c.rig << " " << c.effect << " to " << NameOf(c.target);
+  return out << c.rig << " " << c.effect << " to " << c.target;
 }
 
 // A log of two seconds of the model's own motion.
@@ -48,12 +49,16 @@ TEST_P(NativeFormTest, MovesAsItsFidelitySays) {
   std::map<std::string, double> set;
   for (const auto& [key, value] : c.values) set[uses.value()[0].Text() + "." + key] = value;
   const std::vector<double> values = ValuesWith(*model, set);
-  const auto exported = model->ExportNative(values, nullptr, TargetOf(c.target).has);
+  NativeFeatures features = TargetOf(c.target).has;
+  features.time_step_s = c.step_s;
+  const auto exported = model->ExportNative(values, nullptr, features);
   ASSERT_TRUE(exported.ok()) << exported.error().Text();
   Fidelity fidelity = Fidelity::kExact;
   for (const NativeEffect& effect : exported.value().native) fidelity = effect.fidelity;
   EXPECT_EQ(fidelity, c.fidelity) << FidelityName(fidelity);
-  ExportedFile file{.path = scratch.Path("model.xml"), .host = {}};
+  ExportedFile file{.path = scratch.Path("model.xml"), .host = {}, .delays_s = {}};
+  for (const auto& [drive, steps] : exported.value().delay_steps)
+    file.delays_s[drive] = steps * exported.value().spec->option.timestep;
   if (fidelity == Fidelity::kHost) file.host = uses.value();
   const auto xml = SpecToXml(*exported.value().spec, "model.xml");
   ASSERT_TRUE(xml.ok() && WriteFile(file.path, xml.value()).ok());
@@ -70,7 +75,7 @@ TEST_P(NativeFormTest, MovesAsItsFidelitySays) {
 
 constexpr Fidelity kExact = Fidelity::kExact, kNearly = Fidelity::kApproximated, kHost = Fidelity::kHost,
                    kDropped = Fidelity::kDropped;
-constexpr TargetName kNative = TargetName::kMujocoNative, kMjx = TargetName::kMjx;
+constexpr char kMjx[] = "mjx", kMjlab[] = "mjlab";
 
 INSTANTIATE_TEST_SUITE_P(
     Effects, NativeFormTest,
@@ -112,7 +117,12 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"qube", "cable_spring@arm", {{"stiffness_n_m_per_rad", 0.002}, {"rest_rad", 0.4}}, kExact, 1e-5, kMjx},
         Case{"qube", "torque_bias@arm", {{"torque_n_m", 0.002}}, kExact, 1e-5, kMjx},
         Case{"qube", "gravity_offset@arm", {{"torque_n_m", 0.004}, {"rest_rad", 1}}, kDropped, 1, kMjx},
-        Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kHost, 1e-5, kMjx}),
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kHost, 1e-5, kMjx},
+        // The implicitfast integrator stands for RK4: small steps, lest it be all that is seen.
+        Case{"qube", "gravity_offset@arm", {{"torque_n_m", 0.004}, {"rest_rad", 1}}, kExact, 0.004, kMjlab, 2e-4},
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kExact, 0.006, kMjlab, 2e-4},
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.0213}}, kNearly, 0.006, kMjlab, 2e-4},
+        Case{"joint", "torque_delay@motor", {{"delay_s", 0.008}}, kNearly, 0.15, kMjlab, 2e-4}),
     [](const auto& at) { return "case" + std::to_string(at.index); });
 
 }  // namespace

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-collect_ignore = ["try_wheel.py", "bench.py"]  # scripts/wheel and scripts/bench_python run them
+# scripts/wheel and scripts/bench_python run the first two, test_mjlab.py what is in mjlab.
+collect_ignore = ["try_wheel.py", "bench.py", "mjlab"]
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 

@@ -1,0 +1,141 @@
+"""What is exported for mjlab, built by mjlab's own wheel and stepped by the MuJoCo that it pins.
+
+Torch, warp and the GPU are pretended (mjlab/pretend.py): mjlab's entities and configurations are its own code.
+"""
+
+import json
+import math
+import shutil
+import subprocess
+from pathlib import Path
+
+import gapscope as gs
+import numpy as np
+import pytest
+from conftest import ROOT
+from scipy.integrate import solve_ivp
+
+STEP_S = 2e-4
+# The servo's equation (models/joint/README.md), and what is added to it.
+KP, KD, INERTIA, DAMPING = 157.1451, 7.0729, 0.159221308, 0.5
+SPRING, REST, CUBIC, HANG, HANG_REST, BIAS, DRAG, DELAY = 60.0, 0.2, 300.0, 20.0, 0.3, 8.0, 3.0, 0.0213
+EFFECTS = {
+    "cable_spring@joint": {
+        "stiffness_n_m_per_rad": SPRING,
+        "rest_rad": REST,
+        "stiffness_cubic_n_m_per_rad3": CUBIC,
+    },
+    "gravity_offset@joint": {"torque_n_m": HANG, "rest_rad": HANG_REST},
+    "torque_bias@joint": {"torque_n_m": BIAS},
+    "quadratic_drag@joint": {"drag_n_m_s2_per_rad2": DRAG},
+    "command_delay@motor": {"delay_s": DELAY},
+}
+
+
+def target(t: float) -> float:
+    return 0.5 * math.sin(2 * math.pi * (0.5 * t + 0.6 * t * t))
+
+
+@pytest.fixture(scope="session")
+def mjlab() -> Path:
+    made = subprocess.run([ROOT / "scripts" / "mjlab_env"], capture_output=True, text=True, check=True)
+    return Path(made.stdout.strip())
+
+
+@pytest.fixture
+def joint(tmp_path: Path) -> tuple[str, str]:
+    log = tmp_path / "log.csv"
+    rows = [f"{t:.4f},{target(t):.9f},0" for t in np.arange(0, 3, 0.002)]
+    log.write_text("\n".join(["time_s,target_rad,position_rad", *rows]) + "\n")
+    return str(ROOT / "models" / "joint" / "experiment.yaml"), str(log)
+
+
+def run(mjlab: Path, script: str, *arguments: str | Path) -> None:
+    done = subprocess.run(
+        [mjlab, ROOT / "tests" / "python" / "mjlab" / script, *arguments], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def motion(times: np.ndarray, lag_s: float, without: str = "") -> np.ndarray:
+    """The equation itself, integrated by scipy."""
+
+    def size(value: float, name: str) -> float:
+        return 0.0 if name == without else value
+
+    def rate(t: float, state: np.ndarray) -> tuple[float, float]:
+        q, w = state
+        sent = target(max(0.0, math.floor((t - lag_s) / STEP_S + 1e-6) * STEP_S))
+        torque = KP * (sent - q) - (KD + DAMPING) * w + size(BIAS, "torque_bias")
+        torque -= size(SPRING, "cable_spring") * (q - REST) + size(CUBIC, "cable_spring") * (q - REST) ** 3
+        torque -= size(HANG, "gravity_offset") * math.sin(q - HANG_REST) + size(DRAG, "quadratic_drag") * w * abs(w)
+        return w, torque / INERTIA
+
+    return solve_ivp(rate, (0, times[-1]), (0, 0), t_eval=times, max_step=2e-3, rtol=1e-7, atol=1e-9).y[0]
+
+
+def test_what_mjlab_builds_moves_as_the_equation(joint: tuple[str, str], mjlab: Path, tmp_path: Path) -> None:
+    values = {f"{effect}.{key}": value for effect, keys in EFFECTS.items() for key, value in keys.items()}
+    result = gs.replay(*joint, with_=list(EFFECTS), set=values)
+    lost = result.export("mjlab", tmp_path / "to", timestep=STEP_S)
+    assert {e.name: e.form for e in lost.effects} == {
+        "cable_spring": "exact",
+        "gravity_offset": "exact",
+        "torque_bias": "exact",
+        "quadratic_drag": "exact",
+        "command_delay": "approximated",
+    }
+    times = STEP_S * np.arange(15000)
+    np.save(tmp_path / "commands.npy", [target(t) for t in times])
+    run(mjlab, "drive.py", tmp_path / "to", tmp_path / "commands.npy", tmp_path / "moved.npz")
+    moved = np.load(tmp_path / "moved.npz")
+    assert moved["lag"] == round(DELAY / STEP_S) and list(moved["fields"]) == ["position"]
+    expected = motion(times, int(moved["lag"]) * STEP_S)
+    off = np.sqrt(np.mean((moved["angles"][:, 0] - expected) ** 2))
+    nothing_lost = 2e-3 * np.std(expected)
+    assert off < nothing_lost
+    for effect in ("cable_spring", "gravity_offset", "torque_bias", "quadratic_drag"):
+        assert np.sqrt(np.mean((motion(times, moved["lag"] * STEP_S, effect) - expected) ** 2)) > 10 * nothing_lost
+
+
+def test_a_draw_is_one_row_of_all_that_varies(demo: str, experiment: str, mjlab: Path, tmp_path: Path) -> None:
+    """By the equations of models/qube/README.md, not by what else the program wrote."""
+    tuned = gs.tune(
+        experiment, demo, with_=["command_delay"], starts=1,
+        freeze=["motor.resistance", "motor.km", "arm.mass", "pendulum.mass"],
+    )  # fmt: skip
+    to = Path(tuned.export("mjlab", tmp_path / "to", draws=30, seed=4).model).parent
+    run(mjlab, "draw.py", to, tmp_path / "drawn.json")
+    made = json.loads((tmp_path / "drawn.json").read_text())
+    told = {p["name"]: p for p in json.loads((to / "randomization.json").read_text())["parameters"]}
+    rows = [dict(zip(told, row, strict=True)) for row in np.load(to / "randomization.npz")["parameters"]]
+    fields, fitted = made["fields"], {p.name: p.value for p in tuned.parameters}
+    pendulum = made["names"]["joint"].index("pendulum")
+    body = made["bodies"][made["names"]["body"].index("pendulum")]
+    chosen = []
+    for env in range(len(fields["actuator_gainprm"])):
+        gain = fields["actuator_gainprm"][env][0][0]
+        row = min(rows, key=lambda r: abs(r["motor.kt"] / 8.4 - gain))
+        chosen.append(row["motor.kt"])
+        assert gain == pytest.approx(row["motor.kt"] / 8.4, rel=1e-4)
+        assert fields["actuator_biasprm"][env][0][2] == pytest.approx(-row["motor.kt"] * 0.042 / 8.4, rel=1e-4)
+        damping = fields["dof_damping"][env][made["dofs"][pendulum]]
+        assert damping == pytest.approx(row.get("pendulum.damping", fitted["pendulum.damping"]), rel=1e-4)
+        assert fields["body_ipos"][env][body][2] == pytest.approx(-row["pendulum.length"] / 2, rel=1e-4)
+        assert made["lags"]["arm"][env] == round(row["command_delay@motor.delay_s"] / 0.002)
+    assert len(set(chosen)) > 1
+    alone = {name for name, p in told.items() if not p["conditional"] and name.endswith(".damping")}
+    assert alone and set(made["terms"]) == alone
+    for name, (function, joint, low, high) in made["terms"].items():
+        assert (function, f"{joint}.damping") == ("joint_damping", name)
+        assert (low, high) == pytest.approx((told[name]["low"], told[name]["high"]))
+
+
+def test_air_is_refused_before_anything_is_written(joint: tuple[str, str], tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "models", tmp_path / "models")
+    mjcf = tmp_path / "models" / "joint" / "joint.xml"
+    mjcf.write_text(mjcf.read_text().replace('timestep="0.002"', 'timestep="0.002" density="1.2"'))
+    result = gs.replay(tmp_path / "models" / "joint" / "experiment.yaml", joint[1])
+    with pytest.raises(gs.InputError, match="density"):
+        result.export("mjlab", tmp_path / "to")
+    assert not (tmp_path / "to").exists()

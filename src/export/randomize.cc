@@ -200,4 +200,23 @@ Result<Randomization> Randomize(const Model& model, std::span<const double> valu
   return result;
 }
 
+bool MayBeDrawnAlone(const ParameterRange& range, const std::vector<ParameterRange>& all) {
+  if (range.conditional || range.numbers.size() != 1) return false;
+  const VaryingNumber& mine = range.numbers.front();
+  return std::ranges::none_of(all, [&](const ParameterRange& other) {
+    return &other != &range && std::ranges::any_of(other.numbers, [&](const VaryingNumber& number) {
+      return number.field == mine.field && number.row == mine.row && number.column == mine.column;
+    });
+  });
+}
+
+DelayRange RangeOfDelay(const Randomization& randomization, std::size_t drive, double nominal) {
+  for (const ParameterRange& range : randomization.ranges) {
+    if (!MayBeDrawnAlone(range, randomization.ranges)) continue;
+    const VaryingNumber& number = range.numbers.front();
+    if (number.field == kDelaySteps && number.row == drive) return {number.low, number.high};
+  }
+  return {nominal, nominal};
+}
+
 }  // namespace gapscope

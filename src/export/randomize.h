@@ -52,6 +52,17 @@ struct Randomization {
   std::vector<double> drawn;  // draws x parameters, in the order of `ranges`
 };
 
+// Whether a parameter may be drawn without the others: it goes together with none, and makes one number that no other
+// makes.
+bool MayBeDrawnAlone(const ParameterRange& range, const std::vector<ParameterRange>& all);
+
+// The steps that a drive's commands may be late, where a parameter says so that may be drawn alone; else both
+// `nominal`.
+struct DelayRange {
+  double low = 0, high = 0;
+};
+DelayRange RangeOfDelay(const Randomization& randomization, std::size_t drive, double nominal);
+
 // The MJCF with these values of all parameters.
 using MakeExport = std::function<Result<ExportedModel>(std::span<const double>)>;
 

@@ -160,11 +160,10 @@ void Structure::NativeElastic(const std::string& joint, const Terms& terms) {
   if (std::none_of(std::begin(keys), std::end(keys), [&](const char* key) { return terms.contains(key); })) return;
   const auto value = [&](const char* key) { return ValueIn(terms, key); };
   if (!features.springs_on_drives && !ActuatorsOn(joint).empty()) {
-    for (const char* key : keys) {
-      Tell(kSpringTerms, joint, key, Fidelity::kHost,
-           fmt::format("add -{:.4g} x - {:.4g} x^3 N m, x = q - {:.4g} rad, to the drive's torque", value(keys[0]),
-                       value(keys[2]), value(keys[1])));
-    }
+    const std::string cubic = value(keys[2]) != 0 ? fmt::format(" {:+.4g} x^3", -value(keys[2])) : "";
+    const std::string how = fmt::format("add {:.4g} x{} N m, x = q {:+.4g} rad, to the drive's torque", -value(keys[0]),
+                                        cubic, -value(keys[1]));
+    for (const char* key : keys) Tell(kSpringTerms, joint, key, Fidelity::kHost, how);
     return;
   }
   mjsJoint* element = FindJoint(joint);

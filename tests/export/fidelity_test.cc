@@ -75,7 +75,7 @@ TEST_P(NativeFormTest, MovesAsItsFidelitySays) {
 
 constexpr Fidelity kExact = Fidelity::kExact, kNearly = Fidelity::kApproximated, kHost = Fidelity::kHost,
                    kDropped = Fidelity::kDropped;
-constexpr char kMjx[] = "mjx", kMjlab[] = "mjlab";
+constexpr char kMjx[] = "mjx", kMjlab[] = "mjlab", kIsaacLab[] = "isaaclab";
 
 INSTANTIATE_TEST_SUITE_P(
     Effects, NativeFormTest,
@@ -122,7 +122,20 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"qube", "gravity_offset@arm", {{"torque_n_m", 0.004}, {"rest_rad", 1}}, kExact, 0.004, kMjlab, 2e-4},
         Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kExact, 0.006, kMjlab, 2e-4},
         Case{"joint", "command_delay@motor", {{"delay_s", 0.0213}}, kNearly, 0.006, kMjlab, 2e-4},
-        Case{"joint", "torque_delay@motor", {{"delay_s", 0.008}}, kNearly, 0.15, kMjlab, 2e-4}),
+        Case{"joint", "torque_delay@motor", {{"delay_s", 0.008}}, kNearly, 0.15, kMjlab, 2e-4},
+        Case{"joint",
+             "cable_spring@joint",
+             {{"stiffness_n_m_per_rad", 60}, {"rest_rad", 0.4}},
+             kHost,
+             0.006,
+             kIsaacLab,
+             2e-4},
+        Case{"joint", "gravity_offset@joint", {{"torque_n_m", 40}, {"rest_rad", 1}}, kHost, 0.006, kIsaacLab, 2e-4},
+        Case{"qube", "cable_spring@pendulum", {{"stiffness_n_m_per_rad", 0.01}}, kExact, 0.004, kIsaacLab, 2e-4},
+        Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kExact, 0.006, kIsaacLab, 2e-4},
+        Case{"qube", "gravity_offset@pendulum", {{"torque_n_m", 0.004}}, kDropped, 1, kIsaacLab},
+        Case{"qube", "actuator_lag@motor", {{"time_constant_s", 0.02}}, kDropped, 1, kIsaacLab},
+        Case{"joint", "backlash@joint", {{"gap_rad", 0.05}}, kDropped, 1, kIsaacLab}),
     [](const auto& at) { return "case" + std::to_string(at.index); });
 
 }  // namespace

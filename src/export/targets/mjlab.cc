@@ -10,6 +10,7 @@
 
 #include "src/export/python_text.h"
 #include "src/export/target.h"
+#include "src/model/element_names.h"
 
 namespace gapscope {
 namespace {
@@ -41,11 +42,6 @@ const RowKind* KindOf(const std::string& field) {
   return found == std::end(kRowKinds) ? nullptr : found;
 }
 
-std::string Name(const mjModel& model, mjtObj object, int id) {
-  const char* name = mj_id2name(&model, object, id);
-  return name ? name : "";
-}
-
 // The name of a row's element; empty: it has none, or is a part of a joint of several angles.
 std::string NameOfRow(const mjModel& model, const RowKind& kind, std::size_t row) {
   int id = static_cast<int>(row);
@@ -55,7 +51,7 @@ std::string NameOfRow(const mjModel& model, const RowKind& kind, std::size_t row
                                                 [&](int start) { return start <= static_cast<int>(row); })) -
          1;
   if (kind.object == mjOBJ_JOINT && model.jnt_type[id] != mjJNT_HINGE && model.jnt_type[id] != mjJNT_SLIDE) return "";
-  return Name(model, kind.object, id);
+  return NameOf(model, kind.object, id);
 }
 
 // An actuator that mjlab drives: the first one of its joint.
@@ -88,7 +84,6 @@ class MjlabWriter {
   std::string Ranges() const;
   std::string Draws() const;
   const std::vector<ParameterRange>& ranges() const { return input_.randomization->ranges; }
-  bool DrawnAlone(const ParameterRange& range) const;
   int DelayRow(const std::string& drive) const;
 
   const TargetInput& input_;
@@ -100,10 +95,10 @@ class MjlabWriter {
 void MjlabWriter::FindDrives() {
   std::set<std::string> joints;
   for (int a = 0; a < compiled_.nactuator; ++a) {
-    const std::string name = Name(compiled_, mjOBJ_ACTUATOR, a);
+    const std::string name = NameOf(compiled_, mjOBJ_ACTUATOR, a);
     if (mj_name2id(&input_.model.compiled(), mjOBJ_ACTUATOR, name.c_str()) < 0) continue;  // ours, without a command
     const bool joint = compiled_.actuator_trntype[a] == mjTRN_JOINT;
-    const std::string on = joint ? Name(compiled_, mjOBJ_JOINT, compiled_.actuator_trnid[2 * a]) : "";
+    const std::string on = joint ? NameOf(compiled_, mjOBJ_JOINT, compiled_.actuator_trnid[2 * a]) : "";
     if (joint && joints.insert(on).second)
       drives_.push_back({name, on, CommandField(compiled_, a)});
     else
@@ -160,13 +155,7 @@ std::string MjlabWriter::Lags(const Drive& drive) const {
   const int nominal = input_.exported.delay_steps.at(drive.name);
   std::string cases = fmt::format("None: _lag({0}, {0})", nominal);
   if (!input_.randomization) return "{" + cases + "}";
-  double low = nominal, high = nominal;
-  for (const ParameterRange& range : ranges()) {
-    for (const VaryingNumber& number : range.numbers) {
-      if (number.field != kDelaySteps || static_cast<int>(number.row) != row || !DrawnAlone(range)) continue;
-      low = number.low, high = number.high;
-    }
-  }
+  const auto [low, high] = RangeOfDelay(*input_.randomization, static_cast<std::size_t>(row), nominal);
   double least = nominal, most = nominal;
   for (const DrawnField& field : input_.randomization->fields) {
     if (field.name != kDelaySteps) continue;
@@ -213,7 +202,7 @@ std::string MjlabWriter::Robot() const {
     if (j == 0 && compiled_.jnt_type[j] == mjJNT_FREE)
       root = fmt::format("pos={}, rot={}, ", PyNumbers({at, 3}), PyNumbers({at + 3, 4}));
     if (compiled_.jnt_type[j] == mjJNT_HINGE || compiled_.jnt_type[j] == mjJNT_SLIDE)
-      angles += fmt::format("{}: {}, ", PyPattern(Name(compiled_, mjOBJ_JOINT, j)), PyNumber(*at));
+      angles += fmt::format("{}: {}, ", PyPattern(NameOf(compiled_, mjOBJ_JOINT, j)), PyNumber(*at));
   }
   return fmt::format(
       "def robot(randomize=None):\n"
@@ -226,22 +215,11 @@ std::string MjlabWriter::Robot() const {
       PyText(input_.mjcf), root, angles.empty() ? "" : angles.substr(0, angles.size() - 2));
 }
 
-// Whether it may be drawn without the others: it goes together with none, and makes one number that no other makes.
-bool MjlabWriter::DrawnAlone(const ParameterRange& range) const {
-  if (range.conditional || range.numbers.size() != 1) return false;
-  const VaryingNumber& mine = range.numbers.front();
-  return std::ranges::none_of(ranges(), [&](const ParameterRange& other) {
-    return &other != &range && std::ranges::any_of(other.numbers, [&](const VaryingNumber& number) {
-      return number.field == mine.field && number.row == mine.row && number.column == mine.column;
-    });
-  });
-}
-
 std::string MjlabWriter::Ranges() const {
   std::string terms;
   std::vector<std::string> left;
   for (const ParameterRange& range : ranges()) {
-    const bool alone = DrawnAlone(range);
+    const bool alone = MayBeDrawnAlone(range, ranges());
     if (alone && range.numbers.front().field == kDelaySteps) continue;  // LAGS draws it
     const auto term = std::ranges::find_if(
         kDrTerms, [&](const DrTerm& dr) { return alone && range.numbers.front().field == dr.field; });

@@ -1,0 +1,191 @@
+#include "src/export/isaaclab.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "src/core/statistics.h"
+#include "src/export/python_text.h"
+#include "src/model/element_names.h"
+
+namespace gapscope {
+namespace {
+
+// A joint and what drives it; of a passive joint the drive is its own spring.
+struct JointDrive {
+  std::string name, joint, note;
+  double stiffness = 0, damping = 0, limit = kInfinity;
+  std::optional<DelayRange> delay_steps;  // none: commands are not late
+};
+
+class IsaacLabWriter {
+ public:
+  IsaacLabWriter(const TargetInput& input, const IsaacLabNames& names)
+      : input_(input), names_(names), compiled_(*input.exported.compiled) {}
+
+  Status FindDrives();
+  std::string Text() const;
+
+ private:
+  Error NoForm(const std::string& what, const std::string& allowed) const;
+  Result<JointDrive> DriveOf(int joint) const;
+  Status SetGains(int actuator, JointDrive* drive) const;
+  Status LimitBy(const mjtNum* range, JointDrive* drive) const;
+  std::string Configuration(int joint, const JointDrive& drive) const;
+
+  const TargetInput& input_;
+  const IsaacLabNames& names_;
+  const mjModel& compiled_;
+  std::vector<std::pair<int, JointDrive>> drives_;  // by joint
+};
+
+Error IsaacLabWriter::NoForm(const std::string& what, const std::string& allowed) const {
+  return {.what = what + ", which Isaac Lab's configurations have no form for",
+          .where = input_.model.experiment().model_path,
+          .allowed = allowed,
+          .cure = "export to mjlab or mujoco_native"};
+}
+
+Status IsaacLabWriter::LimitBy(const mjtNum* range, JointDrive* drive) const {
+  if (range[0] != -range[1])
+    return NoForm("the torque limits of '" + drive->name + "' differ by direction", "the same both ways");
+  drive->limit = std::min(drive->limit, range[1]);
+  return Ok();
+}
+
+Status IsaacLabWriter::SetGains(int actuator, JointDrive* drive) const {
+  const mjtNum* gain = compiled_.actuator_gainprm + actuator * mjNGAIN;
+  const mjtNum* bias = compiled_.actuator_biasprm + actuator * mjNBIAS;
+  const bool affine = compiled_.actuator_biastype[actuator] == mjBIAS_AFFINE;
+  const bool plain = compiled_.actuator_dyntype[actuator] == mjDYN_NONE &&
+                     compiled_.actuator_gaintype[actuator] == mjGAIN_FIXED &&
+                     (affine || compiled_.actuator_biastype[actuator] == mjBIAS_NONE) &&
+                     compiled_.actuator_gear[6 * actuator] == 1 && (!affine || bias[0] == 0);
+  if (!plain)
+    return NoForm("the actuator '" + drive->name + "' is no plain servo or motor",
+                  "a stateless fixed gain, an affine bias without a constant, gear 1");
+  drive->stiffness = affine ? 0 - bias[1] : 0;
+  drive->damping = affine ? 0 - bias[2] : 0;
+  if (drive->stiffness == 0)
+    drive->note = fmt::format("effort target: {:.6g} N m for each unit of the command", gain[0]);
+  else if (gain[0] != drive->stiffness)
+    drive->note = fmt::format("position target: {:.6g} times the command", gain[0] / drive->stiffness);
+  const int joint = compiled_.actuator_trnid[2 * actuator];
+  if (compiled_.actuator_forcelimited[actuator])
+    GS_RETURN_IF_ERROR(LimitBy(compiled_.actuator_forcerange + 2 * actuator, drive));
+  if (compiled_.jnt_actfrclimited[joint]) GS_RETURN_IF_ERROR(LimitBy(compiled_.jnt_actfrcrange + 2 * joint, drive));
+  const auto& late = input_.exported.delay_steps;
+  if (const auto mine = late.find(drive->name); mine != late.end()) {
+    const auto row = static_cast<std::size_t>(std::distance(late.begin(), mine));
+    const double steps = mine->second;
+    drive->delay_steps =
+        input_.randomization ? RangeOfDelay(*input_.randomization, row, steps) : DelayRange{steps, steps};
+  }
+  return Ok();
+}
+
+// The first actuator of the joint is its drive; plain motors beside it are
+// efforts of the same configuration.
+Result<JointDrive> IsaacLabWriter::DriveOf(int joint) const {
+  JointDrive drive{.joint = NameOf(compiled_, mjOBJ_JOINT, joint)};
+  drive.name = drive.joint;
+  const double spring = compiled_.jnt_stiffness[joint];
+  bool driven = false;
+  for (int a = 0; a < compiled_.nactuator; ++a) {
+    if (compiled_.actuator_trntype[a] != mjTRN_JOINT || compiled_.actuator_trnid[2 * a] != joint || driven) continue;
+    driven = true;
+    drive.name = NameOf(compiled_, mjOBJ_ACTUATOR, a);
+    GS_RETURN_IF_ERROR(SetGains(a, &drive));
+  }
+  const mjtNum* poly = compiled_.jnt_stiffnesspoly + mjNPOLY * joint;
+  if ((driven && spring != 0) || std::any_of(poly, poly + mjNPOLY, [](double x) { return x != 0; }))
+    return NoForm("the joint '" + drive.joint + "' has a spring of its own beside its drive, or one that hardens",
+                  "linear springs, on joints without a drive");
+  if (!driven && spring != 0) {
+    drive.stiffness = spring;
+    drive.note = fmt::format("a spring: its position target is {:.6g} rad, always",
+                             compiled_.qpos_spring[compiled_.jnt_qposadr[joint]]);
+  }
+  return drive;
+}
+
+Status IsaacLabWriter::FindDrives() {
+  if (compiled_.ntendon > 0 || compiled_.neq > 0)
+    return NoForm("the MJCF has tendons or equality constraints", "joints that stand alone");
+  for (int j = 0; j < compiled_.njnt; ++j) {
+    if (compiled_.jnt_type[j] == mjJNT_FREE && j == 0) continue;
+    if (compiled_.jnt_type[j] != mjJNT_HINGE && compiled_.jnt_type[j] != mjJNT_SLIDE)
+      return NoForm("the joint '" + NameOf(compiled_, mjOBJ_JOINT, j) + "' is a ball or a free joint",
+                    "hinges and slides");
+    GS_ASSIGN(JointDrive drive, DriveOf(j));
+    drives_.push_back({j, std::move(drive)});
+  }
+  return Ok();
+}
+
+std::string IsaacLabWriter::Configuration(int joint, const JointDrive& drive) const {
+  const bool late = drive.delay_steps.has_value();
+  const int dof = compiled_.jnt_dofadr[joint];
+  const std::string friction = PyNumber(compiled_.dof_frictionloss[dof]);
+  std::string text = fmt::format(
+      "  {}: {}(\n    joint_names_expr=[{}],\n    stiffness={},\n    "
+      "damping={},\n",
+      PyText(drive.name), late ? "DelayedPDActuatorCfg" : "ImplicitActuatorCfg", PyPattern(drive.joint),
+      PyNumber(drive.stiffness), PyNumber(drive.damping));
+  if (!drive.note.empty()) text = fmt::format("  # {}\n{}", drive.note, text);
+  if (std::isfinite(drive.limit))
+    text += fmt::format("    {}={},\n", late ? names_.explicit_limit : names_.implicit_limit, PyNumber(drive.limit));
+  text += fmt::format(
+      "    armature={},\n    friction={},\n    "
+      "dynamic_friction={},\n    viscous_friction={},\n",
+      PyNumber(compiled_.dof_armature[dof]), friction, friction, PyNumber(compiled_.dof_damping[dof]));
+  if (late)
+    text += fmt::format(
+        "    # Each episode; efforts that are added to it are late too.\n    min_delay={:.0f},\n    "
+        "max_delay={:.0f},\n",
+        drive.delay_steps->low, drive.delay_steps->high);
+  return text + "  ),\n";
+}
+
+std::string IsaacLabWriter::Text() const {
+  const mjOption& option = input_.exported.spec->option;
+  const bool late =
+      std::ranges::any_of(drives_, [](const auto& drive) { return drive.second.delay_steps.has_value(); });
+  std::string text = fmt::format(
+      "\"\"\"Actuators for Isaac Lab {}, written by gapscope: friction in N m, "
+      "so Isaac Sim 5 or later.\n\n"
+      "from gapscope_isaaclab import ACTUATORS, SIMULATION\n"
+      "ArticulationCfg(spawn=..., actuators=ACTUATORS), of a USD made of "
+      "{}.\n\"\"\"\n\n"
+      "from isaaclab.actuators import {}ImplicitActuatorCfg\nfrom isaaclab.sim "
+      "import SimulationCfg\n\n"
+      "SIMULATION = SimulationCfg(dt={}, gravity={})\n\nACTUATORS = {{\n",
+      names_.version, input_.mjcf, late ? "DelayedPDActuatorCfg, " : "", PyNumber(option.timestep),
+      PyNumbers(option.gravity));
+  for (const auto& [joint, drive] : drives_) text += Configuration(joint, drive);
+  return text + "}\n";
+}
+
+}  // namespace
+
+NativeFeatures IsaacLabFeatures() {
+  return {.passive_motors = PassiveMotors::kHost,
+          .delays = CommandDelays::kWholeSteps,
+          .polynomials = false,
+          .springs_on_drives = false,
+          .tendons = false,
+          .lags = false,
+          .runge_kutta = false};
+}
+
+Result<std::vector<TargetFile>> WriteIsaacLab(const TargetInput& input, const IsaacLabNames& names) {
+  IsaacLabWriter writer(input, names);
+  GS_RETURN_IF_ERROR(writer.FindDrives());
+  return std::vector<TargetFile>{{"gapscope_isaaclab.py", writer.Text()}};
+}
+
+}  // namespace gapscope

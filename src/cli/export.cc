@@ -56,10 +56,12 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
     return Ok();
   }
   GS_ASSIGN(const auto recordings, LoadRecordings(model.experiment(), run->logs, pool));
-  ExportedFile file{.path = run->out, .host = {}, .delays_s = {}};
+  const bool mjcf = TargetOf(run->target).mjcf;
+  ExportedFile file{.path = mjcf ? run->out : "", .host = {}, .delays_s = {}};
   for (const auto& [drive, steps] : run->delay_steps) file.delays_s[drive] = steps * run->time_step_s;
   for (const NativeEffect& effect : run->effects) {
-    if (effect.fidelity == Fidelity::kHost) file.host.push_back(effect.use);
+    const bool beside = mjcf ? effect.fidelity == Fidelity::kHost : effect.fidelity != Fidelity::kDropped;
+    if (beside) file.host.push_back(effect.use);
   }
   GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
   return Ok();
@@ -112,11 +114,13 @@ Status WriteFiles(const ExportFlags& flags, const TargetInput& input, ExportRun*
   if (target.files) {
     GS_ASSIGN(files, target.files(input));
   }
-  GS_RETURN_IF_ERROR(WriteFile(run->out, xml));
+  if (target.mjcf) files.insert(files.begin(), {input.mjcf, xml});
   for (const TargetFile& file : files) {
     GS_RETURN_IF_ERROR(WriteFile(flags.Path(file.name), file.text));
     run->files.push_back(flags.Path(file.name));
   }
+  run->out = run->files.front();
+  run->files.erase(run->files.begin());
   return run->draws > 0 ? WriteRandomization(flags, *run) : Ok();
 }
 
@@ -134,8 +138,14 @@ Result<int> RunExport(const ExportFlags& flags) {
   NativeFeatures features = target.has;
   features.time_step_s = flags.time_step_s;
   const MakeExport make = [&](std::span<const double> values) {
+    if (target.make) return target.make(model, values);
     return target.plugins ? model.Export(values, nullptr, {}) : model.ExportNative(values, nullptr, features);
   };
+  if (flags.draws > 0 && !target.mjcf)
+    return Error{.what = target.what + " has no arrays to draw",
+                 .where = "--to " + target.name + " --draws",
+                 .allowed = "an engine that reads MJCF",
+                 .cure = "leave --draws out"};
   UncertainParameters uncertain;
   if (flags.draws > 0) {
     GS_ASSIGN(uncertain, UncertainOf(model, json, flags.source.path));
@@ -146,7 +156,6 @@ Result<int> RunExport(const ExportFlags& flags) {
                 .result = flags.source.path,
                 .target = flags.target,
                 .what = target.what,
-                .out = flags.Path("model.xml"),
                 .time_step_s = exported.spec->option.timestep,
                 .effects = exported.native,
                 .delay_steps = exported.delay_steps,
@@ -158,6 +167,7 @@ Result<int> RunExport(const ExportFlags& flags) {
   }
   GS_RETURN_IF_ERROR(WriteFiles(flags,
                                 {.model = model,
+                                 .values = loaded.values,
                                  .exported = exported,
                                  .randomization = run.draws > 0 ? &run.randomization : nullptr,
                                  .mjcf = "model.xml"},
@@ -183,7 +193,7 @@ Command ExportCommand() {
       {.flag = "--out",
        .value = &flags->common.out,
        .required = true,
-       .help = "Folder for model.xml and fidelity.json"},
+       .help = "Folder for model.xml, what the engine needs beside it, and fidelity.json"},
       {.flag = "--timestep",
        .value = &flags->time_step_s,
        .range = Above(0, 0),

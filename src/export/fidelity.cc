@@ -41,7 +41,10 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
                                        const std::vector<Recording>& logs, ThreadPool& pool) {
   FidelityErrors errors;
   GS_ASSIGN(const auto nominal, Model::Build(model.rig()));
-  GS_ASSIGN(std::shared_ptr<const Rig> rig, Rig::Load(Bare(model.experiment(), file.path)));
+  std::shared_ptr<const Rig> rig = model.rig();
+  if (!file.path.empty()) {
+    GS_ASSIGN(rig, Rig::Load(Bare(model.experiment(), file.path)));
+  }
   std::vector<EffectUse> beside = file.host;
   std::map<std::string, double> late;
   for (const auto& [drive, delay_s] : file.delays_s) {

@@ -23,7 +23,7 @@ struct FidelityErrors {
 
 // An exported file, and what is done beside it: effects by the host, late commands by the engine's configuration.
 struct ExportedFile {
-  std::string path;
+  std::string path;  // empty: the rig's own model, with the effects of `host`
   std::vector<EffectUse> host;
   std::map<std::string, double> delays_s;  // by drive
 };

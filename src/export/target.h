@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_EXPORT_TARGET_H_
 #define GAPSCOPE_EXPORT_TARGET_H_
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@ namespace gapscope {
 // What a target's own files are made of.
 struct TargetInput {
   const Model& model;
+  std::span<const double> values;  // of the model's parameters
   const ExportedModel& exported;
   const Randomization* randomization;  // null: none was asked for
   std::string mjcf;                    // the name of the written MJCF
@@ -28,6 +30,9 @@ struct ExportTarget {
   bool plugins = false;      // it runs our plugin library
   NativeFeatures has = {};   // where it does not
   bool mujoco_3_11 = false;  // it reads that version's MJCF
+  bool mjcf = true;          // it reads one at all; else `files` are all that is written
+  // The model with what the target has of it; null: Export's with plugins, ExportNative's without.
+  Result<ExportedModel> (*make)(const Model& model, std::span<const double> values) = nullptr;
   // Files beside the MJCF; null: none. Errors: the model has no form there.
   Result<std::vector<TargetFile>> (*files)(const TargetInput& input) = nullptr;
 };

@@ -1,6 +1,7 @@
 """Paths of the checkout; its own program and package."""
 
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -48,3 +49,13 @@ def interrupt_when(ready: Callable[[], bool]) -> None:
 def interrupt_after(seconds: float) -> None:
     then = time.monotonic() + seconds
     interrupt_when(lambda: time.monotonic() >= then)
+
+
+def changed_joint(folder: Path, old: str, new: str) -> str:
+    """The experiment file of a copy of the rig `joint` whose MJCF reads otherwise."""
+    shutil.copytree(ROOT / "models", folder / "models")
+    mjcf = folder / "models" / "joint" / "joint.xml"
+    text = mjcf.read_text()
+    assert old in text
+    mjcf.write_text(text.replace(old, new))
+    return str(folder / "models" / "joint" / "experiment.yaml")

@@ -5,7 +5,6 @@ e579469, 3.0 as of develop in 2026. Its own packages need Isaac Sim.
 """
 
 import runpy
-import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -13,7 +12,7 @@ from typing import Any
 
 import gapscope as gs
 import pytest
-from conftest import ROOT
+from conftest import ROOT, changed_joint
 
 OF_JOINT = {"joint_names_expr", "stiffness", "damping", "armature", "friction", "dynamic_friction", "viscous_friction"}
 LIMITS = {
@@ -104,10 +103,7 @@ def test_a_voltage_drive_and_a_joint_without_one(
 
 
 def test_a_spring_beside_a_drive_is_refused(joint: tuple[str, str], tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "models", tmp_path / "models")
-    mjcf = tmp_path / "models" / "joint" / "joint.xml"
-    mjcf.write_text(mjcf.read_text().replace('damping="0.5"', 'damping="0.5" stiffness="1"'))
-    result = gs.replay(tmp_path / "models" / "joint" / "experiment.yaml", joint[1])
+    result = gs.replay(changed_joint(tmp_path, 'damping="0.5"', 'damping="0.5" stiffness="1"'), joint[1])
     with pytest.raises(gs.InputError, match="spring"):
         result.export("isaaclab", tmp_path / "to")
     assert not (tmp_path / "to").exists()

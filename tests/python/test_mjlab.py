@@ -5,14 +5,13 @@ Torch, warp and the GPU are pretended (mjlab/pretend.py): mjlab's entities and c
 
 import json
 import math
-import shutil
 import subprocess
 from pathlib import Path
 
 import gapscope as gs
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, changed_joint
 from scipy.integrate import solve_ivp
 
 STEP_S = 2e-4
@@ -132,10 +131,8 @@ def test_a_draw_is_one_row_of_all_that_varies(demo: str, experiment: str, mjlab:
 
 
 def test_air_is_refused_before_anything_is_written(joint: tuple[str, str], tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "models", tmp_path / "models")
-    mjcf = tmp_path / "models" / "joint" / "joint.xml"
-    mjcf.write_text(mjcf.read_text().replace('timestep="0.002"', 'timestep="0.002" density="1.2"'))
-    result = gs.replay(tmp_path / "models" / "joint" / "experiment.yaml", joint[1])
+    changed = changed_joint(tmp_path, 'timestep="0.002"', 'timestep="0.002" density="1.2"')
+    result = gs.replay(changed, joint[1])
     with pytest.raises(gs.InputError, match="density"):
         result.export("mjlab", tmp_path / "to")
     assert not (tmp_path / "to").exists()

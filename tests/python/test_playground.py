@@ -26,7 +26,9 @@ class Model(SimpleNamespace):
 
 
 def nothing(model: Any) -> Any:
-    return Model(**{name: nothing(value) for name, value in vars(model).items()}) if hasattr(model, "__dict__") else None
+    if not isinstance(model, Model):
+        return None
+    return Model(**{name: nothing(value) for name, value in vars(model).items()})
 
 
 @pytest.fixture
@@ -47,7 +49,8 @@ def test_each_key_draws_a_row(experiment: str, demo: str, tmp_path: Path, jax: N
     assert [Path(path).name for path in lost.files] == ["gapscope_playground.py"]
     made = runpy.run_path(lost.files[0])
     drawn = np.load(tmp_path / "to" / "randomization.npz")
-    model = Model(opt=Model(gravity=np.zeros(3)), dof_damping=np.zeros(2), body_ipos=np.zeros((4, 3)), qpos0=np.zeros(2))
+    gravity = Model(gravity=np.zeros(3))
+    model = Model(opt=gravity, dof_damping=np.zeros(2), body_ipos=np.zeros((4, 3)), qpos0=np.zeros(2))
     batch, axes = made["domain_randomize"](model, [3, 14, 5])
     rows = [3, 4, 5]
     np.testing.assert_array_equal(batch.dof_damping, drawn["dof_damping"][rows])

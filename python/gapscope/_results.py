@@ -158,7 +158,8 @@ class ExportError(Open):
 class Exported(Open):
     """A model for another engine: ``model`` is the MJCF's path, ``files`` those that the engine has beside it.
 
-    ``unmeasured``: why there are no errors.
+    ``delay_steps``: by drive, delays of the engine's configuration, in its own steps. ``unmeasured``: why there are no
+    errors.
     """
 
     target: str
@@ -167,6 +168,7 @@ class Exported(Open):
     effects: tuple[ExportedEffect, ...]
     held_out_error: ExportError
     files: tuple[str, ...] = ()
+    delay_steps: Mapping[str, float] = field(default_factory=dict)
     unmeasured: str = ""
 
 
@@ -316,7 +318,10 @@ class FoundEffect(Open):
 
 @dataclass(frozen=True)
 class Statement(Open):
-    """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen"."""
+    """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen".
+
+    ``caveat``: what the logs' clocks leave open of a delay or a lag.
+    """
 
     name: str
     on: str
@@ -326,6 +331,7 @@ class Statement(Open):
     bound: Mapping[str, float] = field(default_factory=dict)
     share_of_gap: Interval = Interval()
     rule: str = ""
+    caveat: str = ""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ std::vector<LimbCost> CostsByLimb(const FitProblem& problem, const Residuals& re
     const FitWindow& window = problem.windows()[w];
     const auto& measured = problem.recordings()[window.log].measured;
     for (std::size_t s = 0; s < measured.size(); ++s) {
-      const Eigen::VectorXd own =
-          residuals[w].segment(static_cast<Eigen::Index>(s) * window.scored(), window.scored());
+      const Eigen::VectorXd own = residuals[w].segment(static_cast<Eigen::Index>(s) * window.scored(), window.scored());
       LimbCost& limb = limbs[coupling.LimbOf(measured[s].index)];
       limb.cost += 0.5 * problem.huber().Sum(own);
       if (limbs.size() > 1) limb.noise += 0.5 * static_cast<double>((own.array() != 0).count());
@@ -26,8 +25,7 @@ std::vector<LimbCost> CostsByLimb(const FitProblem& problem, const Residuals& re
 std::vector<LimbCost> ScaledTo(double cost, std::vector<LimbCost> limbs) {
   double all = 0;
   for (const LimbCost& limb : limbs) all += limb.cost;
-  for (LimbCost& limb : limbs)
-    limb.cost = all > 0 ? cost * limb.cost / all : cost / static_cast<double>(limbs.size());
+  for (LimbCost& limb : limbs) limb.cost = all > 0 ? cost * limb.cost / all : cost / static_cast<double>(limbs.size());
   return limbs;
 }
 

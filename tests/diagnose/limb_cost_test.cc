@@ -30,7 +30,8 @@ TEST(LimbCostTest, PartsAddUpToTheCost) {
 
 TEST(LimbCostTest, CartsApartCostTheirOwnSignalsSquares) {
   const Rig rig = LoadThreeCarts(false);
-  std::vector<Recording> logs = {MakeLog(rig, rig.model->Nominal(), [](double) { return 1.0; }, 1, kCartStep_s, 1e-3, 1)};
+  std::vector<Recording> logs = {
+      MakeLog(rig, rig.model->Nominal(), [](double) { return 1.0; }, 1, kCartStep_s, 1e-3, 1)};
   ThreadPool pool(1);
   FitProblem problem(*rig.model, logs, {.free = rig.model->FreeParameters(), .time_step_s = kCartStep_s},
                      rig.model->Nominal(), pool);

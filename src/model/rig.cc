@@ -17,6 +17,16 @@ namespace {
 // into the user's folder.
 void DropMujocoWarning(const char*) {}
 
+// In the order in which they are computed. mj_copySpec puts those of bodies first: friction would no longer follow the
+// drive whose torque it holds.
+std::vector<std::string> PluginInstances(const mjSpec& spec) {
+  std::vector<std::string> names;
+  auto* all = const_cast<mjSpec*>(&spec);  // MuJoCo's look-ups take no const
+  for (mjsElement* e = mjs_firstElement(all, mjOBJ_PLUGIN); e; e = mjs_nextElement(all, e))
+    names.emplace_back(mjs_getString(mjs_getName(e)));
+  return names;
+}
+
 }  // namespace
 
 std::string OneLine(std::string text) {
@@ -28,12 +38,13 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
   mju_user_error = ThrowMujocoError;
   mju_user_warning = DropMujocoWarning;
   std::shared_ptr<Rig> rig(new Rig);
-  rig->experiment_ = experiment;
+  rig->experiment_ = rig->as_given_ = experiment;
   char message[1024] = "";
   const SpecPtr read(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
   if (!read) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
   GS_RETURN_IF_ERROR(AddToSpec(&rig->experiment_, read.get()));
   rig->spec_.reset(mj_copySpec(read.get()));
+  rig->copies_ = PluginInstances(*rig->spec_) == PluginInstances(*read);
   try {
     // What was read is compiled, not a copy: copying leaves out what refers to nothing, which is an error here.
     rig->compiled_.reset(mj_compile(read.get(), nullptr));
@@ -57,7 +68,16 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
 
 SpecPtr Rig::CopySpec() const {
   const std::lock_guard lock(copying_);
-  return SpecPtr(mj_copySpec(spec_.get()));
+  SpecPtr again = copies_ ? nullptr : ReadAgain();
+  return again ? std::move(again) : SpecPtr(mj_copySpec(spec_.get()));
+}
+
+// Null: the file has changed since.
+SpecPtr Rig::ReadAgain() const {
+  char message[1024] = "";
+  SpecPtr spec(mj_parseXML(as_given_.model_path.c_str(), nullptr, message, sizeof message));
+  Experiment experiment = as_given_;
+  return spec && AddToSpec(&experiment, spec.get()).ok() ? std::move(spec) : nullptr;
 }
 
 std::vector<std::string> Rig::Joints() const {

@@ -55,10 +55,14 @@ class Rig {
  private:
   Rig() = default;
 
+  SpecPtr ReadAgain() const;
+
   Experiment experiment_;
   std::vector<Effect> effects_;
   std::vector<LeftOutCandidate> left_out_;
   SpecPtr spec_;
+  Experiment as_given_;         // before anything was added to it
+  bool copies_ = true;          // a copy of the spec is what was read
   mutable std::mutex copying_;  // MuJoCo does not say that one spec may be copied twice at a time
   ModelPtr compiled_;
 };

@@ -6,6 +6,7 @@
 #include "src/core/file.h"
 #include "src/export/target.h"
 #include "tests/model/synthetic.h"
+#include "tests/models/rig_facts.h"
 
 namespace gapscope::testing {
 namespace {
@@ -24,10 +25,16 @@ std::ostream& operator<<(std::ostream& out, const Case& c) {
 }
 
 // A log of two seconds of the model's own motion.
-Recording OwnLog(const Model& model, const std::map<std::string, double>& set) {
+Recording OwnLog(const Model& model, const std::map<std::string, double>& set,
+                 const std::map<std::string, double>& log_values = {}) {
   const bool volts = model.rig()->KindOfCommand("motor") == CommandKind::kVoltage;
-  Recording log = MakeRecording(model.experiment(), 1001, 0.002,
-                                [&](int c, double t) { return c == 0 ? Exciting(t, volts ? 4 : 0.6) : 0; });
+  const auto command = [&](int c, double t) {
+    const std::string& actuator = model.experiment().commands[static_cast<std::size_t>(c)].actuator;
+    if (actuator == "motor.supply") return 7.4;
+    if (actuator == "motor.enable") return 1.0;
+    return c == 0 ? Exciting(t, volts ? 4 : 0.6) : 0;
+  };
+  Recording log = MakeRecording(model.experiment(), 1001, 0.002, command, log_values);
   log.log_path = "own.csv";
   log.timeline.median_step_s = 0.002;
   const auto predicted = Predict(model, log, set);
@@ -76,6 +83,28 @@ TEST_P(NativeFormTest, MovesAsItsFidelitySays) {
 constexpr Fidelity kExact = Fidelity::kExact, kNearly = Fidelity::kApproximated, kHost = Fidelity::kHost,
                    kDropped = Fidelity::kDropped;
 constexpr char kMjx[] = "mjx", kMjlab[] = "mjlab", kIsaacLab[] = "isaaclab";
+
+// A drive's plugin of the MJCF's own comes before that of a joint's friction, in the file and where it is read back.
+TEST(FidelityTest, AFileWithADriveAndItsLoadFrictionMovesAsTheModel) {
+  const Scratch scratch;
+  const Experiment experiment = ShippedExperiment("xl330");
+  const auto log_values = FactsOfRig("xl330").log_values;
+  const auto base = MakeModel(experiment);
+  const auto uses = ParseEffects({"load_friction@joint"}, *base->rig());
+  const auto model = MakeModel(experiment, uses.value(), EstimateScales(*base, {OwnLog(*base, {}, log_values)}));
+  const std::map<std::string, double> set = {{"load_friction@joint.coefficient", 0.4}};
+  const std::vector<double> values = ValuesWith(*model, set);
+  const auto exported = model->Export(values, nullptr, {});
+  ASSERT_TRUE(exported.ok()) << exported.error().Text();
+  const ExportedFile file{.path = scratch.Path("model.xml"), .host = {}, .delays_s = {}};
+  const auto xml = SpecToXml(*exported.value().spec, "model.xml");
+  ASSERT_TRUE(xml.ok() && WriteFile(file.path, xml.value()).ok());
+  ThreadPool pool(1);
+  const auto errors = MeasureFidelity(*model, values, file, {OwnLog(*model, set, log_values)}, pool);
+  ASSERT_TRUE(errors.ok()) << errors.error().Text();
+  EXPECT_GT(errors.value().nominal, 0.02);
+  EXPECT_LT(errors.value().exported, errors.value().model + 1e-4);
+}
 
 INSTANTIATE_TEST_SUITE_P(
     Effects, NativeFormTest,

@@ -11,6 +11,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
+#include "src/core/statistics.h"
 #include "src/experiment/expression.h"
 #include "src/export/target.h"
 #include "src/model/element_names.h"

@@ -6,6 +6,7 @@
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include "src/export/python_text.h"
@@ -82,6 +83,8 @@ class MjlabWriter {
   std::string Lags(const Drive& drive) const;
   std::string Robot() const;
   std::string Ranges() const;
+  std::string Drawn(std::set<std::string>* fields) const;
+  std::string DrawnLags() const;
   std::string Draws() const;
   const std::vector<ParameterRange>& ranges() const { return input_.randomization->ranges; }
   int DelayRow(const std::string& drive) const;
@@ -247,8 +250,8 @@ std::string MjlabWriter::Ranges() const {
       terms);
 }
 
-// The joint draws, written number by number, and the lags.
-std::string MjlabWriter::Draws() const {
+// What varies, number by number.
+std::string MjlabWriter::Drawn(std::set<std::string>* fields) const {
   std::map<std::string, std::set<std::string>> numbers;  // by field
   std::set<std::string> stay;
   for (const ParameterRange& range : ranges()) {
@@ -267,15 +270,18 @@ std::string MjlabWriter::Draws() const {
                                                matrix ? fmt::format("{},", number.column) : ""));
     }
   }
-  std::string fields =
+  std::string text =
       "# Field of mjModel: kind and name of what varies, its row in randomization.npz, its column.\nDRAWN = {\n";
-  std::vector<std::string> names;
   for (const auto& [field, entries] : numbers) {
-    names.push_back(PyText(field));
-    fields += fmt::format("  {}: (\n    {},\n  ),\n", PyText(field), fmt::join(entries, ",\n    "));
+    fields->insert(PyText(field));
+    text += fmt::format("  {}: (\n    {},\n  ),\n", PyText(field), fmt::join(entries, ",\n    "));
   }
-  fields += "}\n";
-  if (!stay.empty()) fields += fmt::format("# No environment has its own {}: as it is.\n", fmt::join(stay, ", "));
+  text += "}\n";
+  if (!stay.empty()) text += fmt::format("# No environment has its own {}: as it is.\n", fmt::join(stay, ", "));
+  return text;
+}
+
+std::string MjlabWriter::DrawnLags() const {
   std::string lags;
   for (std::size_t d = 0; d < drives_.size(); ++d) {
     if (const int row = DelayRow(drives_[d].name); row >= 0)
@@ -284,9 +290,16 @@ std::string MjlabWriter::Draws() const {
           "env_ids)\n",
           d, kDelaySteps, row);
   }
+  return lags;
+}
+
+// The joint draws and the lags.
+std::string MjlabWriter::Draws() const {
   const bool late = std::ranges::any_of(input_.randomization->fields,
                                         [](const DrawnField& field) { return field.name == kDelaySteps; });
-  return fields + fmt::format(R"(
+  std::set<std::string> fields;
+  const std::string drawn = Drawn(&fields);
+  return drawn + fmt::format(R"(
 
 def _index(asset, kind, name):
   at = asset.indexing
@@ -319,8 +332,8 @@ def draws(entity="robot"):
   """The event that draws all parameters at once, from what the logs leave open."""
   return {{"gapscope": EventTermCfg(mode="{}", func=draw, params={{"entity": entity}})}}
 )",
-                              names.empty() ? "" : fmt::format("{}, ", fmt::join(names, ", ")), late ? lags : "",
-                              late ? "reset" : "startup");
+                             fields.empty() ? "" : fmt::format("{}, ", fmt::join(fields, ", ")),
+                             late ? DrawnLags() : "", late ? "reset" : "startup");
 }
 
 std::string MjlabWriter::Text() const {

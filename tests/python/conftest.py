@@ -35,6 +35,13 @@ def demo() -> str:
     return str(ROOT / "demo" / "qube.csv")
 
 
+def shell_program(path: Path, body: str) -> str:
+    """A program that stands in for gapscope's."""
+    path.write_text(f"#!/bin/sh\n{body}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
 def interrupt_when(ready: Callable[[], bool]) -> None:
     """Ctrl-C in a notebook: SIGINT for this process, from a thread of its own."""
 

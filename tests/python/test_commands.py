@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from gapscope._json import from_json
 
-from conftest import interrupt_after
+from conftest import interrupt_after, shell_program
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {
@@ -110,10 +110,7 @@ def test_errors_are_fields(experiment: str, demo: str, tmp_path: Path) -> None:
 def test_a_crash_of_the_program_is_a_bug_not_the_end(
     experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    broken = tmp_path / "broken"
-    broken.write_text("#!/bin/sh\necho it fell >&2\nkill -SEGV $$\n")
-    broken.chmod(0o755)
-    monkeypatch.setenv("GAPSCOPE_PROGRAM", str(broken))
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "broken", "echo it fell >&2\nkill -SEGV $$"))
     with pytest.raises(gs.Bug, match="it fell") as raised:
         gs.replay(experiment, demo)
     assert "replay" in raised.value.command

@@ -15,7 +15,7 @@ import gapscope as gs
 import numpy as np
 import pytest
 
-from conftest import interrupt_when
+from conftest import interrupt_when, shell_program
 
 QUICK: dict[str, Any] = {"effort": "quick", "options": {"no-next-experiment": True}}
 STILL = [0, 0, 0]
@@ -110,10 +110,7 @@ def test_ctrl_c_keeps_what_is_done_and_what_was_found(
 def test_a_worker_that_dies_is_an_error_of_its_group(
     experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    killer = tmp_path / "killer"
-    killer.write_text("#!/bin/sh\nkill -9 $PPID\n")
-    killer.chmod(0o755)
-    monkeypatch.setenv("GAPSCOPE_PROGRAM", str(killer))
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "killer", "kill -9 $PPID"))
     with _processes(1) as pool:
         (error,) = gs.diagnose_many(experiment, {"a": demo}, pool).values()
     assert "process" in str(error) and not isinstance(error, gs.Diagnosis)

@@ -48,7 +48,7 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
 // Columns of torques alone, their products apart by two folds of each log (GramSystem::parts): two seconds in turn.
 inline constexpr std::size_t kFolds = 2;
 ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques);
-// Likewise apart by limbs (Coupling::limbs); of one limb there are no parts.
+// Likewise apart by limbs (Coupling::LimbOf); of one limb there are no parts.
 ColumnTable MakeByLimb(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques);
 // ColumnTable::reduced of a part's products.
 Eigen::MatrixXd Reduce(const ColumnTable& table, const Eigen::MatrixXd& products);

@@ -1,4 +1,4 @@
-// Costs of a mechanism of several limbs, which no joint connects (Coupling::limbs).
+// Costs of a mechanism of several limbs, which no joint connects (Coupling::LimbOf).
 //
 // What is wrong with one limb must not count for less because the robot has others: each limb's squares have a variance
 // of their own, so that the likelihood at its best variances is sum of n/2 ln(cost) over limbs. Of one limb that is the

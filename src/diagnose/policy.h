@@ -17,7 +17,7 @@ struct SearchPolicy {
   std::size_t scan = 12, scanned = 6;               // an effect of more trials is tried on a leader at its best few
   std::size_t leaders = 2, additions = 3;           // sets that are added to, and effects tried on each
   std::size_t alone = 2;                            // effects that gain much alone, tried beside each
-  std::size_t most_effects = 6;
+  std::size_t most_effects = 6;                     // of a limb
   double promise = 0.1;    // least gain by arithmetic for which a set of several effects is refitted
   double member = 0.03;    // least gain of each effect of the final set
   std::size_t rivals = 3;  // tried in each member's place

@@ -38,7 +38,7 @@ class Coupling {
   // Limbs, numbered from 0: no joint moves signals of two of them. Where nothing is known there is one.
   std::size_t limb_count() const;
   std::size_t LimbOf(std::size_t signal) const { return limbs_.empty() ? 0 : limbs_[signal]; }
-  // By limb, whether a place or what these signals are of moves it.
+  // By limb, whether any of these signals is of it.
   std::vector<char> LimbsOf(const MovedSignals& moved) const;
 
  private:

@@ -33,8 +33,8 @@ class WindowColumns {
   // Robust weights, then the state out of all columns.
   void Finish(const Huber& huber) {
     const Eigen::Index m = states_.cols(), rows = columns_.rows() - m;
-    Eigen::VectorXd residual = columns_.col(columns_.cols() - 1).head(rows);
     if (!huber.plain()) {
+      Eigen::VectorXd residual = columns_.col(columns_.cols() - 1).head(rows);
       Eigen::MatrixXd all(rows, columns_.cols() + m);
       all << columns_.topRows(rows), states_.topRows(rows);
       huber.Weigh(residual, all);
@@ -48,7 +48,6 @@ class WindowColumns {
     columns_.applyOnTheLeft(qr.householderQ());
   }
   const Eigen::MatrixXd& columns() const { return columns_; }
-  Eigen::Index priors() const { return states_.cols(); }
 
  private:
   Eigen::MatrixXd columns_, states_;
@@ -120,7 +119,7 @@ struct PartRows {
   double weight = 1;
 };
 
-Eigen::Index ResidualsOf(const FitProblem& problem, std::size_t w) {
+Eigen::Index ResidualRows(const FitProblem& problem, std::size_t w) {
   const FitWindow& window = problem.windows()[w];
   return window.scored() * static_cast<Eigen::Index>(problem.recordings()[window.log].measured.size());
 }
@@ -163,7 +162,7 @@ std::vector<std::vector<PartRows>> RowsOfParts(const FitProblem& problem, const 
       const auto& of = counts[window.log][SignalOfState(problem.layout().signals[window.log], state)];
       const double all = std::accumulate(of.begin(), of.end(), 0.0);
       for (std::size_t part = 0; part < parts.count; ++part) {
-        if (of[part] > 0) rows[part].push_back({w, ResidualsOf(problem, w) + state, 1, of[part] / all});
+        if (of[part] > 0) rows[part].push_back({w, ResidualRows(problem, w) + state, 1, of[part] / all});
       }
     }
   }
@@ -176,7 +175,7 @@ std::vector<WindowMask> Batches(const FitProblem& problem, Eigen::Index columns)
   std::vector<WindowMask> batches;
   Eigen::Index numbers = kNumbers;
   for (std::size_t w = 0; w < problem.windows().size(); ++w) {
-    const Eigen::Index own = ResidualsOf(problem, w) * columns;
+    const Eigen::Index own = ResidualRows(problem, w) * columns;
     if (numbers + own > kNumbers) {
       batches.emplace_back(problem.windows().size(), static_cast<char>(false));
       numbers = 0;

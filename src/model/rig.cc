@@ -34,15 +34,25 @@ std::string OneLine(std::string text) {
   return text;
 }
 
+namespace {
+
+// The MJCF with what the experiment adds to it.
+Result<SpecPtr> ReadSpec(Experiment* experiment) {
+  char message[1024] = "";
+  SpecPtr spec(mj_parseXML(experiment->model_path.c_str(), nullptr, message, sizeof message));
+  if (!spec) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment->model_path};
+  GS_RETURN_IF_ERROR(AddToSpec(experiment, spec.get()));
+  return spec;
+}
+
+}  // namespace
+
 Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
   mju_user_error = ThrowMujocoError;
   mju_user_warning = DropMujocoWarning;
   std::shared_ptr<Rig> rig(new Rig);
   rig->experiment_ = rig->as_given_ = experiment;
-  char message[1024] = "";
-  const SpecPtr read(mj_parseXML(experiment.model_path.c_str(), nullptr, message, sizeof message));
-  if (!read) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment.model_path};
-  GS_RETURN_IF_ERROR(AddToSpec(&rig->experiment_, read.get()));
+  GS_ASSIGN(const SpecPtr read, ReadSpec(&rig->experiment_));
   rig->spec_.reset(mj_copySpec(read.get()));
   rig->copies_ = PluginInstances(*rig->spec_) == PluginInstances(*read);
   try {
@@ -68,16 +78,11 @@ Result<std::shared_ptr<const Rig>> Rig::Load(const Experiment& experiment) {
 
 SpecPtr Rig::CopySpec() const {
   const std::lock_guard lock(copying_);
-  SpecPtr again = copies_ ? nullptr : ReadAgain();
-  return again ? std::move(again) : SpecPtr(mj_copySpec(spec_.get()));
-}
-
-// Null: the file has changed since.
-SpecPtr Rig::ReadAgain() const {
-  char message[1024] = "";
-  SpecPtr spec(mj_parseXML(as_given_.model_path.c_str(), nullptr, message, sizeof message));
-  Experiment experiment = as_given_;
-  return spec && AddToSpec(&experiment, spec.get()).ok() ? std::move(spec) : nullptr;
+  if (!copies_) {
+    Experiment experiment = as_given_;
+    if (auto again = ReadSpec(&experiment); again.ok()) return std::move(again).value();  // else the file has changed
+  }
+  return SpecPtr(mj_copySpec(spec_.get()));
 }
 
 std::vector<std::string> Rig::Joints() const {

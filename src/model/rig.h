@@ -55,8 +55,6 @@ class Rig {
  private:
   Rig() = default;
 
-  SpecPtr ReadAgain() const;
-
   Experiment experiment_;
   std::vector<Effect> effects_;
   std::vector<LeftOutCandidate> left_out_;

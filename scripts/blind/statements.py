@@ -96,12 +96,24 @@ def stands_clear(case, effect):
     return shows and not score.below_a_sample(case.label, effect) and effect.get("stands_clear", True)
 
 
+def at_told_peak(effect, statement):
+    """The effect's parameters; of a droop the loss at the peak torque that the statement is about."""
+    true = effect["parameters"]
+    of = (statement.get("with") or {}).get("values", {})
+    scale = f"scale@{statement['on']}."
+    peak = of.get(scale + "peak_n_m", of.get(scale + "torque_n_m"))
+    twin = effect.get("twin_parameters", {})
+    if "loss_at_peak" not in true or not peak or "peak_n_m" not in twin:
+        return true
+    return {**true, "loss_at_peak": true["loss_at_peak"] * (peak / twin["peak_n_m"]) ** twin["exponent"]}
+
+
 def sizes(judged):
     """(true value, found entry) of every parameter of what is told surely and is true."""
     for j in judged:
-        truth = {(e["name"], e["on"]): e["parameters"] for e in j.case.label["effects"]}
+        truth = {(e["name"], e["on"]): e for e in j.case.label["effects"]}
         for s in (s for f in j.sure for s in f.statements if (s["name"], s["on"]) in truth):
-            for key, value in truth[s["name"], s["on"]].items():
+            for key, value in at_told_peak(truth[s["name"], s["on"]], s).items():
                 entry = (s.get("parameters") or {}).get(key)
                 if value and entry and entry.get("value") is not None and not any(n in key for n in NO_SIZE):
                     yield value, entry

@@ -65,6 +65,16 @@ class Statements(unittest.TestCase):
         row = self.rows(case(label(FRICTION), low, high, none))["absent statements that are true"]
         self.assertEqual(self.share(row), (2, 3))
 
+    def test_a_droop_is_told_at_another_peak_than_the_twins(self):
+        truth = label(("torque_constant_droop", "motor", {"loss_at_peak": 0.6}, True))
+        truth["effects"][0]["twin_parameters"] = {"exponent": 2.0, "peak_n_m": 10.0}
+        told = statement("torque_constant_droop", "motor", 0.9, parameters={
+            "loss_at_peak": {"value": 0.14, "low": 0.12, "high": 0.16}}, **{
+                "with": {"values": {"scale@motor.torque_n_m": 5.0}}})
+        rows = self.rows(case(truth, told))
+        self.assertEqual(self.share(rows["95 % intervals that hold the truth (88 to 98)"]), (1, 1))
+        self.assertAlmostEqual(rows["effect parameter, median error"]["value"], abs(0.14 / 0.15 - 1))
+
     def test_a_verdict_without_statements_is_read(self):
         verdict = {"verdict": "ambiguous", "probability": 0.7, "ambiguous": [["command_delay", "actuator_lag"]],
                    "effects": [{"name": "actuator_lag", "on": "motor", "probability": 0.4, "parameters": {}}],

@@ -197,6 +197,14 @@ class _WithModel(Run):
         """Writes the result into the text of the experiment's own MJCF (docs/apply.md); what changed there."""
         return self._go_on("apply", out=out, experiment=experiment)
 
+    def mcap(self, out: str | os.PathLike[str]) -> tuple[Path, ...]:
+        """Measured and predicted joint states for PlotJuggler, Foxglove and Rerun: OUT/LOG.mcap of each log.
+
+        They are sensor_msgs/JointState on /real/joint_states and /sim/joint_states. Raises InputError: `rosbags` is not
+        installed, no signal is a joint's.
+        """
+        return tuple(Path(log["table"]) for log in self._go_on("convert", to="mcap", out=out)["logs"])
+
     @property
     def model(self) -> Model:
         stated = self.json["model"]

@@ -27,22 +27,6 @@ struct ExportFlags {
   std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
 
-// The logs that the result was judged by; of a replay all of its logs.
-std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json) {
-  std::vector<std::string> paths;
-  const auto add = [&](const nlohmann::ordered_json& logs) {
-    if (!logs.is_array()) return;
-    for (const auto& log : logs) {
-      if (log.is_string()) paths.push_back(log.get<std::string>());
-      if (log.is_object() && log.contains("log")) paths.push_back(log["log"].get<std::string>());
-    }
-  };
-  if (json.contains("logs") && json["logs"].is_object()) add(json["logs"].value("held_out", nlohmann::ordered_json()));
-  if (json.contains("held_out")) add(json["held_out"]);
-  if (paths.empty() && json.contains("logs")) add(json["logs"]);
-  return paths;
-}
-
 Status Measure(const Model& model, const std::vector<double>& values, ExportRun* run, ThreadPool& pool) {
   std::error_code failed;
   for (const std::string& log : run->logs) {

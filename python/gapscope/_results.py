@@ -267,6 +267,18 @@ class Parameter(Open):
 
 
 @dataclass(frozen=True)
+class LogFit(Open):
+    """The parameters that all logs together know, fitted to one log alone."""
+
+    log: str
+    termination: str
+    parameters: tuple[Parameter, ...]
+
+    def __getitem__(self, parameter: str) -> Parameter:
+        return _by_name(self.parameters, parameter)
+
+
+@dataclass(frozen=True)
 class TuneError(Open):
     """Normalised errors: before, on what was fitted, on what was not."""
 
@@ -285,7 +297,10 @@ class Flat(Open):
 
 @dataclass(frozen=True)
 class Tune(_WithTraces):
-    """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ..."""
+    """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ...
+
+    ``per_log``: after ``options={"each-log": True}`` the fits to each log alone, from which `export` draws.
+    """
 
     schema: str
     termination: str
@@ -298,6 +313,7 @@ class Tune(_WithTraces):
     evaluations: int = 0
     wall_s: float = math.nan
     flat: tuple[Flat, ...] = ()
+    per_log: tuple[LogFit, ...] = ()
 
     def __getitem__(self, parameter: str) -> Parameter:
         return _by_name(self.parameters, parameter)

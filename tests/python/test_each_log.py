@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 import subprocess
@@ -27,32 +28,37 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """A log of each of six joints that differ in damping alone."""
     folder = tmp_path_factory.mktemp("twins")
     for seed, (name, damping) in enumerate(TRUE.items()):
-        words = f"--rig joint --nominal --seed {seed} --excitation multisine --duration 2 --rate 200"
+        words = f"--rig joint --nominal --seed {seed} --excitation multisine --duration 1.5 --rate 200"
         command = [str(home() / "bin" / "gapscope_twin"), *words.split(), "--set", f"{DAMPING}={damping}"]
         subprocess.run([*command, "--out", str(folder / name)], check=True, capture_output=True)
         shutil.move(folder / name / "log_0.csv", folder / f"{name}.csv")
     return {name: str(folder / f"{name}.csv") for name in TRUE}
 
 
-def tune(logs: dict[str, str], names: str, out: Path) -> gs.Tune:
+def tune(logs: dict[str, str], names: str, out: Path, budget_s: float | None = None) -> gs.Tune:
     return gs.tune(
         EXPERIMENT,
         [logs[name] for name in names],
         hold_out=logs["held"],
         freeze=["motor.kp", "motor.kd", "joint.inertia"],
         starts=1,
+        budget_s=budget_s,
         out=out,
         options={"each-log": True},
     )
 
 
 def randomization(result: gs.Tune, out: Path) -> tuple[dict[str, Any], Any]:
-    result.export("mujoco_native", out, draws=500)
+    result.export("mujoco_native", out, draws=200)
     return json.loads((out / "randomization.json").read_text()), np.load(out / "randomization.npz")
 
 
-def test_each_log_has_its_own_value(logs: dict[str, str], tmp_path: Path) -> None:
-    fitted = tune(logs, "abcde", tmp_path / "fit")
+@pytest.fixture(scope="module")
+def fitted(logs: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> gs.Tune:
+    return tune(logs, "abcde", tmp_path_factory.mktemp("fit"))
+
+
+def test_each_log_has_its_own_value(fitted: gs.Tune, tmp_path: Path) -> None:
     assert [Path(fit.log).stem for fit in fitted.per_log] == list("abcde")
     for fit in fitted.per_log:
         assert fit[DAMPING].identifiable and fit[DAMPING].value == pytest.approx(TRUE[Path(fit.log).stem], rel=0.03)
@@ -71,13 +77,20 @@ def test_each_log_has_its_own_value(logs: dict[str, str], tmp_path: Path) -> Non
     assert np.array_equal(drawn["dof_damping"][:, 0], drawn["parameters"][:, 0])
 
 
-def test_few_logs_say_what_the_fit_leaves_open(logs: dict[str, str], tmp_path: Path) -> None:
-    fitted = tune(logs, "abc", tmp_path / "fit")
-    assert len(fitted.per_log) == 3
-    told, _ = randomization(fitted, tmp_path / "to")
+def test_few_logs_say_what_the_fit_leaves_open(fitted: gs.Tune, tmp_path: Path) -> None:
+    three = fitted.json
+    three["per_log"] = three["per_log"][:3]
+    (tmp_path / "result.json").write_text(json.dumps(three))
+    told, _ = randomization(dataclasses.replace(fitted, out=tmp_path), tmp_path / "to")
     assert (told["from"], told["fitted_alone"]) == ("covariance", 0)
     (of_damping,) = told["parameters"]
     assert of_damping["value"] == fitted[DAMPING].value
+    assert of_damping["low"] == pytest.approx(fitted[DAMPING].low, rel=0.2)
+
+
+def test_no_fit_that_was_cut_short_is_told(logs: dict[str, str], tmp_path: Path) -> None:
+    fitted = tune(logs, "abcd", tmp_path / "fit", budget_s=0.001)
+    assert fitted.per_log == () and any("time was up" in message for message in fitted.messages)
 
 
 def test_one_log_differs_from_none(logs: dict[str, str], tmp_path: Path) -> None:

@@ -71,14 +71,6 @@ def ask(*words: str) -> dict[str, Any]:
     return answer
 
 
-@pytest.fixture
-def short(demo: str, tmp_path: Path) -> str:
-    """The first 300 rows of the demo's log, of which a diagnosis takes seconds."""
-    path = tmp_path / "short.csv"
-    path.write_text("".join(Path(demo).read_text().splitlines(keepends=True)[:301]))
-    return str(path)
-
-
 @pytest.mark.parametrize("name", FILES)
 def test_a_schema_is_one(name: str) -> None:
     schema = read(name)

@@ -24,10 +24,10 @@ def attributes(path: Path) -> dict[str, dict[str, float]]:
     return {element.tag: {key: float(value) for key, value in element.attrib.items()} for element in joint}
 
 
-@pytest.fixture
-def servo(tmp_path: Path) -> gs.Replay:
-    log = tmp_path / "log.csv"
-    rows = [f"{0.002 * k:.3f},{0.3 * (k % 500 > 250)},{0.1 * (k % 500 > 260)}" for k in range(1000)]
+@pytest.fixture(scope="module")
+def servo(tmp_path_factory: pytest.TempPathFactory) -> gs.Replay:
+    log = tmp_path_factory.mktemp("servo") / "log.csv"
+    rows = [f"{0.002 * k:.3f},{0.3 * (k > 250)},{0.1 * (k > 260)}" for k in range(500)]
     log.write_text("\n".join(["time_s,target_rad,position_rad", *rows]) + "\n")
     values = {
         "coulomb_friction@joint.friction_n_m": 3.0,
@@ -64,14 +64,14 @@ def test_mujoco_reads_the_joint(servo: gs.Replay, tmp_path: Path) -> None:
     assert model.jnt_actfrcrange[0].tolist() == [-40, 40]
 
 
-def test_a_voltage_drive_and_a_joint_without_one(experiment: str, demo: str, tmp_path: Path) -> None:
+def test_a_voltage_drive_and_a_joint_without_one(experiment: str, short: str, tmp_path: Path) -> None:
     """Stall torque and no-load speed at 24 V: kt U / R and U / km (models/qube/README.md)."""
     shutil.copytree(ROOT / "models", tmp_path / "models")
     mjcf = tmp_path / "models" / "qube" / "qube.xml"
     text = mjcf.read_text()
     mjcf.write_text(text.replace('name="motor" joint="arm"', 'name="motor" joint="arm" ctrlrange="-24 24"'))
     for bound, limited in ((experiment, False), (str(mjcf.with_name("experiment.yaml")), True)):
-        result = gs.replay(bound, demo)
+        result = gs.replay(bound, short)
         result.export("urdf", tmp_path / "to")
         arm = attributes(tmp_path / "to" / "joint_arm.urdf")
         assert arm["dynamics"] == {"damping": 1.5e-4}

@@ -11,16 +11,21 @@ import gapscope as gs
 import numpy as np
 import pytest
 from gapscope._program import program
-from gapscope.formats import read_table
+from gapscope.formats import Table, _joint_states, read_table
 
 from conftest import ROOT
 from test_formats import converter
 
 
-@pytest.fixture
-def joint_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> gs.Replay:
-    """Of a log with position, velocity and torque, some of which are missing."""
+@pytest.fixture(autouse=True)
+def own_converter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GAPSCOPE_CONVERT", converter(tmp_path)["GAPSCOPE_CONVERT"])
+
+
+@pytest.fixture(scope="module")
+def joint_result(tmp_path_factory: pytest.TempPathFactory) -> gs.Replay:
+    """Of a log with position, velocity and torque, some of which are missing."""
+    folder = tmp_path_factory.mktemp("joint")
     time_s = 0.005 * np.arange(400)
     columns = {
         "time_s": time_s,
@@ -33,7 +38,7 @@ def joint_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> gs.Replay:
         columns[name][100:110] = np.nan
     text = (ROOT / "models" / "joint" / "experiment.yaml").read_text()
     text = text.replace("model: ", f"model: {ROOT / 'models' / 'joint'}/")
-    bound = tmp_path / "experiment.yaml"
+    bound = folder / "experiment.yaml"
     bound.write_text(text.replace("log:", "log:\n  repair: {missing: keep}"))
     return gs.replay(bound, gs.Log(columns, name="run.1"))
 
@@ -73,14 +78,21 @@ def test_other_readers_see_joint_states(joint_result: gs.Replay, tmp_path: Path)
     assert "/real/joint_states/joint/position" in said and "/sim/joint_states/joint/velocity" in said
 
 
-def test_a_joint_without_a_velocity_has_none(
-    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_joint_without_a_velocity_has_none(experiment: str, short: str, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
-    monkeypatch.setenv("GAPSCOPE_CONVERT", converter(tmp_path)["GAPSCOPE_CONVERT"])
-    (path,) = gs.replay(experiment, demo).mcap(tmp_path / "views")
+    (path,) = gs.replay(experiment, short).mcap(tmp_path / "views")
     names = {f"/{side}/joint_states/{joint}/position" for side in ("real", "sim") for joint in ("arm", "pendulum")}
     assert set(read_table(path).columns) == {"time_s", *names}
+
+
+def test_a_joint_may_be_called_by_a_path(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    columns = {f"/real/joint_states/{joint}/effort": np.array([1.0, np.nan, 3.0]) for joint in ("robot/arm", "hand")}
+    table = Table({"__time": np.array([0.5, 0.6, 0.7]), "voltage": np.ones(3), **columns}, "__time")
+    _joint_states.write(table, tmp_path / "run.mcap")
+    read = read_table(tmp_path / "run.mcap")
+    assert set(read.columns) == {"time_s", *columns} and read.clock["/real/joint_states/hand/effort"] == "header"
+    assert all(read.columns[name].tolist() == [1.0, 3.0] for name in columns), "a row without a value is no message"
 
 
 def test_without_rosbags_nothing_is_written(joint_result: gs.Replay, tmp_path: Path) -> None:

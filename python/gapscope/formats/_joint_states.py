@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,12 +15,13 @@ from gapscope._errors import InputError
 from gapscope.formats._table import Floats, Table, library
 
 _KINDS = ("position", "velocity", "effort")
+_COLUMN = re.compile(r"(/.*?joint_states)/(.+)/(position|velocity|effort)")  # a joint's name may hold slashes
 _STATE = "sensor_msgs/msg/JointState"
-_RATHER = "NAME/JOINT/position, velocity or effort"
+_RATHER = "/WHOSE/joint_states/JOINT/position, velocity or effort"
 
 
 def write(table: Table, path: Path) -> None:
-    """Writes columns /TOPIC/JOINT/position, velocity and effort, whole or not at all.
+    """Writes columns /WHOSE/joint_states/JOINT/position, velocity and effort, whole or not at all.
 
     Rows without a value of a topic are no message of it. Raises InputError: `rosbags` is not installed, no such column,
     a row without a time or before zero.
@@ -50,9 +52,8 @@ def _topics(table: Table, path: Path) -> dict[str, dict[str, dict[str, Floats]]]
     """The columns of each topic, joint and kind."""
     topics: dict[str, dict[str, dict[str, Floats]]] = {}
     for name, values in table.columns.items():
-        topic, *rest = name.rsplit("/", 2)
-        if len(rest) == 2 and topic.startswith("/") and rest[1] in _KINDS:
-            topics.setdefault(topic, {}).setdefault(rest[0], {})[rest[1]] = values
+        if found := _COLUMN.fullmatch(name):
+            topics.setdefault(found[1], {}).setdefault(found[2], {})[found[3]] = values
     if not topics:
         raise InputError("no column is a joint's state", str(path), ", ".join(table.columns), _RATHER)
     return topics

@@ -2,7 +2,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -71,10 +70,15 @@ Result<Log> AsJointStates(const Log& trace, const std::map<std::string, std::str
   return states;
 }
 
-// The traces that the command wrote.
-Result<std::vector<Log>> ReadTraces(const std::vector<fs::path>& files) {
+// The traces that the command wrote of these logs; of an earlier run there may be others beside them. None: it wrote
+// none.
+Result<std::vector<Log>> ReadTraces(const std::string& result, const std::vector<std::string>& logs) {
   std::vector<Log> traces;
-  for (const fs::path& file : files) {
+  std::error_code failed;
+  const fs::path folder = fs::is_directory(result, failed) ? fs::path(result) : fs::path(result).parent_path();
+  for (const std::string& name : CsvNames(logs)) {
+    const fs::path file = folder / "traces" / name;
+    if (!fs::exists(file, failed)) return std::vector<Log>();
     GS_ASSIGN(traces.emplace_back(), ReadLog(file.string(), {}));
   }
   return traces;
@@ -105,13 +109,11 @@ Result<std::vector<Log>> JointStatesOf(const std::string& path, ThreadPool& pool
   for (const MeasuredSpec& measured : result.model->experiment().measured) {
     if (const auto place = PlaceOf(measured, result.model->compiled())) places[measured.signal] = *place;
   }
-  std::vector<fs::path> files;
-  std::error_code failed;
-  const fs::path folder = fs::is_directory(path, failed) ? fs::path(path) : fs::path(path).parent_path();
-  for (const auto& entry : fs::directory_iterator(folder / "traces", failed)) files.push_back(entry.path());
-  std::ranges::sort(files);
-  GS_ASSIGN(const std::vector<Log> traces,
-            files.empty() ? MakeTraces(result, JudgedBy(json), pool) : ReadTraces(files));
+  const std::vector<std::string> logs = JudgedBy(json);
+  GS_ASSIGN(std::vector<Log> traces, ReadTraces(path, logs));
+  if (traces.empty()) {
+    GS_ASSIGN(traces, MakeTraces(result, logs, pool));
+  }
   std::vector<Log> states;
   for (const Log& trace : traces) {
     GS_ASSIGN(states.emplace_back(), AsJointStates(trace, places));

@@ -48,6 +48,7 @@ KINDS = {"position": "position_rad", "velocity": "velocity_rad_per_s", "effort":
 
 def test_joint_states_are_the_traces(joint_result: gs.Replay, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
+    (joint_result.out / "traces" / "of_an_earlier_run.csv").write_text("__time\n0\n")
     (path,) = joint_result.mcap(tmp_path / "views")
     assert path == tmp_path / "views" / "run.1.mcap" and list(path.parent.iterdir()) == [path]
     table, (traces,) = read_table(path), joint_result.traces

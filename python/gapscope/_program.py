@@ -90,6 +90,12 @@ def program() -> Path:
     return path
 
 
+def _environment() -> dict[str, str]:
+    """The program finds this package's converter even where the environment is not activated."""
+    converter = Path(sys.executable).with_name("gapscope-convert")
+    return {**({"GAPSCOPE_CONVERT": str(converter)} if converter.exists() else {}), **os.environ}
+
+
 def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> Finished:
     """Runs a command to its end. Ctrl-C goes to the child exactly once, and what it then still writes is kept.
 
@@ -108,6 +114,7 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
             encoding="utf-8",
             errors="replace",
             start_new_session=True,
+            env=_environment(),
         ) as child:
             listener = _Listener(child, progress)
             try:

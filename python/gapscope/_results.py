@@ -197,6 +197,14 @@ class _WithModel(Run):
         """Writes the result into the text of the experiment's own MJCF (docs/apply.md); what changed there."""
         return self._go_on("apply", out=out, experiment=experiment)
 
+    def mcap(self, out: str | os.PathLike[str]) -> tuple[Path, ...]:
+        """Measured and predicted joint states for PlotJuggler, Foxglove and Rerun: OUT/LOG.mcap of each log.
+
+        They are sensor_msgs/JointState on /real/joint_states and /sim/joint_states. Raises InputError: `rosbags` is not
+        installed, no signal is a joint's.
+        """
+        return tuple(Path(log["table"]) for log in self._go_on("convert", to="mcap", out=out)["logs"])
+
     @property
     def model(self) -> Model:
         stated = self.json["model"]
@@ -259,6 +267,18 @@ class Parameter(Open):
 
 
 @dataclass(frozen=True)
+class LogFit(Open):
+    """The parameters that all logs together know, fitted to one log alone."""
+
+    log: str
+    termination: str
+    parameters: tuple[Parameter, ...]
+
+    def __getitem__(self, parameter: str) -> Parameter:
+        return _by_name(self.parameters, parameter)
+
+
+@dataclass(frozen=True)
 class TuneError(Open):
     """Normalised errors: before, on what was fitted, on what was not."""
 
@@ -277,7 +297,10 @@ class Flat(Open):
 
 @dataclass(frozen=True)
 class Tune(_WithTraces):
-    """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ..."""
+    """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ...
+
+    ``per_log``: after ``options={"each-log": True}`` the fits to each log alone, from which `export` draws.
+    """
 
     schema: str
     termination: str
@@ -290,6 +313,7 @@ class Tune(_WithTraces):
     evaluations: int = 0
     wall_s: float = math.nan
     flat: tuple[Flat, ...] = ()
+    per_log: tuple[LogFit, ...] = ()
 
     def __getitem__(self, parameter: str) -> Parameter:
         return _by_name(self.parameters, parameter)

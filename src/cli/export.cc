@@ -6,6 +6,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
+#include "src/cli/uncertain.h"
 #include "src/core/collect.h"
 #include "src/core/file.h"
 #include "src/export/randomize.h"
@@ -26,22 +27,6 @@ struct ExportFlags {
 
   std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
-
-// The logs that the result was judged by; of a replay all of its logs.
-std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json) {
-  std::vector<std::string> paths;
-  const auto add = [&](const nlohmann::ordered_json& logs) {
-    if (!logs.is_array()) return;
-    for (const auto& log : logs) {
-      if (log.is_string()) paths.push_back(log.get<std::string>());
-      if (log.is_object() && log.contains("log")) paths.push_back(log["log"].get<std::string>());
-    }
-  };
-  if (json.contains("logs") && json["logs"].is_object()) add(json["logs"].value("held_out", nlohmann::ordered_json()));
-  if (json.contains("held_out")) add(json["held_out"]);
-  if (paths.empty() && json.contains("logs")) add(json["logs"]);
-  return paths;
-}
 
 Status Measure(const Model& model, const std::vector<double>& values, ExportRun* run, ThreadPool& pool) {
   std::error_code failed;
@@ -65,35 +50,6 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
   }
   GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
   return Ok();
-}
-
-// What a tune knows of its parameters, of this model. Errors: another result, or one of an earlier version.
-Result<UncertainParameters> UncertainOf(const Model& model, const nlohmann::ordered_json& json,
-                                        const std::string& where) {
-  constexpr char kCure[] = "run `gapscope tune` (--from DIR takes over what a diagnosis found), and export its result";
-  if (json.value("schema", "") != kTuneSchema)
-    return Error{.what = "only a result of tune says how its parameters vary together", .where = where, .cure = kCure};
-  GS_ASSIGN(const TuneRun run, ReadTuneRun(json, where));
-  if (run.spread.logarithmic.size() != run.parameters.size())
-    return Error{.what = "a result of an earlier version, without its covariance", .where = where, .cure = kCure};
-  std::vector<Eigen::Index> known;
-  UncertainParameters uncertain;
-  for (std::size_t i = 0; i < run.parameters.size(); ++i) {
-    const std::string& name = run.parameters[i].name;
-    if (!run.parameters[i].identifiable) continue;
-    known.push_back(static_cast<Eigen::Index>(i));
-    uncertain.parameters.push_back({.index = model.IndexOf(name),
-                                    .logarithmic = run.spread.logarithmic[i],
-                                    .together = std::ranges::any_of(run.correlated, [&](const auto& pair) {
-                                      return pair.a == name || pair.b == name;
-                                    })});
-  }
-  if (known.empty())
-    return Error{.what = "the logs know none of the parameters: there is nothing to draw",
-                 .where = where,
-                 .cure = "tune with more logs, or with --freeze NAME for what goes together"};
-  uncertain.covariance = run.spread.covariance(known, known);
-  return uncertain;
 }
 
 // randomization.json and .npz.
@@ -146,9 +102,9 @@ Result<int> RunExport(const ExportFlags& flags) {
                  .where = "--to " + target.name + " --draws",
                  .allowed = "an engine that reads MJCF",
                  .cure = "leave --draws out"};
-  UncertainParameters uncertain;
+  Uncertain uncertain;
   if (flags.draws > 0) {
-    GS_ASSIGN(uncertain, UncertainOf(model, json, flags.source.path));
+    GS_ASSIGN(uncertain, UncertainOf(model, loaded.values, json, flags.source.path));
   }
   GS_ASSIGN(const ExportedModel exported, make(loaded.values));
   if (target.plugins && flags.time_step_s > 0) exported.spec->option.timestep = flags.time_step_s;
@@ -163,7 +119,10 @@ Result<int> RunExport(const ExportFlags& flags) {
                 .logs = JudgedBy(json)};
   if (flags.draws > 0) {
     run.draws = static_cast<std::size_t>(flags.draws);
-    GS_ASSIGN(run.randomization, Randomize(model, loaded.values, uncertain, make, run.draws, flags.common.seed));
+    run.fitted_alone = uncertain.logs;
+    run.not_of_each = uncertain.not_of_each;
+    GS_ASSIGN(run.randomization,
+              Randomize(model, uncertain.values, uncertain.parameters, make, run.draws, flags.common.seed));
   }
   GS_RETURN_IF_ERROR(WriteFiles(flags,
                                 {.model = model,
@@ -204,7 +163,9 @@ Command ExportCommand() {
        .range = Between(0, 100000),
        .unset = "none",
        .help = "Of a tune: also randomization.json, the 95 % range of each parameter in numbers of the MJCF, and "
-               "randomization.npz, so many joint draws of all that vary"},
+               "randomization.npz, so many joint draws of all that vary",
+       .more = "After --each-log of four logs or more they are of how the logs differ, else of what the fit leaves "
+               "open"},
       WhileOption(flags->source.while_column),
       {.flag = "--experiment",
        .value = &flags->source.experiment,

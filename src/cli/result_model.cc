@@ -59,4 +59,19 @@ Result<ResultModel> LoadWholeResult(const nlohmann::ordered_json& json, const Re
   return BuildRunModel(std::move(rig), held, source.path, {});
 }
 
+std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json) {
+  std::vector<std::string> paths;
+  const auto add = [&](const nlohmann::ordered_json& logs) {
+    if (!logs.is_array()) return;
+    for (const auto& log : logs) {
+      if (log.is_string()) paths.push_back(log.get<std::string>());
+      if (log.is_object() && log.contains("log")) paths.push_back(log["log"].get<std::string>());
+    }
+  };
+  if (json.contains("logs") && json["logs"].is_object()) add(json["logs"].value("held_out", nlohmann::ordered_json()));
+  if (json.contains("held_out")) add(json["held_out"]);
+  if (paths.empty() && json.contains("logs")) add(json["logs"]);
+  return paths;
+}
+
 }  // namespace gapscope::cli

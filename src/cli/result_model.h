@@ -24,6 +24,9 @@ struct ResultSource {
 // Rig::Load and BuildRunModel.
 Result<ResultModel> LoadWholeResult(const nlohmann::ordered_json& json, const ResultSource& source);
 
+// The logs that a result was judged by; of a replay all of its logs.
+std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json);
+
 }  // namespace gapscope::cli
 
 #endif  // GAPSCOPE_CLI_RESULT_MODEL_H_

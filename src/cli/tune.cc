@@ -42,7 +42,7 @@ struct TuneFlags {
   Normalization normalization = Normalization::kDeviation;
   double window_s = 0, budget_s = 0, time_step_s = 0, huber = 4, tolerance = 1e-4;
   int starts = 2;
-  bool resume = false, actuator = false;
+  bool resume = false, actuator = false, each_log = false;
 };
 
 // The model that --actuator asks for.
@@ -137,6 +137,15 @@ Status WriteTune(const std::string& out, const Session& session, const DataSplit
   return WriteRun(out, ToJson(run), files);
 }
 
+std::vector<TuneRun::LogFit> FitAlone(const Session& session, const DataSplit& data, const TuneSummary& joint,
+                                      const TuneOptions& options) {
+  TuneOptions silent = options;
+  silent.solve.progress = {};
+  const LogFits fits = FitEachLog(*session.model, data.train, joint, silent, *session.pool);
+  for (const auto& warning : fits.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  return PerLogOf(fits, *session.model);
+}
+
 Result<int> RunTune(const TuneFlags& flags) {
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
   ModelFlags model = flags.model;
@@ -146,6 +155,12 @@ Result<int> RunTune(const TuneFlags& flags) {
   PrintFindings(session.recordings, flags.common.quiet);
   GS_ASSIGN(TuneOptions options, OptionsOf(flags, session));
   const DataSplit data = SplitData(std::move(session.recordings), logs.held_out);
+  if (flags.each_log && data.train.size() < 2)
+    return Error{.what = "how logs differ is not known of one log",
+                 .where = "--each-log",
+                 .actual = fmt::format("{} fitted", data.train.size()),
+                 .allowed = "two logs or more that are not held out",
+                 .cure = "give more logs, or leave --each-log out"};
   const auto tuned = [&] {
     ProgressLine line(flags.common);
     if (line.live()) ShowProgress(flags.budget_s, line, &options);
@@ -154,7 +169,8 @@ Result<int> RunTune(const TuneFlags& flags) {
   }();
   if (!tuned.ok()) return tuned.error();
   for (const auto& warning : tuned.value().warnings) fmt::print(stderr, "warning: {}\n", warning);
-  const TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
+  TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
+  if (flags.each_log) run.per_log = FitAlone(session, data, tuned.value(), options);
   if (!flags.common.out.empty())
     GS_RETURN_IF_ERROR(WriteTune(flags.common.out, session, data, options, tuned.value(), run));
   fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run, ConsoleOf(1)));
@@ -186,7 +202,12 @@ std::vector<Option> FreedomOptions(TuneFlags& flags) {
        .more = "All three are fitted unless fixed, and are never a finding"},
       {.flag = "--actuator",
        .value = &flags.actuator,
-       .help = "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none"}};
+       .help = "Fit an actuator model: adds delay, lag, torque-speed limit and friction where the model has none"},
+      {.flag = "--each-log",
+       .value = &flags.each_log,
+       .help = "Then fit each log alone too, from there: how the parameters differ from log to log",
+       .more = "Of the logs that are not held out. `export --draws` takes the differences of four logs or more for "
+               "domain randomisation"}};
 }
 
 // What is minimised, and by what.

@@ -22,6 +22,11 @@ struct JointDrive {
   std::optional<DelayRange> delay_steps;  // none: commands are not late
 };
 
+// A number's range over the number that the configuration has.
+struct ScaleRange {
+  double low = 0, high = 0;
+};
+
 class IsaacLabWriter {
  public:
   IsaacLabWriter(const TargetInput& input, const IsaacLabNames& names)
@@ -36,6 +41,8 @@ class IsaacLabWriter {
   Status SetGains(int actuator, JointDrive* drive) const;
   Status LimitBy(const mjtNum* range, JointDrive* drive) const;
   std::string Configuration(int joint, const JointDrive& drive) const;
+  std::optional<ScaleRange> ScaleOf(const char* field, int dof, double base) const;
+  std::string Event(int joint, const std::string& name) const;
 
   const TargetInput& input_;
   const IsaacLabNames& names_;
@@ -151,23 +158,71 @@ std::string IsaacLabWriter::Configuration(int joint, const JointDrive& drive) co
   return text + "  ),\n";
 }
 
+// Of a number that a parameter makes which may be drawn alone.
+std::optional<ScaleRange> IsaacLabWriter::ScaleOf(const char* field, int dof, double base) const {
+  if (!input_.randomization || base <= 0) return std::nullopt;
+  const std::vector<ParameterRange>& ranges = input_.randomization->ranges;
+  for (const ParameterRange& range : ranges) {
+    if (!MayBeDrawnAlone(range, ranges)) continue;
+    const VaryingNumber& number = range.numbers.front();
+    if (number.field == field && number.row == static_cast<std::size_t>(dof))
+      return ScaleRange{number.low / base, number.high / base};
+  }
+  return std::nullopt;
+}
+
+// What of a joint is drawn; empty: nothing.
+std::string IsaacLabWriter::Event(int joint, const std::string& name) const {
+  const int dof = compiled_.jnt_dofadr[joint];
+  const double dry_base = compiled_.dof_frictionloss[dof], viscous_base = compiled_.dof_damping[dof];
+  const auto dry = ScaleOf("dof_frictionloss", dof, dry_base), viscous = ScaleOf("dof_damping", dof, viscous_base);
+  std::optional<ScaleRange> friction = dry ? dry : viscous;
+  if (dry && viscous) {
+    const ScaleRange both{std::max(dry->low, viscous->low), std::min(dry->high, viscous->high)};
+    if (both.low < both.high) friction = both;
+  }
+  std::string text;
+  if (friction && dry_base > 0 && viscous_base > 0)
+    text += "      # For dry and for viscous friction: Isaac Lab draws both from one range.\n";
+  if (friction)
+    text += fmt::format("      \"friction_distribution_params\": ({}, {}),\n", PyNumber(friction->low),
+                        PyNumber(friction->high));
+  if (const auto armature = ScaleOf("dof_armature", dof, compiled_.dof_armature[dof]))
+    text += fmt::format("      \"armature_distribution_params\": ({}, {}),\n", PyNumber(armature->low),
+                        PyNumber(armature->high));
+  if (text.empty()) return "";
+  return fmt::format(
+      "  {}: EventTermCfg(\n    func=mdp.randomize_joint_parameters,\n    mode=\"startup\",\n    params={{\n"
+      "      \"asset_cfg\": SceneEntityCfg(\"robot\", joint_names=[{}]),\n{}"
+      "      \"operation\": \"scale\",\n      \"distribution\": \"uniform\",\n    }},\n  ),\n",
+      PyText(name), PyPattern(NameOf(compiled_, mjOBJ_JOINT, joint)), text);
+}
+
 std::string IsaacLabWriter::Text() const {
   const mjOption& option = input_.exported.spec->option;
   const bool late =
       std::ranges::any_of(drives_, [](const auto& drive) { return drive.second.delay_steps.has_value(); });
+  std::string events;
+  for (const auto& [joint, drive] : drives_) events += Event(joint, drive.name);
   std::string text = fmt::format(
       "\"\"\"Actuators for Isaac Lab {}, written by gapscope: friction in N m, "
       "so Isaac Sim 5 or later.\n\n"
-      "from gapscope_isaaclab import ACTUATORS, SIMULATION\n"
+      "from gapscope_isaaclab import ACTUATORS, {}SIMULATION\n"
       "ArticulationCfg(spawn=..., actuators=ACTUATORS), of a USD made of "
-      "{}.\n\"\"\"\n\n"
-      "from isaaclab.actuators import {}ImplicitActuatorCfg\nfrom isaaclab.sim "
-      "import SimulationCfg\n\n"
-      "SIMULATION = SimulationCfg(dt={}, gravity={})\n\nACTUATORS = {{\n",
-      names_.version, input_.mjcf, late ? "DelayedPDActuatorCfg, " : "", PyNumber(option.timestep),
-      PyNumbers(option.gravity));
+      "{}.\n{}\"\"\"\n\n"
+      "from isaaclab.actuators import {}ImplicitActuatorCfg\n",
+      names_.version, events.empty() ? "" : "EVENTS, ", input_.mjcf,
+      events.empty() ? "" : "The environment's events = EVENTS, where the articulation is the scene's \"robot\".\n",
+      late ? "DelayedPDActuatorCfg, " : "");
+  if (!events.empty())
+    text += "from isaaclab.envs import mdp\nfrom isaaclab.managers import EventTermCfg, SceneEntityCfg\n";
+  text += fmt::format("from isaaclab.sim import SimulationCfg\n\nSIMULATION = SimulationCfg(dt={}, gravity={})\n\n",
+                      PyNumber(option.timestep), PyNumbers(option.gravity));
+  text += "ACTUATORS = {\n";
   for (const auto& [joint, drive] : drives_) text += Configuration(joint, drive);
-  return text + "}\n";
+  text += "}\n";
+  if (!events.empty()) text += "\n# Each environment's own, times what ACTUATORS says.\nEVENTS = {\n" + events + "}\n";
+  return text;
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "src/core/dense.h"
+#include "src/core/statistics.h"
 #include "src/fit/covariance.h"
 
 namespace gapscope {
@@ -65,8 +66,14 @@ Status CheckSame(const std::vector<Array>& base, const std::vector<Array>& other
                .cure = "freeze the parameter that does it, or export to an engine that has its effect"};
 }
 
+// A result does not keep the rig's size, by which an effect's bounds are scaled: of those on torques zero alone is
+// known, and a bound that the value itself breaks is none.
 double Moved(const UncertainParameter& uncertain, const Parameter& p, double value, double by) {
-  return std::clamp(uncertain.logarithmic ? value * std::exp(by) : value + by, p.low, p.high);
+  const auto holds = [&](double bound) {
+    return p.owner != Parameter::Owner::kEffect || bound == 0 || !(p.of_torque || value < p.low || value > p.high);
+  };
+  return std::clamp(uncertain.logarithmic ? value * std::exp(by) : value + by, holds(p.low) ? p.low : -kInfinity,
+                    holds(p.high) ? p.high : kInfinity);
 }
 
 // A parameter's deviation; where it goes together with others, that with the others as they are.

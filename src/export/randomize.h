@@ -66,9 +66,10 @@ DelayRange RangeOfDelay(const Randomization& randomization, std::size_t drive, d
 // The MJCF with these values of all parameters.
 using MakeExport = std::function<Result<ExportedModel>(std::span<const double>)>;
 
-// `draws` of a normal distribution, kept within the parameters' bounds; the same seed gives the same ones. What follows
-// from other numbers (inverse weights, lengths) varies with them in `fields` and is not told in `ranges`. Errors: as
-// `make`; a draw whose MJCF has other elements.
+// `draws` of a normal distribution, kept within the parameters' bounds; of an effect's torques, whose bounds depend on
+// the rig's size, zero alone is one. The same seed gives the same draws. What follows from other numbers (inverse
+// weights, lengths) varies with them in `fields` and is not told in `ranges`. Errors: as `make`; a draw whose MJCF has
+// other elements.
 Result<Randomization> Randomize(const Model& model, std::span<const double> values,
                                 const UncertainParameters& uncertain, const MakeExport& make, std::size_t draws,
                                 std::uint64_t seed);

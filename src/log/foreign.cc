@@ -16,6 +16,7 @@
 
 #include "src/core/file.h"
 #include "src/log/npz_reader.h"
+#include "src/log/npz_writer.h"
 
 extern char** environ;
 
@@ -97,6 +98,41 @@ Error RefusedBy(const std::string& said, const std::string& path) {
           .cure = fields[4]};
 }
 
+// A run of the converter: its words, the user's file that it is about, and what is needed for it.
+struct Conversion {
+  std::vector<std::string> words;
+  std::string path, needed, install;
+};
+
+Status Convert(const Conversion& conversion, const std::string& said) {
+  std::vector<std::string> words = {Converter()};
+  words.insert(words.end(), conversion.words.begin(), conversion.words.end());
+  const int status = Run(words, said);
+  if (status == -ENOENT || status == -EACCES || status == 127) {
+    return Error{.what = conversion.needed,
+                 .where = conversion.path,
+                 .actual = "no program " + words[0],
+                 .cure = "pip install " + conversion.install};
+  }
+  if (status == kRefused) {
+    GS_ASSIGN(const std::string refusal, ReadFile(said));
+    return RefusedBy(refusal, conversion.path);
+  }
+  if (status < 0)
+    return Error{.what = "a file on which the library of its format crashes",
+                 .where = conversion.path,
+                 .actual = "the converter was killed",
+                 .cure = "record it again"};
+  if (status != 0)
+    return Error{
+        .what = "the converter failed", .where = conversion.path, .actual = fmt::format("{}: {}", words[0], status)};
+  return Ok();
+}
+
+Error NoRoom(const std::string& path) {
+  return {.what = "no room to convert the log", .where = path, .actual = std::strerror(errno), .cure = "$TMPDIR"};
+}
+
 }  // namespace
 
 const ForeignFormat* ForeignFormatOf(const std::string& path) {
@@ -120,35 +156,31 @@ const ForeignFormat* ForeignFormatOf(const std::string& path) {
 
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, const std::string& source) {
   const ScratchFolder scratch;
-  if (!scratch.made())
-    return Error{
-        .what = "no room to convert the log", .where = path, .actual = std::strerror(errno), .cure = "$TMPDIR"};
-  const std::string table = scratch.Path("table.npz"), said = scratch.Path("said"), converter = Converter();
-  std::vector<std::string> words = {converter, "--out", table};
-  if (!source.empty()) words.insert(words.end(), {"--options", source});
-  words.insert(words.end(), {"--", path});
-  const int status = Run(words, said);
-  if (status == -ENOENT || status == -EACCES || status == 127) {
-    return Error{.what = "the log is a " + format.name + ", which the Python package reads",
-                 .where = path,
-                 .actual = "no program " + converter,
-                 .cure = "pip install " + format.install};
-  }
-  if (status == kRefused) {
-    GS_ASSIGN(const std::string refusal, ReadFile(said));
-    return RefusedBy(refusal, path);
-  }
-  if (status < 0)
-    return Error{.what = "a file on which the library of its format crashes",
-                 .where = path,
-                 .actual = "the converter was killed",
-                 .cure = "record it again"};
-  if (status != 0)
-    return Error{.what = "the converter failed", .where = path, .actual = fmt::format("{}: {}", converter, status)};
+  if (!scratch.made()) return NoRoom(path);
+  const std::string table = scratch.Path("table.npz");
+  Conversion conversion{.words = {"--out", table},
+                        .path = path,
+                        .needed = "the log is a " + format.name + ", which the Python package reads",
+                        .install = format.install};
+  if (!source.empty()) conversion.words.insert(conversion.words.end(), {"--options", source});
+  conversion.words.insert(conversion.words.end(), {"--", path});
+  GS_RETURN_IF_ERROR(Convert(conversion, scratch.Path("said")));
   GS_ASSIGN(const std::string bytes, ReadFile(table));
   GS_ASSIGN(Log log, ReadNpz(path, bytes));
   log.format = format.name;
   return log;
+}
+
+Status WriteMcap(const std::string& path, const Log& log) {
+  const ScratchFolder scratch;
+  if (!scratch.made()) return NoRoom(path);
+  const std::string table = scratch.Path("table.npz");
+  GS_RETURN_IF_ERROR(WriteNpz(table, log));
+  return Convert({.words = {"--out", path, "--to", "mcap", "--", table},
+                  .path = path,
+                  .needed = "MCAP files are written by the Python package",
+                  .install = kRos.install},
+                 scratch.Path("said"));
 }
 
 }  // namespace gapscope

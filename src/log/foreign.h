@@ -1,4 +1,5 @@
-// Formats of other tools, which the Python package reads (docs/formats.md): its converter writes one NPZ table.
+// Formats of other tools, which the Python package reads and writes (docs/formats.md): its converter makes one NPZ
+// table of them, and an MCAP file of one.
 #ifndef GAPSCOPE_LOG_FOREIGN_H_
 #define GAPSCOPE_LOG_FOREIGN_H_
 
@@ -19,6 +20,11 @@ const ForeignFormat* ForeignFormatOf(const std::string& path);
 // there is none (says what to install); what the converter refuses, in its own words; it fails. `source` is handed on
 // as it stands: a JSON object with the keys of docs/formats.md, or nothing.
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, const std::string& source);
+
+// Columns /TOPIC/JOINT/position, velocity and effort as messages sensor_msgs/JointState in the MCAP file `path`, whole
+// or not at all: the columns that ReadForeign gives again. Rows without a value of a topic are no message of it.
+// Errors: as ReadForeign; a log without such columns; as WriteFile.
+Status WriteMcap(const std::string& path, const Log& log);
 
 }  // namespace gapscope
 

@@ -15,7 +15,10 @@ using nlohmann::ordered_json;
 namespace {
 
 std::string RangeLines(const ExportRun& run) {
-  std::string text = fmt::format("  {} draws of what the logs leave open, and 95 % ranges:\n", run.draws);
+  std::string text =
+      run.fitted_alone > 0
+          ? fmt::format("  {} draws of how {} logs differ, and 95 % ranges:\n", run.draws, run.fitted_alone)
+          : fmt::format("  {} draws of what the logs leave open, and 95 % ranges:\n", run.draws);
   for (const ParameterRange& range : run.randomization.ranges) {
     std::vector<std::string> fields;
     for (const VaryingNumber& number : range.numbers) {
@@ -25,6 +28,11 @@ std::string RangeLines(const ExportRun& run) {
                         range.conditional ? ", the others as they are" : "",
                         fields.empty() ? "no number of the MJCF, so the host's" : Join(fields));
   }
+  if (!run.not_of_each.empty())
+    text += "  as they are, for not each log alone knows them: " + Join(run.not_of_each) + "\n";
+  if (run.fitted_alone == 0)
+    text +=
+        "  of one fit, which is not how robots and days differ: for that `tune --each-log`, with four logs or more\n";
   return text;
 }
 
@@ -64,6 +72,9 @@ ordered_json RandomizationJson(const ExportRun& run) {
                        {"model", run.out},
                        {"draws", run.draws},
                        {"seed", run.info.seed},
+                       {"from", run.fitted_alone > 0 ? "logs" : "covariance"},
+                       {"fitted_alone", run.fitted_alone},
+                       {"not_of_each", run.not_of_each},
                        {"parameters", ordered_json::array()},
                        {"fields", ordered_json::object()},
                        {"versions", JsonVersions(run.info)}};

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/core/collect.h"
 #include "src/core/file.h"
 #include "src/report/read_json.h"
 
@@ -36,17 +37,23 @@ std::vector<TuneRun::Log> LogsFrom(const ordered_json& json) {
   return logs;
 }
 
+std::vector<TuneRun::Parameter> ParametersFrom(const ordered_json& json) {
+  return Collect(json, [](const ordered_json& p) -> TuneRun::Parameter {
+    return {.name = p.at("name"),
+            .unit = p.at("unit"),
+            .nominal = NumberAt(p, "nominal"),
+            .value = NumberAt(p, "value"),
+            .low = NumberAt(p, "low"),
+            .high = NumberAt(p, "high"),
+            .at_bound = p.at("at_bound"),
+            .identifiable = p.at("identifiable")};
+  });
+}
+
 void ReadKnowledge(const ordered_json& json, TuneRun* run) {
-  for (const auto& p : json.at("parameters")) {
-    run->parameters.push_back({.name = p.at("name"),
-                               .unit = p.at("unit"),
-                               .nominal = NumberAt(p, "nominal"),
-                               .value = NumberAt(p, "value"),
-                               .low = NumberAt(p, "low"),
-                               .high = NumberAt(p, "high"),
-                               .at_bound = p.at("at_bound"),
-                               .identifiable = p.at("identifiable")});
-  }
+  run->parameters = ParametersFrom(json.at("parameters"));
+  for (const auto& fit : json.value("per_log", ordered_json::array()))
+    run->per_log.push_back({fit.at("log"), fit.at("termination"), ParametersFrom(fit.at("parameters"))});
   run->left_frozen = json.value("left_frozen", std::vector<std::string>{});
   for (const auto& entry : json.at("flat")) {
     TuneRun::Flat flat{.direction = {}, .text = entry.at("text")};

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "src/core/collect.h"
 #include "src/report/signal_table.h"
 
 namespace gapscope {
@@ -36,6 +37,48 @@ ordered_json Json(const std::vector<TuneRun::Log>& logs) {
     list.push_back(std::move(entry));
   }
   return list;
+}
+
+TuneRun::Parameter ParameterOf(const TunedParameter& t, const Model& model) {
+  const gapscope::Parameter& p = model.parameters()[t.index];
+  return {p.name, p.unit, p.nominal, t.value, t.low, t.high, t.at_bound, t.identifiable};
+}
+
+ordered_json Json(const std::vector<TuneRun::Parameter>& parameters) {
+  ordered_json list = ordered_json::array();
+  for (const auto& p : parameters) {
+    list.push_back({{"name", p.name},
+                    {"unit", p.unit},
+                    {"nominal", p.nominal},
+                    {"value", p.value},
+                    {"low", p.low},
+                    {"high", p.high},
+                    {"at_bound", p.at_bound},
+                    {"identifiable", p.identifiable}});
+  }
+  return list;
+}
+
+// From the least to the most of what each log alone says of a parameter; of logs that do not know it nothing.
+std::string PerLogLines(const TuneRun& run) {
+  if (run.per_log.empty()) return "";
+  std::string text = fmt::format("\n{:<44} {:>11}    {:<11}\n", "each log alone", "least", "most");
+  for (std::size_t i = 0; i < run.per_log.front().parameters.size(); ++i) {
+    std::vector<double> values;
+    for (const auto& fit : run.per_log) {
+      if (fit.parameters[i].identifiable) values.push_back(fit.parameters[i].value);
+    }
+    const auto& p = run.per_log.front().parameters[i];
+    const std::string count = fmt::format("  {} of {} logs", values.size(), run.per_log.size());
+    if (values.empty()) {
+      text += fmt::format("{:<44} not known of a log alone\n", p.name);
+      continue;
+    }
+    const auto [least, most] = std::ranges::minmax(values);
+    text += fmt::format("{:<44} {:>11.4g} .. {:<11.4g} {}{}\n", p.name, least, most, p.unit,
+                        values.size() < run.per_log.size() ? count : "");
+  }
+  return text;
 }
 
 // Two directions may lead with the same parameter and say the same: once is enough.
@@ -178,10 +221,7 @@ TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t 
               .command_shift_s = summary.stamps.commands_s,
               .force_shift_s = summary.stamps.forces_s};
   const auto name = [&](int index) { return model.parameters()[index].name; };
-  for (const auto& t : summary.tuned) {
-    const gapscope::Parameter& p = model.parameters()[t.index];
-    run.parameters.push_back({p.name, p.unit, p.nominal, t.value, t.low, t.high, t.at_bound, t.identifiable});
-  }
+  for (const auto& t : summary.tuned) run.parameters.push_back(ParameterOf(t, model));
   for (const int index : summary.left_frozen) run.left_frozen.push_back(name(index));
   for (const auto& flat : summary.flat) {
     TuneRun::Flat entry{.direction = {}, .text = FlatText(flat, model)};
@@ -193,20 +233,15 @@ TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t 
   return run;
 }
 
-ordered_json JsonParameters(const TuneRun& run) {
-  ordered_json list = ordered_json::array();
-  for (const auto& p : run.parameters) {
-    list.push_back({{"name", p.name},
-                    {"unit", p.unit},
-                    {"nominal", p.nominal},
-                    {"value", p.value},
-                    {"low", p.low},
-                    {"high", p.high},
-                    {"at_bound", p.at_bound},
-                    {"identifiable", p.identifiable}});
-  }
-  return list;
+std::vector<TuneRun::LogFit> PerLogOf(const LogFits& fits, const Model& model) {
+  return Collect(fits.logs, [&](const LogFit& fit) -> TuneRun::LogFit {
+    return {.log = fit.log,
+            .termination = TerminationText(fit.termination),
+            .parameters = Collect(fit.tuned, [&](const TunedParameter& t) { return ParameterOf(t, model); })};
+  });
 }
+
+ordered_json JsonParameters(const TuneRun& run) { return Json(run.parameters); }
 
 ordered_json JsonErrors(const TuneRun& run) {
   return {{"nominal", JsonNumber(run.error_nominal)},
@@ -237,6 +272,8 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
   json["spread"] = {{"logarithmic", run.spread.logarithmic}, {"covariance", ordered_json::array()}};
   for (const auto& row : run.spread.covariance.rowwise())
     json["spread"]["covariance"].push_back(std::vector<double>(row.begin(), row.end()));
+  for (const auto& [log, termination, parameters] : run.per_log)
+    json["per_log"].push_back({{"log", log}, {"termination", termination}, {"parameters", Json(parameters)}});
   json["error"] = JsonErrors(run);
   json["held_out_by"] = run.held_out_by;
   json["train"] = Json(run.train);
@@ -253,7 +290,7 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
 }
 
 std::string ToTable(const TuneRun& run, const Console& console) {
-  std::string text = ParameterLines(run, console) + "\n" + HeldOutLines(run, console);
+  std::string text = ParameterLines(run, console) + PerLogLines(run) + "\n" + HeldOutLines(run, console);
   text += fmt::format("\nerror: nominal {:.4g}, train {:.4g}, held out {:.4g} ({})\n", run.error_nominal,
                       run.error_train, run.error_held_out, run.held_out_by);
   const std::string forces = run.force_shift_s == 0 ? "" : fmt::format(", forces {:+.3f} ms", 1e3 * run.force_shift_s);

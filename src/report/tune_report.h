@@ -10,6 +10,7 @@
 #include "src/report/console.h"
 #include "src/report/json.h"
 #include "src/report/run.h"
+#include "src/tune/each_log.h"
 #include "src/tune/tune.h"
 
 namespace gapscope {
@@ -35,6 +36,10 @@ struct TuneRun {
     Outcome outcome = Outcome::kCompleted;
     std::vector<SignalScore> signals;
   };
+  struct LogFit {
+    std::string log, termination;
+    std::vector<Parameter> parameters;  // those that all logs together know
+  };
 
   RunInfo info;
   std::string optimizer, termination;
@@ -52,9 +57,11 @@ struct TuneRun {
   std::vector<Log> train, held_out;
   RunModel model;
   double time_step_s = 0, command_shift_s = 0, force_shift_s = 0;
-  Spread spread;  // of `parameters`; empty: a result of an earlier version
+  Spread spread;                // of `parameters`; empty: a result of an earlier version
+  std::vector<LogFit> per_log;  // fits to each log alone; empty: none was asked for
 };
 TuneRun TuneRunOf(const TuneSummary& summary, const Model& model, std::uint64_t seed);
+std::vector<TuneRun::LogFit> PerLogOf(const LogFits& fits, const Model& model);
 
 inline constexpr const char* kTuneSchema = "gapscope.tune/1";
 nlohmann::ordered_json ToJson(const TuneRun& run, Timing timing = Timing::kInclude);

@@ -123,5 +123,20 @@ TEST_F(RandomizeTest, DrawsKeepToTheBounds) {
   }
 }
 
+TEST_F(RandomizeTest, ATorqueAboveThatOfASmallRigIsDrawnAsWell) {
+  constexpr double kLarge = 30, kDeviation = 1;
+  const auto index = static_cast<std::size_t>(uncertain_.parameters[1].index);
+  ASSERT_LT(model_->parameters()[index].high, kLarge) << "the bound of a rig of one N m";
+  values_[index] = kLarge;
+  uncertain_.parameters = {{static_cast<int>(index), false, false}};
+  uncertain_.covariance = Eigen::MatrixXd::Constant(1, 1, kDeviation * kDeviation);
+  const auto drawn = Draw(200, 1);
+  ASSERT_TRUE(drawn.ok()) << drawn.error().Text();
+  EXPECT_NEAR(drawn.value().ranges[0].high, kLarge + kNormalQuantile * kDeviation, 1e-9);
+  const Moments moments = MomentsOf(Drawn(drawn.value(), 0));
+  EXPECT_NEAR(moments.mean, kLarge, 0.3);
+  EXPECT_NEAR(moments.deviation, kDeviation, 0.2);
+}
+
 }  // namespace
 }  // namespace gapscope::testing

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "src/log/npz_reader.h"
 #include "src/log/npz_writer.h"
 #include "tests/log/log_fixture.h"
 
@@ -85,6 +86,22 @@ TEST_F(ForeignTest, RefusalsAndFailuresAreErrors) {
   EXPECT_NE(MessageOf(path).find("the converter failed"), std::string::npos);
   Install("echo PK > \"$2\"");
   EXPECT_NE(MessageOf(path).find("NPZ"), std::string::npos);
+}
+
+TEST_F(ForeignTest, AnMcapFileIsMadeOfATable) {
+  const Log log = MakeLog({{"__time", {0, 1}}, {"/real/joint_states/arm/position", {2, 3}}});
+  const std::string path = folder_.Path("a.mcap");
+  setenv("GAPSCOPE_CONVERT", folder_.Path("gone").c_str(), 1);
+  const Status lacking = WriteMcap(path, log);
+  ASSERT_FALSE(lacking.ok());
+  EXPECT_EQ(lacking.error().cure, "pip install 'gapscope[ros]'");
+  EXPECT_FALSE(std::filesystem::exists(path));
+  Install("cp \"$6\" \"$2\"");
+  ASSERT_TRUE(WriteMcap(path, log).ok());
+  EXPECT_TRUE(ReadFile(folder_.Path("words")).value().starts_with("--out\n" + path + "\n--to\nmcap\n--\n"));
+  const auto table = ReadNpz(path, ReadFile(path).value());
+  ASSERT_TRUE(table.ok()) << table.error().Text();
+  EXPECT_EQ(table.value().Find("/real/joint_states/arm/position")->values, (std::vector<double>{2, 3}));
 }
 
 }  // namespace

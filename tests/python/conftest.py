@@ -35,6 +35,14 @@ def demo() -> str:
     return str(ROOT / "demo" / "qube.csv")
 
 
+@pytest.fixture
+def short(demo: str, tmp_path: Path) -> str:
+    """The first 300 rows of the demo's log, of which a diagnosis takes seconds."""
+    path = tmp_path / "short.csv"
+    path.write_text("".join(Path(demo).read_text().splitlines(keepends=True)[:301]))
+    return str(path)
+
+
 def shell_program(path: Path, body: str) -> str:
     """A program that stands in for gapscope's."""
     path.write_text(f"#!/bin/sh\n{body}\n")

@@ -21,6 +21,7 @@ from gapscope._results import Open
 from referencing import Registry, Resource
 
 from conftest import ROOT
+from test_formats import converter
 
 Schema: typing.TypeAlias = dict[str, Any]
 FILES = {path.name: path for path in sorted((ROOT / "schemas").iterdir())}
@@ -70,14 +71,6 @@ def ask(*words: str) -> dict[str, Any]:
     return answer
 
 
-@pytest.fixture
-def short(demo: str, tmp_path: Path) -> str:
-    """The first 300 rows of the demo's log, of which a diagnosis takes seconds."""
-    path = tmp_path / "short.csv"
-    path.write_text("".join(Path(demo).read_text().splitlines(keepends=True)[:301]))
-    return str(path)
-
-
 @pytest.mark.parametrize("name", FILES)
 def test_a_schema_is_one(name: str) -> None:
     schema = read(name)
@@ -123,7 +116,9 @@ def test_what_a_result_becomes(experiment: str, short: str, tmp_path: Path) -> N
     check(ask("apply", out, "--out", str(tmp_path / "robot.xml")), "apply")
 
 
-def test_a_diagnosis_and_its_evidence(experiment: str, short: str, tmp_path: Path) -> None:
+def test_a_diagnosis_and_its_evidence(
+    experiment: str, short: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = str(tmp_path / "out")
     found = ask("diagnose", experiment, short, "--effort", "quick", "--out", out)
     check(found, "diagnosis")
@@ -131,6 +126,10 @@ def test_a_diagnosis_and_its_evidence(experiment: str, short: str, tmp_path: Pat
     assert told  # else the evidence is not looked at
     for number in {1, len(found["statements"])}:
         check(ask("explain", out, str(number)), "explain")
+    monkeypatch.setenv("GAPSCOPE_CONVERT", converter(tmp_path)["GAPSCOPE_CONVERT"])
+    views = ask("convert", out, "--to", "mcap", "--out", str(tmp_path / "views"))
+    check(views, "convert")
+    assert views["logs"][0]["rows"] > 50 and "/sim/joint_states/arm/position" in views["logs"][0]["columns"]
 
 
 def test_logs(experiment: str, demo: str, tmp_path: Path) -> None:

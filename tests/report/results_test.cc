@@ -162,6 +162,21 @@ TEST(TuneRunTest, IsReadBackAsItWasWritten) {
   }
 }
 
+TEST(TuneRunTest, FitsToEachLogAloneAreWrittenWhereThereAreAny) {
+  EXPECT_FALSE(ToJson(MadeTune()).contains("per_log"));
+  TuneRun run = MadeTune();
+  const TuneRun::Parameter known{"motor.kt", "N m/A", 0.042, 0.05, 0.049, 0.051, false, true};
+  TuneRun::Parameter other = known, unknown = known;
+  other.value = 0.06, unknown.identifiable = false;
+  run.per_log = {{"a.csv", "converged", {known}}, {"b.csv", "converged", {other}}, {"c.csv", "budget", {unknown}}};
+  const std::string text = ToJson(run).dump();
+  const auto read = ReadTuneRun(ordered_json::parse(text), "here");
+  ASSERT_TRUE(read.ok()) << read.error().Text();
+  EXPECT_EQ(ToJson(read.value()).dump(), text);
+  EXPECT_EQ(read.value().per_log[2].termination, "budget");
+  EXPECT_NE(ToTable(run).find("0.05 .. 0.06        N m/A  2 of 3 logs\n"), std::string::npos) << ToTable(run);
+}
+
 TEST(TuneRunTest, TimesAreLeftOutOnRequestAndNothingElse) {
   ordered_json whole = ToJson(MadeTune());
   EXPECT_EQ(whole["wall_s"], 1.5);

@@ -1,4 +1,4 @@
-"""The converter, a process of its own: gapscope-convert FILE --out TABLE.npz --options JSON.
+"""The converter, a process of its own: gapscope-convert FILE --out TABLE.npz --options JSON; back, --to mcap.
 
 The program starts it, and so does this package: libraries of formats may crash on a stranger's bytes. What is refused:
 status 2, and five lines on stdout: what, where, actual, allowed, cure.
@@ -15,8 +15,9 @@ from pathlib import Path
 
 from gapscope._errors import InputError
 from gapscope._log import Log
-from gapscope.formats import Source, format_of, read_table, read_tables
+from gapscope.formats import Source, _joint_states, format_of, read_table, read_tables
 from gapscope.formats._cache import through_cache
+from gapscope.formats.apart import load_table
 
 _MOST_BYTES = 16 << 30  # of memory, and no more than the machine has, and of a file: a small one may unpack to more
 
@@ -52,13 +53,16 @@ def main() -> int:
     parser.add_argument("file", help="MAT, HDF5, Parquet, Feather, ROS bag, MCAP, PACE, LeRobot dataset#EPISODE")
     parser.add_argument("--out", required=True, help="the table, .npz; with --all a folder")
     parser.add_argument("--all", action="store_true", help="every recording of the file, 000000.npz and so on")
+    parser.add_argument("--to", choices=("npz", "mcap"), default="npz", help="mcap: of a table, joint states in MCAP")
     parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable, time, joints (docs/formats.md)")
     given = parser.parse_args()
     _limit(resource.RLIMIT_AS, min(_MOST_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))
     _limit(resource.RLIMIT_FSIZE, _MOST_BYTES)
     try:
         source = Source.of(_options(given.options), "--options")
-        if given.all:
+        if given.to == "mcap":
+            _joint_states.write(load_table(Path(given.file)), Path(given.out))
+        elif given.all:
             for k, table in enumerate(read_tables(given.file, source)):
                 Log.of_table(table).save(Path(given.out) / f"{k:06d}.npz")
         else:

@@ -229,40 +229,16 @@ double FinestStep(const DataSplit& data) {
   return step_s;
 }
 
-void NameLogs(const Workbench& bench, double asked_window_s, Diagnosis* result) {
-  for (const auto& recording : bench.data.train) result->train_logs.push_back(recording.log_path);
-  for (const auto& recording : bench.data.held_out) result->held_out_logs.push_back(recording.log_path);
-  result->split = bench.data.how;
-  if (bench.window_s < asked_window_s)
-    result->split +=
-        fmt::format("; windows of {:g} s, as over longer ones the base model leaves the log", bench.window_s);
-}
-
-// Whether windows half as long still say something.
-bool MayHalve(double window_s, const DataSplit& data) {
-  const auto& policy = kDiagnosePolicy.search;
-  return window_s / 2 >= std::max(policy.least_window_s, static_cast<double>(policy.least_samples) * FinestStep(data));
+void NameLogs(const DataSplit& data, Diagnosis* result) {
+  for (const auto& recording : data.train) result->train_logs.push_back(recording.log_path);
+  for (const auto& recording : data.held_out) result->held_out_logs.push_back(recording.log_path);
+  result->split = data.how;
 }
 
 // Of the search; `replay_steps`: of one replay of the training windows.
 std::size_t MostSteps(SearchEffort effort, std::size_t replay_steps) {
   return static_cast<std::size_t>(ShareOfWork(effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
                                   static_cast<double>(replay_steps));
-}
-
-// With nothing chosen or counted yet.
-Workbench BareBench(const Model& model, const DataSplit& data, const ScaleTable& scales, const DiagnoseOptions& options,
-                    ThreadPool& pool) {
-  return {.rig = model.rig(),
-          .data = data,
-          .scales = scales,
-          .pool = pool,
-          .weights = {},
-          .window_s = options.window_s,
-          .priors = options.priors,
-          .known = options.known,
-          .values = options.values,
-          .frozen = options.frozen};
 }
 
 // Tells what is done, and how much of the work of `bench`, once there is one.
@@ -289,44 +265,45 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   const Deadline deadline = DeadlineOf(options, begin);
   GS_ASSIGN(const auto journal, OpenJournal(*model, fine, options, deadline));
   bool fewer_windows = false;
-  const auto make_bench = [&](const DataSplit& part, bool by_windows, double window_s) {
-    Workbench bench = BareBench(*model, part, scales, options, pool);
-    bench.window_s = window_s;
+  const auto make_bench = [&](const DataSplit& part, bool by_windows) {
+    Workbench bench{.rig = model->rig(),
+                    .data = part,
+                    .scales = scales,
+                    .pool = pool,
+                    .weights = {},
+                    .window_s = options.window_s,
+                    .priors = options.priors,
+                    .known = options.known,
+                    .values = options.values,
+                    .frozen = options.frozen};
     bench.sample_s = FinestStep(fine);
     for (std::size_t i = 0; i < noise.size(); ++i)
       bench.weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
     bench.time_step_s =
-        ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = window_s}, pool).step_s;
+        ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
+            .step_s;
     ChooseFitted(*model, options.replay_steps, by_windows, &bench);
     bench.most_steps = MostSteps(options.effort, KeepToTime(*model, options, &bench, &fewer_windows));
     bench.deadline = deadline;
     bench.journal = journal.get();
     return bench;
   };
-  std::unique_ptr<Workbench> bench;
-  std::unique_ptr<SearchResult> found;
-  double window_s = options.window_s;
-  for (;; window_s /= 2) {
-    found.reset();
-    bench = std::make_unique<Workbench>(make_bench(data, false, window_s));
-    at = bench.get();
-    const bool may_halve = MayHalve(window_s, data);
-    GS_ASSIGN(found, Search(*bench, {.uneven = !data.asked, .lost = may_halve}, say));
-    if (!found->lost || !may_halve) break;
-  }
+  const Workbench bench = make_bench(data, false);
+  at = &bench;
+  GS_ASSIGN(const auto found, Search(bench, !data.asked, say));
   const DescribeOptions describe{noise, options.seed, options.next_experiment};
   Diagnosis result;
   if (!data.asked && found->uneven) {
     // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
     const DataSplit blocks = InWindows(data);
-    const Workbench again = make_bench(blocks, true, window_s);
+    const Workbench again = make_bench(blocks, true);
     at = &again;
-    GS_ASSIGN(const auto second, Search(again, {}, say));
+    GS_ASSIGN(const auto second, Search(again, false, say));
     GS_ASSIGN(result, Describe(*second, again, describe, say));
-    NameLogs(again, options.window_s, &result);
+    NameLogs(blocks, &result);
   } else {
-    GS_ASSIGN(result, Describe(*found, *bench, describe, say));
-    NameLogs(*bench, options.window_s, &result);
+    GS_ASSIGN(result, Describe(*found, bench, describe, say));
+    NameLogs(data, &result);
   }
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.interrupted = deadline.stopped();

@@ -8,10 +8,7 @@ namespace gapscope {
 
 // Gains are ln(cost without / cost with), costs those of refitted sets.
 struct SearchPolicy {
-  std::size_t widenings = 2;  // of base parameters' bounds, before effects are judged
-  // Error of the base model, refitted, above which it leaves the log within a window: windows are halved, down to so
-  // many seconds and samples. A model that is far from the log no longer says by its slopes what would bring it back.
-  double lost = 0.5, least_window_s = 0.1, least_samples = 25;
+  std::size_t widenings = 2;                        // of base parameters' bounds, before effects are judged
   std::size_t beam = 8;                             // sets kept per size while arithmetic orders them
   std::size_t singles = 5, pairs = 3, triples = 1;  // of the base model, that are refitted
   std::size_t go_on = 2;                            // of the sets that were begun, how many are fitted on

@@ -427,7 +427,7 @@ double Gain(const Candidate& without, const Candidate& with) {
 
 double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(kPolicy.far_behind); }
 
-Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, const StopIf& stop, const Say& say) {
+Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
   auto result = std::make_unique<SearchResult>(bench);
   result->logged = WhatIsLogged(bench.data.train);
   Searcher searcher(bench, say, result.get());
@@ -437,8 +437,7 @@ Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, const StopI
   constexpr double kUneven = 1.5;
   result->uneven =
       std::max(train_floors / result->base->held_out_floors, result->base->held_out_floors / train_floors) > kUneven;
-  result->lost = !(result->base->held_out_error <= kPolicy.lost);
-  if ((result->lost && stop.lost) || (result->uneven && stop.uneven)) return result;
+  if (result->uneven && stop_if_uneven) return result;
   searcher.Find();
   return result;
 }

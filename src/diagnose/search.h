@@ -31,7 +31,6 @@ struct SearchResult {
   std::vector<EffectUse> uses;         // all that were tried
   LoggedSignals logged;
   bool uneven = false;           // training and held-out logs show the gap very differently
-  bool lost = false;             // the base model, refitted, leaves the log within a window
   std::vector<std::string> cut;  // what the budget left out
 };
 
@@ -40,13 +39,9 @@ double Gain(const Candidate& without, const Candidate& with);
 // The cost above which a set is so far behind the chosen one that it matters little how far.
 double FarBehind(const Candidate& chosen);
 
-// When the search ends after the base model's refit.
-struct StopIf {
-  bool uneven = false;  // the split is a poor one
-  bool lost = false;    // the windows are too long for this model
-};
-// Errors: the base model cannot be simulated along the logs.
-Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, const StopIf& stop, const Say& say);
+// `stop_if_uneven`: ends after the base model's refit when the split is a poor one. Errors: the base model cannot be
+// simulated along the logs.
+Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
 
 }  // namespace gapscope
 

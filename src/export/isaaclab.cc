@@ -95,18 +95,16 @@ Status IsaacLabWriter::SetGains(int actuator, JointDrive* drive) const {
   return Ok();
 }
 
-// The first actuator of the joint is its drive; plain motors beside it are efforts of the same configuration.
+// Plain motors beside the joint's drive are efforts of the same configuration.
 Result<JointDrive> IsaacLabWriter::DriveOf(int joint) const {
   JointDrive drive{.joint = NameOf(compiled_, mjOBJ_JOINT, joint)};
   drive.name = drive.joint;
   const double spring = compiled_.jnt_stiffness[joint];
-  bool driven = false;
-  for (int a = 0; a < compiled_.nactuator; ++a) {
-    if (compiled_.actuator_trntype[a] != mjTRN_JOINT || compiled_.actuator_trnid[2 * a] != joint) continue;
-    driven = true;
-    drive.name = NameOf(compiled_, mjOBJ_ACTUATOR, a);
-    GS_RETURN_IF_ERROR(SetGains(a, &drive));
-    break;
+  const int actuator = DriveOn(compiled_, joint);
+  const bool driven = actuator >= 0;
+  if (driven) {
+    drive.name = NameOf(compiled_, mjOBJ_ACTUATOR, actuator);
+    GS_RETURN_IF_ERROR(SetGains(actuator, &drive));
   }
   const mjtNum* poly = compiled_.jnt_stiffnesspoly + mjNPOLY * joint;
   if ((driven && spring != 0) || std::any_of(poly, poly + mjNPOLY, [](double x) { return x != 0; }))

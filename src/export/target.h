@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_EXPORT_TARGET_H_
 #define GAPSCOPE_EXPORT_TARGET_H_
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -36,6 +37,20 @@ struct ExportTarget {
   // Files beside the MJCF; null: none. Errors: the model has no form there.
   Result<std::vector<TargetFile>> (*files)(const TargetInput& input) = nullptr;
 };
+
+// A model with some of its effects alone, and their values.
+struct KeptEffects {
+  std::shared_ptr<const Model> model;
+  std::vector<double> values;
+  bool Has(const EffectUse& use) const;
+};
+// Those of these names. `values`: of the model's parameters.
+Result<KeptEffects> KeepEffects(const Model& model, std::span<const double> values, std::span<const char* const> names);
+// What becomes of one that is not kept: the host's where it can, else dropped.
+NativeEffect LeftOut(const Model& model, const EffectUse& use, const std::string& why_dropped);
+
+// The actuator that drives a joint, the first one on it; -1: none.
+int DriveOn(const mjModel& model, int joint);
 
 // Leaves out of a compiled spec what no MJCF of MuJoCo 3.11 says: the `input` of actuators of one control, whose law
 // stands in their gain and bias.

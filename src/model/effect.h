@@ -106,6 +106,7 @@ struct Effect {
   bool of_motion = false;  // a torque that only the joint's own angle and speed make: what roughness looks like
   bool of_range = false;   // looked for on joints that the MJCF gives a range: others have no stops
   bool of_time = false;    // says how late something is: no better known than the log's stamps
+  std::string host = "";   // what does the same, of whoever sends the commands or reads the sensors; empty: nothing
   EffectCharacter character = EffectCharacter::kOther;
   BaseTerm base_term = BaseTerm::kNone;
   int actuator_stage = 0;  // of a drive's own model (tune --actuator), in the order of its parameters; 0: none of it

@@ -99,8 +99,8 @@ std::vector<NativeEffect> WhatBecame(const Model& model, const std::vector<Nativ
   return Collect(model.effects(), [&](const EffectUse& use) -> NativeEffect {
     const auto of = std::ranges::find_if(told, [&](const NativeEffect& effect) { return effect.use == use; });
     if (of != told.end()) return *of;
-    if (EffectOf(use, *model.rig()).place == EffectPlace::kSignal)
-      return {use, Fidelity::kHost, "delay what the sensor says"};
+    if (const Effect& effect = EffectOf(use, *model.rig()); effect.place == EffectPlace::kSignal)
+      return {use, Fidelity::kHost, effect.host};
     return {use, Fidelity::kExact, "elements of the MJCF"};
   });
 }

@@ -43,6 +43,14 @@ def short(demo: str, tmp_path: Path) -> str:
     return str(path)
 
 
+def servo_log(folder: Path, rows: int) -> str:
+    """A log of models/joint: its target steps to 0.3 rad and back twice in 1000 rows, the joint goes a third of it."""
+    path = folder / "log.csv"
+    lines = [f"{0.002 * k:.3f},{0.3 * (k % 500 > 250)},{0.1 * (k % 500 > 260)}" for k in range(rows)]
+    path.write_text("\n".join(["time_s,target_rad,position_rad", *lines]) + "\n")
+    return str(path)
+
+
 def shell_program(path: Path, body: str) -> str:
     """A program that stands in for gapscope's."""
     path.write_text(f"#!/bin/sh\n{body}\n")

@@ -14,7 +14,7 @@ from typing import Any
 
 import gapscope as gs
 import pytest
-from conftest import ROOT, changed_joint
+from conftest import ROOT, changed_joint, servo_log
 
 OF_JOINT = {"joint_names_expr", "stiffness", "damping", "armature", "friction", "dynamic_friction", "viscous_friction"}
 LIMITS = {
@@ -60,10 +60,7 @@ def read(monkeypatch: pytest.MonkeyPatch, target: str, folder: Path) -> dict[str
 
 @pytest.fixture
 def joint(tmp_path: Path) -> tuple[str, str]:
-    log = tmp_path / "log.csv"
-    rows = [f"{0.002 * k:.3f},{0.3 * (k % 500 > 250)},{0.1 * (k % 500 > 260)}" for k in range(1000)]
-    log.write_text("\n".join(["time_s,target_rad,position_rad", *rows]) + "\n")
-    return str(ROOT / "models" / "joint" / "experiment.yaml"), str(log)
+    return str(ROOT / "models" / "joint" / "experiment.yaml"), servo_log(tmp_path, 1000)
 
 
 @pytest.mark.parametrize("target", list(LIMITS))

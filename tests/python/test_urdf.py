@@ -7,7 +7,7 @@ from pathlib import Path
 import gapscope as gs
 import pytest
 
-from conftest import ROOT
+from conftest import ROOT, servo_log
 
 ATTRIBUTES = {"limit": {"lower", "upper", "effort", "velocity"}, "dynamics": {"damping", "friction"}}
 ROBOT = """<robot name="r"><mujoco><compiler discardvisual="true"/></mujoco>
@@ -26,9 +26,7 @@ def attributes(path: Path) -> dict[str, dict[str, float]]:
 
 @pytest.fixture(scope="module")
 def servo(tmp_path_factory: pytest.TempPathFactory) -> gs.Replay:
-    log = tmp_path_factory.mktemp("servo") / "log.csv"
-    rows = [f"{0.002 * k:.3f},{0.3 * (k > 250)},{0.1 * (k > 260)}" for k in range(500)]
-    log.write_text("\n".join(["time_s,target_rad,position_rad", *rows]) + "\n")
+    log = servo_log(tmp_path_factory.mktemp("servo"), 500)
     values = {
         "coulomb_friction@joint.friction_n_m": 3.0,
         "torque_limit@motor.limit_n_m": 40.0,
@@ -36,7 +34,7 @@ def servo(tmp_path_factory: pytest.TempPathFactory) -> gs.Replay:
         "command_delay@motor.delay_s": 0.004,
     }
     effects = sorted({name.rpartition(".")[0] for name in values})
-    return gs.replay(str(ROOT / "models" / "joint" / "experiment.yaml"), str(log), with_=effects, set=values)
+    return gs.replay(str(ROOT / "models" / "joint" / "experiment.yaml"), log, with_=effects, set=values)
 
 
 def test_a_servo(servo: gs.Replay, tmp_path: Path) -> None:

@@ -34,10 +34,6 @@ constexpr Family kFamilies[] = {{"xl330", 4096 / (2 * std::numbers::pi) / (256 *
 // Effects that are terms of BAM's friction.
 constexpr const char* kFriction[] = {"coulomb_friction", "stribeck_friction", "load_friction"};
 
-bool IsTerm(const EffectUse& use) {
-  return std::ranges::any_of(kFriction, [&](const char* name) { return use.effect == name; });
-}
-
 Error NoBam(const Model& model, const std::string& what, const std::string& actual, const std::string& allowed) {
   return {.what = what,
           .where = model.experiment().model_path,
@@ -48,18 +44,11 @@ Error NoBam(const Model& model, const std::string& what, const std::string& actu
 
 // The model with what BAM has of it.
 Result<ExportedModel> MakeBam(const Model& model, std::span<const double> values) {
-  std::vector<EffectUse> terms;
-  std::ranges::copy_if(model.effects(), std::back_inserter(terms), IsTerm);
-  GS_ASSIGN(const auto kept, Model::Build(model.rig(), terms, {}));
-  const std::vector<double> of_kept = Collect(kept->parameters(), [&](const Parameter& parameter) {
-    return values[static_cast<std::size_t>(model.IndexOf(parameter.name))];
-  });
-  GS_ASSIGN(ExportedModel exported, kept->Export(of_kept, nullptr, {}));
-  exported.native = Collect(model.effects(), [](const EffectUse& use) -> NativeEffect {
-    if (IsTerm(use)) return {use, Fidelity::kExact, "a term of BAM's friction"};
-    if (use.effect == "command_delay") return {use, Fidelity::kHost, "send commands later"};
-    if (use.effect == "sensor_delay") return {use, Fidelity::kHost, "delay what the sensor says"};
-    return {use, Fidelity::kDropped, "no parameter of BAM's"};
+  GS_ASSIGN(const KeptEffects kept, KeepEffects(model, values, kFriction));
+  GS_ASSIGN(ExportedModel exported, kept.model->Export(kept.values, nullptr, {}));
+  exported.native = Collect(model.effects(), [&](const EffectUse& use) -> NativeEffect {
+    if (kept.Has(use)) return {use, Fidelity::kExact, "a term of BAM's friction"};
+    return LeftOut(model, use, "no parameter of BAM's");
   });
   return exported;
 }

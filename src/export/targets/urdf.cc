@@ -12,6 +12,7 @@
 #include "src/core/statistics.h"
 #include "src/export/target.h"
 #include "src/model/element_names.h"
+#include "src/model/xml_text.h"
 
 namespace gapscope {
 namespace {
@@ -19,46 +20,22 @@ namespace {
 // Effects that are numbers of a URDF's joint.
 constexpr const char* kOfJoints[] = {"coulomb_friction", "stribeck_friction", "torque_limit"};
 
-bool IsOfJoints(const EffectUse& use) {
-  return std::ranges::any_of(kOfJoints, [&](const char* name) { return use.effect == name; });
-}
-
-NativeEffect NotInUrdf(const EffectUse& use) {
-  if (use.effect == "command_delay") return {use, Fidelity::kHost, "send commands later"};
-  if (use.effect == "sensor_delay") return {use, Fidelity::kHost, "delay what the sensor says"};
-  return {use, Fidelity::kDropped, "no attribute of a URDF's joint"};
-}
-
 // The model with what a URDF has of it.
 Result<ExportedModel> MakeUrdf(const Model& model, std::span<const double> values) {
-  std::vector<EffectUse> held;
-  std::ranges::copy_if(model.effects(), std::back_inserter(held), IsOfJoints);
-  GS_ASSIGN(const auto kept, Model::Build(model.rig(), held, {}));
-  const std::vector<double> of_kept = Collect(kept->parameters(), [&](const Parameter& parameter) {
-    return values[static_cast<std::size_t>(model.IndexOf(parameter.name))];
-  });
+  GS_ASSIGN(const KeptEffects kept, KeepEffects(model, values, kOfJoints));
   const NativeFeatures features{.passive_motors = PassiveMotors::kNone,
                                 .delays = CommandDelays::kNone,
                                 .polynomials = false,
                                 .tendons = false,
                                 .lags = false};
-  GS_ASSIGN(ExportedModel exported, kept->ExportNative(of_kept, nullptr, features));
+  GS_ASSIGN(ExportedModel exported, kept.model->ExportNative(kept.values, nullptr, features));
   std::map<std::string, NativeEffect> of_joints;
   for (const NativeEffect& effect : exported.native) of_joints[effect.use.Text()] = effect;
   exported.native = Collect(model.effects(), [&](const EffectUse& use) {
     const auto found = of_joints.find(use.Text());
-    return found == of_joints.end() ? NotInUrdf(use) : found->second;
+    return found == of_joints.end() ? LeftOut(model, use, "no attribute of a URDF's joint") : found->second;
   });
   return exported;
-}
-
-std::string XmlEscaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    const std::string named = c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '"' ? "&quot;" : "";
-    escaped += named.empty() ? std::string(1, c) : named;
-  }
-  return escaped;
 }
 
 // The least of what limits a joint's torque, and the speed at which its drive has none left; infinite: nothing does.
@@ -84,14 +61,12 @@ DriveLimits LimitsOf(const mjModel& model, int joint) {
   DriveLimits limits;
   if (model.jnt_actfrclimited[joint])
     limits.effort = std::min(-model.jnt_actfrcrange[2 * joint], model.jnt_actfrcrange[2 * joint + 1]);
-  for (int a = 0; a < model.nactuator; ++a) {
-    if (model.actuator_trntype[a] != mjTRN_JOINT || model.actuator_trnid[2 * a] != joint) continue;
-    const mjtNum* force = model.actuator_forcerange + 2 * a;
-    if (model.actuator_forcelimited[a])
-      limits.effort = std::min(limits.effort, std::abs(model.actuator_gear[6 * a]) * std::min(-force[0], force[1]));
-    LimitByCommand(model, a, &limits);
-    break;  // it is the joint's drive; what stands beside it adds efforts
-  }
+  const int drive = DriveOn(model, joint);  // what stands beside it adds efforts
+  if (drive < 0) return limits;
+  const mjtNum* force = model.actuator_forcerange + 2 * drive;
+  if (model.actuator_forcelimited[drive])
+    limits.effort = std::min(limits.effort, std::abs(model.actuator_gear[6 * drive]) * std::min(-force[0], force[1]));
+  LimitByCommand(model, drive, &limits);
   return limits;
 }
 
@@ -106,7 +81,7 @@ std::string PatchOf(const mjModel& model, int joint) {
   if (model.dof_damping[dof] > 0) dynamics += fmt::format(" damping=\"{:.10g}\"", model.dof_damping[dof]);
   if (model.dof_frictionloss[dof] > 0) dynamics += fmt::format(" friction=\"{:.10g}\"", model.dof_frictionloss[dof]);
   if (limit.empty() && dynamics.empty()) return "";
-  std::string text = fmt::format("<joint name=\"{}\" type=\"{}\">\n", XmlEscaped(NameOf(model, mjOBJ_JOINT, joint)),
+  std::string text = fmt::format("<joint name=\"{}\" type=\"{}\">\n", XmlEscape(NameOf(model, mjOBJ_JOINT, joint)),
                                  !hinge    ? "prismatic"
                                  : limited ? "revolute"
                                            : "continuous");

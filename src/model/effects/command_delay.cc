@@ -23,6 +23,7 @@ Effect Effect_command_delay() {
       .told_apart = "steps, high frequency",
       .partners = {"actuator_lag", "sensor_delay"},
       .of_time = true,
+      .host = "send commands later",
       .actuator_stage = 1,
       .same_on_one_signal = "sensor_delay",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {

@@ -23,6 +23,7 @@ Effect Effect_sensor_delay() {
       .told_apart = "two sensors, torque log",
       .partners = {"command_delay"},
       .of_time = true,
+      .host = "delay what the sensor says",
       .same_on_one_signal = "command_delay",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         structure.signal_delay[on] = names[0];

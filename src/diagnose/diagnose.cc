@@ -14,6 +14,8 @@
 #include "src/diagnose/describe.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/policy.h"
+#include "src/diagnose/search.h"
+#include "src/diagnose/short_windows.h"
 #include "src/tune/job_key.h"
 
 namespace gapscope {
@@ -39,6 +41,12 @@ std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& d
     noise[i] = std::max(Median(found[i]), std::numeric_limits<double>::min());
   }
   return noise;
+}
+
+std::vector<double> WeightsOf(const Experiment& experiment, const std::vector<double>& noise) {
+  std::vector<double> weights;
+  for (std::size_t i = 0; i < noise.size(); ++i) weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
+  return weights;
 }
 
 }  // namespace
@@ -270,15 +278,13 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .data = part,
                     .scales = scales,
                     .pool = pool,
-                    .weights = {},
+                    .weights = WeightsOf(experiment, noise),
                     .window_s = options.window_s,
                     .priors = options.priors,
                     .known = options.known,
                     .values = options.values,
                     .frozen = options.frozen};
     bench.sample_s = FinestStep(fine);
-    for (std::size_t i = 0; i < noise.size(); ++i)
-      bench.weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
     bench.time_step_s =
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
@@ -290,21 +296,24 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   };
   const Workbench bench = make_bench(data, false);
   at = &bench;
-  GS_ASSIGN(const auto found, Search(bench, !data.asked, say));
+  GS_ASSIGN(auto found, FitBase(bench, say));
   const DescribeOptions describe{noise, options.seed, options.next_experiment};
-  Diagnosis result;
-  if (!data.asked && found->uneven) {
-    // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
-    const DataSplit blocks = InWindows(data);
-    const Workbench again = make_bench(blocks, true);
-    at = &again;
-    GS_ASSIGN(const auto second, Search(again, false, say));
-    GS_ASSIGN(result, Describe(*second, again, describe, say));
-    NameLogs(blocks, &result);
-  } else {
-    GS_ASSIGN(result, Describe(*found, bench, describe, say));
-    NameLogs(data, &result);
+  // What only one log shows can be judged on no other: then windows of every log are held out instead of whole logs.
+  const bool by_windows = !data.asked && found->uneven;
+  const DataSplit blocks = by_windows ? InWindows(data) : DataSplit{};
+  std::unique_ptr<const Workbench> again;
+  if (by_windows) {
+    again = std::make_unique<const Workbench>(make_bench(blocks, true));
+    at = again.get();
+    found = nullptr;
+    GS_ASSIGN(found, FitBase(*again, say));
   }
+  GS_ASSIGN(const auto lead, SearchShortWindows(*at, *found->base, say));
+  FindEffects(*at, lead.hints, say, found.get());
+  GS_ASSIGN(Diagnosis result, Describe(*found, *at, describe, say));
+  result.work += lead.work;
+  result.most_steps += lead.work.steps;
+  NameLogs(at->data, &result);
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.interrupted = deadline.stopped();
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

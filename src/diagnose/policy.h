@@ -8,7 +8,11 @@ namespace gapscope {
 
 // Gains are ln(cost without / cost with), costs those of refitted sets.
 struct SearchPolicy {
-  std::size_t widenings = 2;                        // of base parameters' bounds, before effects are judged
+  std::size_t widenings = 2;  // of base parameters' bounds, before effects are judged
+  // Error of the base model, refitted, above which it leaves the logs within a window: then a search in shorter ones
+  // leads, halved down to so many seconds and samples, with so much of the work as the whole search may take.
+  double lost = 0.5, least_window_s = 0.1, short_share = 0.3;
+  std::size_t least_samples = 25;
   std::size_t beam = 8;                             // sets kept per size while arithmetic orders them
   std::size_t singles = 5, pairs = 3, triples = 1;  // of the base model, that are refitted
   std::size_t go_on = 2;                            // of the sets that were begun, how many are fitted on

@@ -62,13 +62,21 @@ class Searcher {
     return Ok();
   }
 
-  void Find() {
+  void Find(const std::vector<Hint>& hints) {
+    for (const Hint& hint : hints) {
+      if (hint.effects.empty()) result_.ledger.Refit({}, *result_.base, hint.values, {}, Effort::kFinish);
+    }
+    ScoreCandidate(bench_, result_.base);
     say_("columns of all effects");
     FindCoupling(*result_.base);
     SplitTrainCost(bench_, result_.base);
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
+    for (const Hint& hint : hints) {
+      say_("refitting " + NameOfSet(hint.effects));
+      result_.ledger.Refit(hint.effects, *result_.base, hint.values, {}, Effort::kTry);
+    }
     // However little may be done, the first sets are looked at.
     until_ = kPolicy.until_grown;
     Grow(Leaders());
@@ -427,7 +435,7 @@ double Gain(const Candidate& without, const Candidate& with) {
 
 double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(kPolicy.far_behind); }
 
-Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say) {
+Result<std::unique_ptr<SearchResult>> FitBase(const Workbench& bench, const Say& say) {
   auto result = std::make_unique<SearchResult>(bench);
   result->logged = WhatIsLogged(bench.data.train);
   Searcher searcher(bench, say, result.get());
@@ -437,9 +445,11 @@ Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_i
   constexpr double kUneven = 1.5;
   result->uneven =
       std::max(train_floors / result->base->held_out_floors, result->base->held_out_floors / train_floors) > kUneven;
-  if (result->uneven && stop_if_uneven) return result;
-  searcher.Find();
   return result;
+}
+
+void FindEffects(const Workbench& bench, const std::vector<Hint>& hints, const Say& say, SearchResult* result) {
+  Searcher(bench, say, result).Find(hints);
 }
 
 }  // namespace gapscope

@@ -3,7 +3,10 @@
 #ifndef GAPSCOPE_DIAGNOSE_SEARCH_H_
 #define GAPSCOPE_DIAGNOSE_SEARCH_H_
 
+#include <map>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "src/diagnose/columns.h"
 #include "src/diagnose/diagnosis.h"
@@ -39,9 +42,16 @@ double Gain(const Candidate& without, const Candidate& with);
 // The cost above which a set is so far behind the chosen one that it matters little how far.
 double FarBehind(const Candidate& chosen);
 
-// `stop_if_uneven`: ends after the base model's refit when the split is a poor one. Errors: the base model cannot be
-// simulated along the logs.
-Result<std::unique_ptr<SearchResult>> Search(const Workbench& bench, bool stop_if_uneven, const Say& say);
+// The base model, refitted; nothing is searched yet. Errors: it cannot be simulated along the logs.
+Result<std::unique_ptr<SearchResult>> FitBase(const Workbench& bench, const Say& say);
+
+// A set of effects, and values of its parameters, that a search elsewhere ended at.
+struct Hint {
+  EffectSet effects;
+  std::map<std::string, double> values;
+};
+// Finds effects from there on; each hint is one more set that may lead.
+void FindEffects(const Workbench& bench, const std::vector<Hint>& hints, const Say& say, SearchResult* result);
 
 }  // namespace gapscope
 

@@ -194,6 +194,10 @@ ordered_json Json(const NextExperiment& next) {
 ordered_json JsonSearchPolicy() {
   constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
   return {{"search.widenings", policy.search.widenings},
+          {"search.lost", policy.search.lost},
+          {"search.least_window_s", policy.search.least_window_s},
+          {"search.short_share", policy.search.short_share},
+          {"search.least_samples", policy.search.least_samples},
           {"search.beam", policy.search.beam},
           {"search.singles", policy.search.singles},
           {"search.pairs", policy.search.pairs},

@@ -115,6 +115,7 @@ std::vector<Moved> Compared(const Model& model, const std::vector<LogFindings>& 
     const std::size_t first = series.size();
     for (const auto& log : now) add(log);
     if (first == 0 || first == series.size()) continue;
+    if (series.size() == 2 && !(series[0].error > 0 && series[1].error > 0)) continue;
     all.push_back({model.parameters()[p].name, model.parameters()[p].unit, StepAt(series, first)});
   }
   for (Moved& one : all) one.step.chance = std::min(1.0, one.step.chance * static_cast<double>(all.size()));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "src/core/statistics.h"
+
 namespace gapscope {
 namespace {
 
@@ -118,12 +120,19 @@ ChangePoint StepAt(std::span<const SeriesValue> series, std::size_t first) {
   double stated = 0;
   for (const SeriesValue& one : series) stated += one.error * one.error / static_cast<double>(series.size());
   const double seen = (SquaresAboutPlainMean(before) + SquaresAboutPlainMean(after)) / static_cast<double>(freedom);
-  // At least half of what is seen, or a few estimates that state small errors would make up a mean whose days vary by
-  // more: of 30 days with as much from day to day as stated, 4 in 100 stable robots were called.
-  const double between = std::max({seen - stated, seen / 2, LeastVariance(series)});
+  // A day that states a small error weighs at most twice a middling one: what days really differ by need not go with
+  // what they state. (Of 30 days with as much again from day to day, 4 in 100 stable robots were called without this.)
+  std::vector<double> variances;
+  for (const SeriesValue& one : series) variances.push_back(one.error * one.error);
+  const double between =
+      freedom == kNormal ? 0 : std::max({seen - stated, seen / 2, Median(variances), LeastVariance(series)});
   const Part a = WeightedMean(before, between), b = WeightedMean(after, between);
   const double left = SquaresAbout(before, a.mean, between) + SquaresAbout(after, b.mean, between);
-  const double scale = std::max(1.0, left / static_cast<double>(freedom));
+  // What is common to all days is in their intervals too, and makes no step: of fits to short logs days differ by a
+  // fifth of what each states. Less than that is estimates that stick, at a bound say, not days that are alike.
+  constexpr double kLeastShare = 0.2;
+  const double least = freedom == kNormal ? 1 : kLeastShare * kLeastShare;
+  const double scale = std::max(least, left / static_cast<double>(freedom));
   const double t = (b.mean - a.mean) / std::sqrt(scale * (1 / a.weight + 1 / b.weight));
   return {.first = first, .before = a.mean, .after = b.mean, .chance = StudentTails(t, freedom)};
 }

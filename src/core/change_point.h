@@ -22,15 +22,15 @@ struct ChangePoint {
 // Shorter series have no change, and no part of one is shorter than that.
 inline constexpr std::size_t kLeastSeries = 6, kLeastPart = 2;
 
-// A variance is what the estimates state and what they differ by from day to day within the two parts, so that a series
-// that varies by more than its intervals say is not called changed. Looked for are a step, and a stretch that goes
-// there and back; the chance of the largest counts each place that it could be at (Bonferroni). Where there is a
-// change, its parts are searched again. A stable series of independent normal errors is called changed with a
-// probability of at most `chance`. In order.
+// The variance is what the estimates of one part differ by among themselves, those that state small errors weighing
+// more: a series that varies by more than its intervals say is not called changed, and one whose intervals are too wide
+// is, down to a fifth of them. Looked for are a step, and a stretch that goes there and back; the chance of the largest
+// counts each place that it could be at (Bonferroni). Where there is a change, its parts are searched again. A stable
+// series of independent normal errors is called changed with a probability of at most `chance`. In order.
 std::vector<ChangePoint> FindChanges(std::span<const SeriesValue> series, double chance);
 
 // The step between the estimates before `first` and those from there on, at least one on each side, its chance that of
-// this place alone. Of two estimates the variance is what they state.
+// this place alone. Of two estimates the variance is what they state, and they must state one.
 ChangePoint StepAt(std::span<const SeriesValue> series, std::size_t first);
 
 // That Student's t with `freedom` degrees of freedom, 1 or more, lies further from zero than `t` on either side.

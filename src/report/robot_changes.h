@@ -17,7 +17,7 @@ struct RobotChange {
   double chance = 0;             // that a stable robot shows such a step in any of its numbers: at most this
 };
 
-// A stable robot is called changed in at most this share of cases, over all its numbers.
+// A stable robot is called changed in at most about this share of cases, over all its numbers.
 inline constexpr double kFalseChange = 0.01;
 
 // `units`: of one robot, in time. The surest first.

@@ -163,7 +163,7 @@ class Merger {
     const ordered_json& json = file.value();
     if (json.contains("error")) {
       totals_.failed.push_back(json);
-      return UnitResult{.state = "failed", .error = json["error"].dump()};
+      return UnitResult{.state = "failed", .error = json.value("error", "")};
     }
     const ordered_json result = json.value("result", ordered_json::object());
     GS_ASSIGN(UnitResult known, ReadUnitResult(result, path));

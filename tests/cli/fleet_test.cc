@@ -63,6 +63,22 @@ TEST_F(FleetTest, RobotsAndDaysComeOutOfPathsAndAFailedUnitIsListed) {
   EXPECT_NE(ReadAll(Work() + "/results/" + one + ".json").find("has changed since the plan"), std::string::npos);
 }
 
+// The same without a file: a unit a log.
+TEST_F(FleetTest, LogsWithoutAFleetAreTunedOneByOne) {
+  ASSERT_EQ(Run("plan " + Joint() + " '" + Log("a", "2") + "' '" + Log("b", "10") + "' --out '" + Work() + "'").status,
+            0);
+  EXPECT_EQ(Run("run --shard 2/2 '" + Work() + "'").status, 0);
+  EXPECT_EQ(Run("merge '" + Work() + "'").status, 1);
+  const auto json = Json("merged.json");
+  EXPECT_EQ(json["schema"], "gapscope.merge/1");
+  EXPECT_EQ(json["logs"].size(), 1u);
+  EXPECT_EQ(json["logs"][0]["log"], Log("b", "10"));
+  EXPECT_EQ(json["missing"], nlohmann::json{Log("a", "2")});
+  EXPECT_EQ(json["parameters"][0]["logs"], 1);
+  EXPECT_FALSE(std::filesystem::exists(Work() + "/fleet.html"));
+  ExpectRefused("plan " + Joint() + " nowhere.csv --out '" + Work() + "'", {"nowhere.csv"});
+}
+
 TEST_F(FleetTest, AFleetFileThatCannotBeMeantIsRefused) {
   const std::string out = " --out '" + Work() + "'";
   ExpectRefused("fleet plan " + Fleet("logs/{robot}/{day}.txt") + out, {"no log fits", "{day}.txt"});

@@ -78,7 +78,7 @@ function drawMap() {
     ? `${FLEET.times[0]} to ${FLEET.times[FLEET.times.length - 1]}` : "";
   const head = element("thead", {}, element("tr", {}, element("th", {scope: "col"}, "robot"),
                                             element("th", {scope: "col"}, `${FLEET.time}: ${ends}`)));
-  byId("map-area").replaceChildren(element("table", {class: "map"}, head, body));
+  byId("map-area").replaceChildren(element("table", {class: "map", "aria-label": "Robots and time"}, head, body));
   const more = byId("more-robots");
   more.hidden = rows >= FLEET.robots.length;
   more.textContent = `Show all ${FLEET.robots.length}`;
@@ -174,8 +174,7 @@ function begin() {
   byId("pick").addEventListener("change", (event) => pick(Number(event.target.value), false));
   byId("more-robots").addEventListener("click", () => { rows = robots.length; drawMap(); });
   byId("theme").addEventListener("click", () => {
-    const dark = document.documentElement.dataset.theme !== "dark";
-    setTheme(dark);
+    setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
     drawMap();
   });
   byId("failed").hidden = failed.length === 0;
@@ -188,10 +187,10 @@ function begin() {
   if (robots.length) pick(0, false);
 }
 
-function setTheme(dark) {
-  document.documentElement.dataset.theme = dark ? "dark" : "light";
-  byId("theme").textContent = dark ? "Light" : "Dark";
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  byId("theme").textContent = theme === "dark" ? "Light" : "Dark";
 }
 
-setTheme(matchMedia("(prefers-color-scheme: dark)").matches);
+setTheme(matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
 begin();

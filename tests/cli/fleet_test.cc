@@ -74,7 +74,7 @@ TEST_F(FleetTest, LogsWithoutAFleetAreTunedOneByOne) {
   EXPECT_EQ(json["logs"].size(), 1u);
   EXPECT_EQ(json["logs"][0]["log"], Log("b", "10"));
   EXPECT_EQ(json["missing"], nlohmann::json{Log("a", "2")});
-  EXPECT_EQ(json["parameters"][0]["logs"], 1);
+  EXPECT_EQ(json["parameters"][0]["name"], "motor.kp");
   EXPECT_FALSE(std::filesystem::exists(Work() + "/fleet.html"));
   ExpectRefused("plan " + Joint() + " nowhere.csv --out '" + Work() + "'", {"nowhere.csv"});
 }

@@ -74,7 +74,7 @@ void MatchBelow(const fs::path& folder, fs::path::iterator part, const fs::path:
 Result<std::vector<PlanUnit>> UnitsOf(const std::string& file, const std::vector<std::string>& patterns, Plan* plan) {
   std::map<std::vector<std::string>, std::set<std::string>> groups;
   for (const auto& pattern : patterns) {
-    GS_ASSIGN(std::vector<std::string> columns, ColumnsOf(pattern));
+    GS_ASSIGN(std::vector<std::string> columns, PatternColumns(pattern));
     std::sort(columns.begin(), columns.end());
     std::vector<std::string> expected = plan->columns;
     std::sort(expected.begin(), expected.end());
@@ -101,6 +101,21 @@ Result<std::vector<PlanUnit>> UnitsOf(const std::string& file, const std::vector
                      .group = plan->columns.empty() ? std::vector<std::string>{} : group,
                      .logs = {logs.begin(), logs.end()}});
   return units;
+}
+
+// The tables of a merge have these of their own.
+Status CheckColumns(const std::string& file, const std::vector<std::string>& columns) {
+  static const std::set<std::string> kTaken = {"task", "log",       "state",   "error",  "verdict",   "probability",
+                                               "left", "gap",       "nominal", "report", "statement", "answer",
+                                               "unit", "parameter", "value",   "low",    "high"};
+  for (const auto& column : columns) {
+    if (kTaken.contains(column))
+      return Error{.what = "a column's name that the tables of merge have already",
+                   .where = file,
+                   .actual = "{" + column + "}",
+                   .cure = "call it otherwise in the pattern"};
+  }
+  return Ok();
 }
 
 // The column of time last: it is what goes along a robot's units.
@@ -151,7 +166,7 @@ bool TextBefore(const std::string& a, const std::string& b) {
   return a_number && x != y ? x < y : a < b;
 }
 
-Result<std::vector<std::string>> ColumnsOf(const std::string& pattern) {
+Result<std::vector<std::string>> PatternColumns(const std::string& pattern) {
   std::vector<std::string> columns;
   for (std::size_t at = pattern.find('{'); at != std::string::npos; at = pattern.find('{', at + 1)) {
     const std::size_t end = pattern.find_first_of("}/", at);
@@ -195,7 +210,8 @@ Result<Plan> LoadFleet(const std::string& path) {
   plan.time = map.Text("time", "");
   GS_RETURN_IF_ERROR(map.Finish());
   if (patterns.empty()) return Error{.what = "no logs", .where = path, .allowed = "logs: PATTERN, or a list of them"};
-  GS_ASSIGN(plan.columns, ColumnsOf(patterns.front()));
+  GS_ASSIGN(plan.columns, PatternColumns(patterns.front()));
+  GS_RETURN_IF_ERROR(CheckColumns(path, plan.columns));
   if (plan.time.empty() && !plan.columns.empty()) plan.time = plan.columns.back();
   if (!plan.time.empty() && std::find(plan.columns.begin(), plan.columns.end(), plan.time) == plan.columns.end())
     return Error{.what = "the time is not a column",

@@ -25,7 +25,7 @@ struct MatchedLog {
 // twice is the same text twice. In the order of their paths; of folders that cannot be read nothing.
 std::vector<MatchedLog> MatchLogs(const std::string& pattern, const std::vector<std::string>& columns);
 // The names of a pattern, each once. Error: a brace that does not close, or a name that is not letters, digits and _.
-Result<std::vector<std::string>> ColumnsOf(const std::string& pattern);
+Result<std::vector<std::string>> PatternColumns(const std::string& pattern);
 
 // Numbers by their value, other texts by letters.
 bool TextBefore(const std::string& a, const std::string& b);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/core/collect.h"
 #include "src/report/html_assets.h"
 #include "src/report/version.h"
 
@@ -114,8 +115,7 @@ void FleetPage::AddRobot(const std::string& name, std::span<const UnitResult> un
 }
 
 std::string FleetPage::Html(const std::vector<std::string>& times) const {
-  std::vector<const Robot*> order;
-  for (const Robot& robot : robots_) order.push_back(&robot);
+  std::vector<const Robot*> order = Collect(robots_, [](const Robot& robot) { return &robot; });
   std::stable_sort(order.begin(), order.end(), [](const Robot* a, const Robot* b) {
     return a->chance != b->chance ? a->chance < b->chance : a->error > b->error;
   });

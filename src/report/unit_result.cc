@@ -42,7 +42,7 @@ UnitResult DiagnosedFrom(const ordered_json& json) {
     const std::string name = s.at("name").get<std::string>() + "@" + s.at("on").get<std::string>();
     unit.statements.push_back({name, s.at("answer"), NumberFrom(s.at("probability"))});
     for (const auto& [key, size] : s.at("parameters").items())
-      unit.sizes.push_back({.name = name + "." + key,
+      unit.sizes.push_back({.name = std::string(name).append(".").append(key),
                             .value = NumberFrom(size.at("value")),
                             .low = NumberFrom(size.at("low")),
                             .high = NumberFrom(size.at("high"))});

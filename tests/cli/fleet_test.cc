@@ -85,6 +85,7 @@ TEST_F(FleetTest, AFleetFileThatCannotBeMeantIsRefused) {
   ExpectRefused("fleet plan " + Fleet("logs/{robot/{day}.csv") + out, {"not a column's name", "{robot"});
   ExpectRefused("fleet plan " + Fleet("logs/{robot}/{day}.csv", "time: week") + out, {"not a column", "robot, day"});
   ExpectRefused("fleet plan " + Fleet("logs/{robot}/{day}.csv", "tim: day") + out, {"tim", "time"});
+  ExpectRefused("fleet plan " + Fleet("logs/{robot}/{log}.csv") + out, {"{log}", "call it otherwise"});
   ASSERT_EQ(Run("fleet plan " + Fleet() + out).status, 0);
   ExpectRefused("fleet run --unit 0123 '" + Work() + "'", {"no such unit", "0123"});
   ExpectRefused("fleet run '" + Work() + "'", {"--shard"});

@@ -46,7 +46,9 @@ std::vector<Command> AllCommands() {
           WithPlugins(RenderCommand()),
           WithPlugins(PlanCommand()),
           WithPlugins(RunCommand()),
-          MergeCommand()};
+          MergeCommand(),
+          WithPlugins(FleetCommand()),
+          WithPlugins(MonitorCommand())};
 }
 
 }  // namespace gapscope::cli

@@ -39,6 +39,8 @@ Command ExportCommand();
 Command PlanCommand();  // plan, run and merge: many logs, shared out
 Command RunCommand();
 Command MergeCommand();
+Command FleetCommand();  // the same, of robots and days
+Command MonitorCommand();
 
 std::vector<Command> AllCommands();
 

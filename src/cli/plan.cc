@@ -1,17 +1,12 @@
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <filesystem>
 
 #include "src/cli/commands.h"
 #include "src/cli/plan_file.h"
 #include "src/core/collect.h"
-#include "src/core/file.h"
 
 namespace gapscope::cli {
 namespace {
-
-using nlohmann::ordered_json;
 
 struct PlanFlags {
   CommonFlags common;
@@ -20,47 +15,26 @@ struct PlanFlags {
 };
 
 Result<int> RunPlan(const PlanFlags& flags) {
-  if (flags.common.out.empty())
-    return Error{.what = "no folder for the plan", .where = "--out", .cure = "name one; all shards must reach it"};
   const auto absolute = [](const std::string& path) {
     return std::filesystem::absolute(path).lexically_normal().string();
   };
-  ModelFlags model = flags.model;
-  model.experiment = absolute(model.experiment);
-  for (auto& path : model.params) path = absolute(path);
+  const ModelFlags& model = flags.model;
   std::vector<std::string> logs = Collect(model.logs, absolute);
   std::sort(logs.begin(), logs.end());
   logs.erase(std::unique(logs.begin(), logs.end()), logs.end());
-  ordered_json plan = {{"schema", kPlanSchema},
-                       {"experiment", model.experiment},
-                       {"shards", flags.shards},
-                       {"options",
-                        {{"with", model.with},
-                         {"set", model.set},
-                         {"params", model.params},
-                         {"while", model.while_column},
-                         {"starts", flags.starts},
-                         {"seed", flags.common.seed}}},
-                       {"tasks", ordered_json::array()}};
-  const std::string options = plan.at("options").dump();
-  for (const auto& log : logs) {
-    model.logs = {log};
-    GS_ASSIGN(const Session session, LoadSession(model, flags.common));
-    const std::uint64_t hash = TaskHash(session, session.recordings.front(), options);
-    plan["tasks"].push_back({{"log", log}, {"task", Hex(hash)}});
-  }
-  const std::filesystem::path out = flags.common.out;
-  std::error_code failure;
-  std::filesystem::create_directories(out / "results", failure);
-  if (failure)
-    return Error{.what = "cannot make the folder", .where = (out / "results").string(), .actual = failure.message()};
-  GS_RETURN_IF_ERROR(WriteFile(out / "plan.json", plan.dump(2) + "\n"));
-  if (flags.common.json) {
-    fmt::print("{}\n", plan.dump(2));
-  } else {
-    fmt::print("{} logs in {} shards: gapscope run --shard i/{} {} for i = 1..{}, then gapscope merge {}\n",
-               logs.size(), flags.shards, flags.shards, out.string(), flags.shards, out.string());
-  }
+  Plan plan{.experiment = absolute(model.experiment),
+            .options = {{"with", model.with},
+                        {"set", model.set},
+                        {"params", Collect(model.params, absolute)},
+                        {"while", model.while_column},
+                        {"starts", flags.starts},
+                        {"seed", flags.common.seed}},
+            .shards = flags.shards,
+            .columns = {},
+            .time = {},
+            .units = {}};
+  for (const auto& log : logs) plan.units.push_back({.id = {}, .group = {}, .logs = {log}});
+  GS_RETURN_IF_ERROR(WritePlan(std::move(plan), flags.common, false));
   return kDone;
 }
 

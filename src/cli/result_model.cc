@@ -25,7 +25,8 @@ Status CheckSchema(const nlohmann::ordered_json& json, const std::string& where)
                .allowed = "a result of diagnose, tune or replay: " + Join(schemas)};
 }
 
-// What is given, else what the result names itself.
+}  // namespace
+
 Result<Experiment> ExperimentOf(const ResultSource& source, const RunModel& held) {
   if (!source.experiment.empty()) return LoadExperiment(source.experiment);
   constexpr char kCure[] = "give it: --experiment FILE";
@@ -40,8 +41,6 @@ Result<Experiment> ExperimentOf(const ResultSource& source, const RunModel& held
   }
   return LoadExperiment(held.experiment);
 }
-
-}  // namespace
 
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales) {
   GS_ASSIGN(const auto json, ReadJson(path));

@@ -20,6 +20,8 @@ struct ResultSource {
   std::string experiment;    // empty: the one that the result names
   std::string while_column;  // over the experiment's own
 };
+// What is given, else what the result `held` names itself. Errors: it is not there, or none is named.
+Result<Experiment> ExperimentOf(const ResultSource& source, const RunModel& held);
 // `json`: what source.path holds. Errors: not a result of diagnose, tune or replay; its experiment is not there; as
 // Rig::Load and BuildRunModel.
 Result<ResultModel> LoadWholeResult(const nlohmann::ordered_json& json, const ResultSource& source);

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "src/cli/commands.h"
+#include "src/cli/diagnose_job.h"
 #include "src/cli/plan_file.h"
 #include "src/core/file.h"
 #include "src/report/read_run.h"
@@ -14,68 +15,112 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ModelFlags ModelOf(const ordered_json& plan, const std::string& log) {
-  const auto& options = plan.at("options");
-  return {.experiment = plan.at("experiment"),
-          .logs = {log},
-          .with = options.at("with"),
-          .set = options.at("set"),
-          .params = options.at("params"),
-          .while_column = options.at("while")};
-}
-
-// One log's fit.
-Result<TuneRun> DoTask(const ordered_json& plan, const std::string& log, const std::string& task,
-                       const CommonFlags& common) {
-  GS_ASSIGN(Session session, LoadSession(ModelOf(plan, log), common));
-  if (Hex(TaskHash(session, session.recordings.front(), plan.at("options").dump())) != task)
-    return Error{.what = "the log, the experiment or the program has changed since the plan",
-                 .where = log,
-                 .cure = "write the plan again"};
-  TuneOptions options{.window_s = session.experiment.replay.window_s, .starts = plan.at("options").at("starts")};
-  options.solve.seed = plan.at("options").at("seed");
+// The fit of a unit's logs. Nothing in it depends on when, where or how fast it was made.
+Result<ordered_json> TuneUnit(const Plan& plan, Session session) {
+  TuneOptions options{.window_s = session.experiment.replay.window_s, .starts = plan.options.at("starts")};
+  options.solve.seed = plan.options.at("seed");
   if (session.experiment.replay.mode == ReplayMode::kWindows) options.objective = ObjectiveKind::kWindows;
   GS_ASSIGN(const TuneSummary tuned,
             Tune(*session.model, SplitData(std::move(session.recordings), {}), session.values, options, *session.pool));
-  return TuneRunOf(tuned, *session.model, options.solve.seed);
+  return ToJson(TuneRunOf(tuned, *session.model, options.solve.seed), Timing::kLeaveOut);
 }
 
-Result<int> RunShard(const PlanFolderFlags& flags) {
-  int shard = 0, shards = 0, end = 0;
-  if (std::sscanf(flags.shard.c_str(), "%d/%d%n", &shard, &shards, &end) != 2 ||
-      end != static_cast<int>(flags.shard.size()) || shard < 1 || shard > shards) {
-    return Error{.what = "not a shard",
-                 .where = "--shard",
-                 .actual = "'" + flags.shard + "'",
-                 .allowed = "i/N with 1 <= i <= N"};
+// Empty: it was interrupted.
+Result<ordered_json> DiagnoseUnit(const Plan& plan, const PlanUnit& unit, const PlanFolderFlags& flags) {
+  DiagnoseFlags diagnose{.common = flags.common,
+                         .model = ModelOf(plan, unit),
+                         .effort = *ValueOf<SearchEffort>(plan.options.at("effort").get<std::string>()),
+                         .no_next_experiment = true};
+  diagnose.common.seed = plan.options.at("seed");
+  diagnose.common.out = plan.reports ? ReportFolder(flags.folder, unit).string() : "";
+  GS_ASSIGN(const DiagnoseRun run, DiagnoseLogs(diagnose));
+  return run.diagnosis.interrupted ? ordered_json() : ToJson(run, Timing::kLeaveOut);
+}
+
+Result<ordered_json> DoUnit(const Plan& plan, const PlanUnit& unit, const PlanFolderFlags& flags) {
+  GS_ASSIGN(Session session, LoadSession(ModelOf(plan, unit), flags.common));
+  if (UnitId(plan, session) != unit.id)
+    return Error{.what = "the log, the experiment or the program has changed since the plan",
+                 .where = unit.logs.front(),
+                 .cure = "write the plan again"};
+  if (plan.what == "tune") return TuneUnit(plan, std::move(session));
+  return DiagnoseUnit(plan, unit, flags);
+}
+
+// A bug that one unit meets does not stop the others.
+Result<ordered_json> TryUnit(const Plan& plan, const PlanUnit& unit, const PlanFolderFlags& flags) {
+  try {
+    return DoUnit(plan, unit, flags);
+  } catch (const std::exception& e) {
+    return Error{.what = "internal error", .where = unit.logs.front(), .actual = e.what()};
   }
-  GS_ASSIGN(const ordered_json plan, ReadPlan(flags.folder));
-  const std::filesystem::path results = std::filesystem::path(flags.folder) / "results";
+}
+
+// A failure is tried again: what was missing may be there now.
+bool IsDone(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) return false;
+  const auto before = ReadJson(path);
+  return before.ok() && before.value().contains("result");
+}
+
+// The units that are asked for.
+Result<std::vector<const PlanUnit*>> Chosen(const Plan& plan, const PlanFolderFlags& flags) {
+  if (flags.unit.empty() == flags.shard.empty())
+    return Error{.what = "which units?", .where = "the command line", .allowed = "--shard i/N, or --unit ID"};
+  std::vector<const PlanUnit*> chosen;
+  if (!flags.unit.empty()) {
+    for (const auto& unit : plan.units) {
+      if (unit.id == flags.unit) return std::vector<const PlanUnit*>{&unit};
+    }
+    return Error{.what = "no such unit",
+                 .where = "--unit",
+                 .actual = "'" + flags.unit + "'",
+                 .allowed = fmt::format("a 'task' of the {} in {}/plan.json", plan.units.size(), flags.folder)};
+  }
+  int shard = 0, shards = 0;
+  std::sscanf(flags.shard.c_str(), "%d/%d", &shard, &shards);
+  for (std::size_t i = static_cast<std::size_t>(shard) - 1; i < plan.units.size();
+       i += static_cast<std::size_t>(shards))
+    chosen.push_back(&plan.units[i]);
+  return chosen;
+}
+
+Status CheckShard(const std::string& text) {
+  int shard = 0, shards = 0, end = 0;
+  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &end) == 2 && end == static_cast<int>(text.size()) &&
+      shard >= 1 && shard <= shards)
+    return Ok();
+  return Error{
+      .what = "not a shard", .where = "--shard", .actual = "'" + text + "'", .allowed = "i/N with 1 <= i <= N"};
+}
+
+Result<int> RunUnits(const PlanFolderFlags& flags) {
+  if (!flags.shard.empty()) GS_RETURN_IF_ERROR(CheckShard(flags.shard));
+  GS_ASSIGN(const Plan plan, ReadPlan(flags.folder));
+  GS_ASSIGN(const auto chosen, Chosen(plan, flags));
   int done = 0, there = 0, failures = 0;
-  const auto& tasks = plan.at("tasks");
-  for (std::size_t i = static_cast<std::size_t>(shard) - 1; i < tasks.size(); i += static_cast<std::size_t>(shards)) {
-    const std::string task = tasks[i].at("task"), log = tasks[i].at("log");
-    const std::filesystem::path path = results / (task + ".json");
-    // A failure is tried again: what was missing may be there now.
-    const auto before = std::filesystem::exists(path) ? ReadJson(path) : Result<ordered_json>(Error{.what = "none"});
-    if (before.ok() && before.value().contains("result")) {
+  for (const PlanUnit* unit : chosen) {
+    const std::filesystem::path path = ResultPath(flags.folder, *unit);
+    if (IsDone(path)) {
       ++there;
       continue;
     }
-    const auto fit = DoTask(plan, log, task, flags.common);
-    // Nothing in it depends on when, where or how fast it was made.
-    ordered_json file = {{"log", log}, {"task", task}};
-    if (fit.ok()) {
-      file["result"] = ToJson(fit.value(), Timing::kLeaveOut);
+    const auto result = TryUnit(plan, *unit, flags);
+    if (result.ok() && result.value().is_null())
+      return Error{.what = "interrupted", .where = unit->logs.front(), .cure = "run it again: what is done stays"};
+    ordered_json file = JsonUnit(plan, *unit);
+    if (result.ok()) {
+      file["result"] = result.value();
     } else {
-      file["error"] = fit.error().Text();
+      file["error"] = result.error().Text();
     }
     GS_RETURN_IF_ERROR(WriteFile(path, file.dump(2) + "\n"));
-    failures += !fit.ok();
+    failures += !result.ok();
     ++done;
-    if (!flags.common.quiet) fmt::print(stderr, "{}: {}\n", log, fit.ok() ? "done" : "failed");
+    if (!flags.common.quiet) fmt::print(stderr, "{}: {}\n", unit->logs.front(), result.ok() ? "done" : "failed");
   }
-  fmt::print(stderr, "shard {}: {} done ({} failed), {} were there\n", flags.shard, done, failures, there);
+  fmt::print(stderr, "{} {}: {} done ({} failed), {} were there\n", flags.unit.empty() ? "shard" : "unit",
+             flags.unit.empty() ? flags.shard : flags.unit, done, failures, there);
   return failures > 0 ? kBelowThreshold : kDone;
 }
 
@@ -83,15 +128,21 @@ Result<int> RunShard(const PlanFolderFlags& flags) {
 
 Command RunCommand() {
   auto flags = std::make_shared<PlanFolderFlags>();
-  const Option shard = {.flag = "--shard",
-                        .value = &flags->shard,
-                        .required = true,
-                        .help = "i/N with 1 <= i <= N: every N-th log from the i-th on"};
+  const std::vector<Option> which = {
+      {.flag = "--shard",
+       .value = &flags->shard,
+       .unset = "--unit says which",
+       .help = "i/N with 1 <= i <= N: every N-th unit from the i-th on",
+       .more = "A unit is a log of `gapscope plan`, or a group of logs of `gapscope fleet plan`"},
+      {.flag = "--unit",
+       .value = &flags->unit,
+       .unset = "--shard says which",
+       .help = "One unit: a 'task' of plan.json"}};
   return {.name = "run",
-          .what = "Do one shard of a plan; what is done already is left alone",
-          .options = Join({{PlanFolderOption(*flags), shard}, CommonOptions(flags->common)}),
+          .what = "Do one shard of a plan, or one unit; what is done already is left alone",
+          .options = Join({{PlanFolderOption(*flags)}, which, CommonOptions(flags->common)}),
           .example = "gapscope run --shard 1/8 work",
-          .run = [flags] { return RunShard(*flags); }};
+          .run = [flags] { return RunUnits(*flags); }};
 }
 
 }  // namespace gapscope::cli

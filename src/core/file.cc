@@ -104,4 +104,32 @@ Status WriteFile(const std::string& path, std::string_view bytes) {
   return Ok();
 }
 
+PartWriter::PartWriter(std::string path, std::string temporary, FILE* file)
+    : path_(std::move(path)), temporary_(std::move(temporary)), file_(file, &std::fclose) {}
+
+Result<PartWriter> PartWriter::Open(const std::string& path) {
+  GS_ASSIGN(std::string temporary, TemporaryBeside(path));
+  FILE* file = std::fopen(temporary.c_str(), "we");
+  if (file) return PartWriter(path, std::move(temporary), file);
+  const Error error = SystemError("cannot write the file", path);
+  unlink(temporary.c_str());
+  return error;
+}
+
+PartWriter::~PartWriter() {
+  if (file_) unlink(temporary_.c_str());
+}
+
+void PartWriter::Write(std::string_view bytes) {
+  failed_ = failed_ || std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size();
+}
+
+Status PartWriter::Finish() {
+  const bool written = std::fclose(file_.release()) == 0 && !failed_;
+  if (written && rename(temporary_.c_str(), path_.c_str()) == 0) return Ok();
+  const Error error = SystemError("cannot write the file", path_);
+  unlink(temporary_.c_str());
+  return error;
+}
+
 }  // namespace gapscope

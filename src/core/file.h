@@ -2,6 +2,8 @@
 #ifndef GAPSCOPE_CORE_FILE_H_
 #define GAPSCOPE_CORE_FILE_H_
 
+#include <cstdio>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -18,6 +20,27 @@ Result<std::string> TemporaryBeside(const std::string& path);
 // Writes `path` atomically (temporary name in the same folder, then rename), making its folders.
 // Errors: cannot create, write (disk full) or rename; the old file stays.
 Status WriteFile(const std::string& path, std::string_view bytes);
+
+// A long file, written a part at a time under a temporary name. Without Finish() nothing is left of it.
+class PartWriter {
+ public:
+  // Errors: cannot create.
+  static Result<PartWriter> Open(const std::string& path);
+  ~PartWriter();
+  PartWriter(PartWriter&& other) = default;
+  PartWriter& operator=(PartWriter&& other) = delete;
+
+  void Write(std::string_view bytes);
+  // Gives it its name. Errors: some part could not be written (disk full), cannot rename; the old file stays.
+  Status Finish();
+
+ private:
+  PartWriter(std::string path, std::string temporary, FILE* file);
+
+  std::string path_, temporary_;
+  std::unique_ptr<FILE, int (*)(FILE*)> file_;
+  bool failed_ = false;
+};
 
 }  // namespace gapscope
 

@@ -9,6 +9,9 @@ extern const char* const kStyle;
 extern const char* const kScript;
 extern const char* const kDygraphs;  // with its synchronizer; MIT licence
 extern const char* const kDygraphsStyle;
+extern const char* const kFleetPage;
+extern const char* const kFleetStyle;  // beside kStyle
+extern const char* const kFleetScript;
 extern const char* const kGlossary;  // docs/glossary.md
 
 }  // namespace gapscope::assets

@@ -27,7 +27,7 @@ Schema: typing.TypeAlias = dict[str, Any]
 FILES = {path.name: path for path in sorted((ROOT / "schemas").iterdir())}
 COMMON = "common.schema.json"
 PLUGINS = {path.name for path in (ROOT / "src" / "plugins").iterdir()}  # gapscope.motor and so on are not results
-NOT_DESCRIBED = {"experiment", "log", "plan", "merge"}  # docs/experiment.md; files between commands of one version
+NOT_DESCRIBED = {"experiment", "log", "plan", "merge", "fleet"}  # docs/; files between commands of one version
 
 
 def read(name: str) -> Schema:
@@ -109,6 +109,7 @@ def test_what_a_result_becomes(experiment: str, short: str, tmp_path: Path) -> N
     freeze = [word for name in ("motor.resistance", "motor.km", "arm.mass") for word in ("--freeze", name)]
     check(ask("tune", experiment, short, *freeze, "--starts", "1", "--out", out), "tune")
     check(json.loads((tmp_path / "out" / "result.json").read_text()), "tune")
+    check(ask("monitor", out, short), "monitor")
     native = tmp_path / "native"
     check(ask("export", out, "--to", "mujoco_native", "--draws", "5", "--out", str(native)), "fidelity")
     check(json.loads((native / "fidelity.json").read_text()), "fidelity")

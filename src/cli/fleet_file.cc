@@ -1,0 +1,227 @@
+#include "src/cli/fleet_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "src/core/collect.h"
+#include "src/core/names.h"
+#include "src/diagnose/diagnosis.h"
+#include "src/experiment/yaml_reader.h"
+
+namespace gapscope::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool IsWild(const std::string& part) { return part.find_first_of("*?{") != std::string::npos; }
+
+// One part of a path as a regular expression; the names of its groups are added.
+std::regex PartExpression(const std::string& part, std::vector<std::string>* names) {
+  std::string text;
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const char c = part[i];
+    if (c == '{') {
+      const std::size_t end = part.find('}', i);
+      names->push_back(part.substr(i + 1, end - i - 1));
+      text += "(.+?)";
+      i = end;
+    } else if (c == '*') {
+      text += ".*";
+    } else if (c == '?') {
+      text += '.';
+    } else {
+      if (!std::isalnum(static_cast<unsigned char>(c)) && static_cast<unsigned char>(c) < 128) text += '\\';
+      text += c;
+    }
+  }
+  return std::regex(text);
+}
+
+using Texts = std::map<std::string, std::string>;
+
+void MatchBelow(const fs::path& folder, fs::path::iterator part, const fs::path::iterator& end, const Texts& texts,
+                std::vector<std::pair<std::string, Texts>>* found) {
+  std::error_code failure;
+  if (part == end) {
+    if (fs::is_regular_file(folder, failure)) found->emplace_back(folder.lexically_normal().string(), texts);
+    return;
+  }
+  const std::string pattern = part->string();
+  const auto next = std::next(part);
+  if (!IsWild(pattern)) return MatchBelow(folder / pattern, next, end, texts, found);
+  std::vector<std::string> names;
+  const std::regex expression = PartExpression(pattern, &names);
+  std::vector<std::string> entries;
+  for (fs::directory_iterator entry(folder, failure), last; !failure && entry != last; entry.increment(failure))
+    entries.push_back(entry->path().filename().string());
+  std::sort(entries.begin(), entries.end());
+  for (const auto& entry : entries) {
+    std::smatch match;
+    if (!std::regex_match(entry, match, expression)) continue;
+    Texts known = texts;
+    bool same = true;
+    for (std::size_t i = 0; i < names.size(); ++i)
+      same = same && known.emplace(names[i], match[i + 1].str()).first->second == match[i + 1].str();
+    if (same) MatchBelow(folder / entry, next, end, known, found);
+  }
+}
+
+// The logs of all patterns as units, those of one robot together, in time.
+Result<std::vector<PlanUnit>> UnitsOf(const std::string& file, const std::vector<std::string>& patterns, Plan* plan) {
+  std::map<std::vector<std::string>, std::set<std::string>> groups;
+  for (const auto& pattern : patterns) {
+    GS_ASSIGN(std::vector<std::string> columns, PatternColumns(pattern));
+    std::sort(columns.begin(), columns.end());
+    std::vector<std::string> expected = plan->columns;
+    std::sort(expected.begin(), expected.end());
+    if (columns != expected)
+      return Error{.what = "patterns of different columns",
+                   .where = file,
+                   .actual = pattern,
+                   .allowed = "the columns of the first pattern: " + gapscope::Join(plan->columns)};
+    const auto logs = MatchLogs((fs::path(file).parent_path() / pattern).string(), plan->columns);
+    if (logs.empty())
+      return Error{.what = "no log fits the pattern",
+                   .where = file,
+                   .actual = pattern,
+                   .cure = "patterns are relative to this file; {robot} and * stand for any text between slashes"};
+    for (const auto& log : logs) {
+      // Without columns each log is a unit of its own.
+      const bool alone = log.columns.empty();
+      groups[alone ? std::vector<std::string>{log.path} : log.columns].insert(log.path);
+    }
+  }
+  std::vector<PlanUnit> units;
+  for (const auto& [group, logs] : groups)
+    units.push_back({.id = {},
+                     .group = plan->columns.empty() ? std::vector<std::string>{} : group,
+                     .logs = {logs.begin(), logs.end()}});
+  return units;
+}
+
+// The tables of a merge have these of their own.
+Status CheckColumns(const std::string& file, const std::vector<std::string>& columns) {
+  static const std::set<std::string> kTaken = {"task", "log",       "state",   "error",  "verdict",   "probability",
+                                               "left", "gap",       "nominal", "report", "statement", "answer",
+                                               "unit", "parameter", "value",   "low",    "high"};
+  for (const auto& column : columns) {
+    if (kTaken.contains(column))
+      return Error{.what = "a column's name that the tables of merge have already",
+                   .where = file,
+                   .actual = "{" + column + "}",
+                   .cure = "call it otherwise in the pattern"};
+  }
+  return Ok();
+}
+
+// The column of time last: it is what goes along a robot's units.
+void MoveTimeLast(Plan* plan) {
+  const auto at = std::find(plan->columns.begin(), plan->columns.end(), plan->time);
+  std::rotate(at, at + 1, plan->columns.end());
+}
+
+void SortUnits(std::vector<PlanUnit>* units) {
+  std::stable_sort(units->begin(), units->end(), [](const PlanUnit& a, const PlanUnit& b) {
+    return std::lexicographical_compare(a.group.begin(), a.group.end(), b.group.begin(), b.group.end(), TextBefore);
+  });
+}
+
+Status ReadOptions(YamlMap& map, const fs::path& folder, Plan* plan) {
+  const std::vector<std::string> whats = {"tune", "diagnose"}, efforts = NamesOf<SearchEffort>();
+  plan->what = whats[map.Choice("what", whats, 1)];
+  const auto absolute = [&](const std::string& path) { return (folder / path).lexically_normal().string(); };
+  plan->options = {{"with", map.TextList("with")},
+                   {"set", map.TextList("set")},
+                   {"params", Collect(map.TextList("params"), absolute)},
+                   {"while", map.Text("while", "")}};
+  const double starts = map.Number("starts", 1), seed = map.Number("seed", 0);
+  const std::size_t effort = map.Choice("effort", efforts, 1);
+  const auto whole = [](double x, double low, double high) { return x == std::floor(x) && x >= low && x <= high; };
+  if (!map.failed() && !(whole(starts, 1, 1000) && whole(seed, 0, 1e15)))
+    return Error{.what = "not a whole number in its range",
+                 .where = map.file(),
+                 .actual = whole(starts, 1, 1000) ? "seed" : "starts",
+                 .allowed = "starts: 1 .. 1000; seed: 0 or more"};
+  if (plan->what == "tune") plan->options["starts"] = static_cast<int>(starts);
+  if (plan->what == "diagnose") plan->options["effort"] = efforts[effort];
+  plan->options["seed"] = static_cast<std::uint64_t>(seed);
+  plan->reports = map.Flag("reports", true) && plan->what == "diagnose";
+  return Ok();
+}
+
+}  // namespace
+
+bool TextBefore(const std::string& a, const std::string& b) {
+  double x = 0, y = 0;
+  const auto number = [](const std::string& text, double* value) {
+    const auto parsed = std::from_chars(text.data(), text.data() + text.size(), *value);
+    return parsed.ec == std::errc() && parsed.ptr == text.data() + text.size();
+  };
+  const bool a_number = number(a, &x), b_number = number(b, &y);
+  if (a_number != b_number) return a_number;
+  return a_number && x != y ? x < y : a < b;
+}
+
+Result<std::vector<std::string>> PatternColumns(const std::string& pattern) {
+  std::vector<std::string> columns;
+  for (std::size_t at = pattern.find('{'); at != std::string::npos; at = pattern.find('{', at + 1)) {
+    const std::size_t end = pattern.find_first_of("}/", at);
+    const std::string name = end == std::string::npos ? "" : pattern.substr(at + 1, end - at - 1);
+    const bool good =
+        !name.empty() && pattern[end] == '}' &&
+        std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+    if (!good)
+      return Error{.what = "not a column's name in a pattern",
+                   .where = pattern,
+                   .actual = "'" + pattern.substr(at, end == std::string::npos ? end : end - at + 1) + "'",
+                   .allowed = "{NAME} of letters, digits and _"};
+    if (std::find(columns.begin(), columns.end(), name) == columns.end()) columns.push_back(name);
+  }
+  return columns;
+}
+
+std::vector<MatchedLog> MatchLogs(const std::string& pattern, const std::vector<std::string>& columns) {
+  const fs::path path = fs::absolute(pattern).lexically_normal();
+  std::vector<std::pair<std::string, Texts>> found;
+  const fs::path below = path.relative_path();
+  MatchBelow(path.root_path(), below.begin(), below.end(), {}, &found);
+  std::sort(found.begin(), found.end());
+  return Collect(found, [&](const auto& log) {
+    return MatchedLog{log.first, Collect(columns, [&](const auto& name) { return log.second.at(name); })};
+  });
+}
+
+Result<Plan> LoadFleet(const std::string& path) {
+  GS_ASSIGN(const YAML::Node root, ReadYaml(path));
+  const fs::path folder = fs::absolute(path).parent_path();
+  YamlMap map(root, path, "fleet");
+  map.Choice("schema", {kFleetSchema}, 0);
+  Plan plan{.experiment = (folder / map.Text("experiment")).lexically_normal().string(),
+            .options = {},
+            .columns = {},
+            .time = {},
+            .units = {}};
+  const std::vector<std::string> patterns = map.TextList("logs");
+  GS_RETURN_IF_ERROR(ReadOptions(map, folder, &plan));
+  plan.time = map.Text("time", "");
+  GS_RETURN_IF_ERROR(map.Finish());
+  if (patterns.empty()) return Error{.what = "no logs", .where = path, .allowed = "logs: PATTERN, or a list of them"};
+  GS_ASSIGN(plan.columns, PatternColumns(patterns.front()));
+  GS_RETURN_IF_ERROR(CheckColumns(path, plan.columns));
+  if (plan.time.empty() && !plan.columns.empty()) plan.time = plan.columns.back();
+  if (!plan.time.empty() && std::find(plan.columns.begin(), plan.columns.end(), plan.time) == plan.columns.end())
+    return Error{.what = "the time is not a column",
+                 .where = path,
+                 .actual = "time: " + plan.time,
+                 .allowed = plan.columns.empty() ? "a pattern with {NAME}" : gapscope::Join(plan.columns)};
+  if (!plan.time.empty()) MoveTimeLast(&plan);
+  GS_ASSIGN(plan.units, UnitsOf(fs::absolute(path).string(), patterns, &plan));
+  SortUnits(&plan.units);
+  return plan;
+}
+
+}  // namespace gapscope::cli

@@ -1,0 +1,237 @@
+// New logs against a finished tune or diagnosis: its model on both, log by log, and its parameters fitted to both.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "src/cli/commands.h"
+#include "src/cli/result_model.h"
+#include "src/cli/session.h"
+#include "src/core/change_point.h"
+#include "src/report/json.h"
+#include "src/report/read_diagnosis.h"
+#include "src/report/read_run.h"
+#include "src/report/robot_changes.h"
+
+namespace gapscope::cli {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct MonitorFlags {
+  CommonFlags common;
+  ResultSource source;
+  std::vector<std::string> logs;
+  double fail_above = 0;
+  bool fail_on_change = false;
+};
+
+// What one log says of the result's model.
+struct LogFindings {
+  double error = kNaN;                // of the result's model as it is
+  std::vector<SeriesValue> sizes;     // refitted; a value of NaN: this log does not know it
+  std::vector<std::string> problems;  // why it could not be refitted
+};
+
+struct Moved {
+  std::string name, unit;
+  ChangePoint step;  // its chance is over all parameters
+};
+
+struct MonitorRun {
+  std::vector<std::string> before, now;  // logs
+  double error_before = kNaN, error_now = kNaN;
+  std::vector<Moved> parameters;  // the least likely to be chance first
+  std::vector<std::string> problems;
+
+  double Ratio() const { return error_now / error_before; }
+  bool Changed() const { return !parameters.empty() && parameters.front().step.chance <= kFalseChange; }
+};
+
+// The logs that a result was made of, and of these the ones it was judged by.
+struct ResultLogs {
+  std::vector<std::string> all, held_out;
+};
+
+Result<ResultLogs> LogsOf(const ordered_json& json, const std::string& where) {
+  ResultLogs logs;
+  const auto add = [&](const std::string& path, bool held_out) {
+    if (held_out) logs.held_out.push_back(path);
+    if (std::find(logs.all.begin(), logs.all.end(), path) == logs.all.end()) logs.all.push_back(path);
+  };
+  if (json.value("schema", "") == kTuneSchema) {
+    GS_ASSIGN(const TuneRun run, ReadTuneRun(json, where));
+    for (const auto& log : run.train) add(log.log, false);
+    for (const auto& log : run.held_out) add(log.log, true);
+  } else {
+    GS_ASSIGN(const EarlierDiagnosis earlier, ReadDiagnosis(json, where));
+    for (const auto& log : earlier.train_logs) add(log, false);
+    for (const auto& log : earlier.held_out_logs) add(log, true);
+  }
+  for (const auto& log : logs.all) {
+    std::error_code failure;
+    if (!std::filesystem::exists(log, failure))
+      return Error{.what = "a log of the result is not there: new logs are compared with it",
+                   .where = where,
+                   .actual = log,
+                   .cure = "go to the folder where the result was made, or put the log back"};
+  }
+  return logs;
+}
+
+LogFindings Look(const ResultModel& result, Recording recording, const CommonFlags& common, ThreadPool& pool) {
+  const ReplayDefaults& replay = result.model->rig()->experiment().replay;
+  TuneOptions options{.window_s = replay.window_s, .starts = 1};
+  options.solve.seed = common.seed;
+  if (replay.mode == ReplayMode::kWindows) options.objective = ObjectiveKind::kWindows;
+  LogFindings found{.sizes = std::vector<SeriesValue>(result.model->parameters().size(), {.value = kNaN})};
+  std::vector<Recording> one;
+  one.push_back(std::move(recording));
+  found.error = ReplayError(Evaluate(*result.model, one, {result.values, std::nullopt}, replay.mode, options, pool));
+  const auto tuned = Tune(*result.model, SplitData(std::move(one), {}), result.values, options, pool);
+  if (!tuned.ok()) {
+    found.problems.push_back(tuned.error().Text());
+    return found;
+  }
+  for (const TunedParameter& p : tuned.value().tuned) {
+    if (p.identifiable)
+      found.sizes[static_cast<std::size_t>(p.index)] = {p.value, (p.high - p.low) / (2 * kNormalQuantile)};
+  }
+  return found;
+}
+
+// The parameters that both sides know, each step's chance over all of them.
+std::vector<Moved> Compared(const Model& model, const std::vector<LogFindings>& before,
+                            const std::vector<LogFindings>& now) {
+  std::vector<Moved> all;
+  for (std::size_t p = 0; p < model.parameters().size(); ++p) {
+    std::vector<SeriesValue> series;
+    const auto add = [&](const LogFindings& log) {
+      if (std::isfinite(log.sizes[p].value)) series.push_back(log.sizes[p]);
+    };
+    for (const auto& log : before) add(log);
+    const std::size_t first = series.size();
+    for (const auto& log : now) add(log);
+    if (first == 0 || first == series.size()) continue;
+    if (series.size() == 2 && !(series[0].error > 0 && series[1].error > 0)) continue;
+    all.push_back({model.parameters()[p].name, model.parameters()[p].unit, StepAt(series, first)});
+  }
+  for (Moved& one : all) one.step.chance = std::min(1.0, one.step.chance * static_cast<double>(all.size()));
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Moved& a, const Moved& b) { return a.step.chance < b.step.chance; });
+  return all;
+}
+
+Result<MonitorRun> Monitor(const MonitorFlags& flags) {
+  GS_ASSIGN(const ordered_json json, ReadJson(flags.source.path));
+  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.source.path));
+  GS_ASSIGN(const ResultLogs logs, LogsOf(json, flags.source.path));
+  GS_ASSIGN(Experiment experiment, ExperimentOf(flags.source, held));
+  if (!flags.source.while_column.empty()) experiment.replay.while_column = flags.source.while_column;
+  ThreadPool pool(WorkersOf(flags.common));
+  GS_ASSIGN(std::vector<Recording> old_ones, LoadRecordings(experiment, logs.all, pool));
+  GS_ASSIGN(std::vector<Recording> new_ones, LoadRecordings(experiment, flags.logs, pool));
+  PrintFindings(new_ones, flags.common.quiet);
+  GS_ASSIGN(const std::shared_ptr<const Rig> rig, Rig::Load(experiment));
+  GS_ASSIGN(const auto bare, Model::Build(rig));
+  GS_ASSIGN(const ResultModel result, BuildRunModel(rig, held, flags.source.path, EstimateScales(*bare, old_ones)));
+  MonitorRun run{.before = logs.all, .now = flags.logs};
+  std::vector<LogFindings> before, now;
+  std::vector<double> errors_before, errors_now;
+  for (std::size_t i = 0; i < old_ones.size(); ++i) {
+    before.push_back(Look(result, std::move(old_ones[i]), flags.common, pool));
+    // What was fitted to a log is too good a judge of it.
+    if (std::find(logs.held_out.begin(), logs.held_out.end(), logs.all[i]) != logs.held_out.end())
+      errors_before.push_back(before.back().error);
+  }
+  for (Recording& recording : new_ones) {
+    now.push_back(Look(result, std::move(recording), flags.common, pool));
+    errors_now.push_back(now.back().error);
+    for (const auto& problem : now.back().problems) run.problems.push_back(problem);
+  }
+  run.error_before = Median(errors_before);
+  run.error_now = Median(errors_now);
+  run.parameters = Compared(*result.model, before, now);
+  return run;
+}
+
+ordered_json ToJson(const MonitorRun& run) {
+  ordered_json json = {{"schema", "gapscope.monitor/1"},
+                       {"changed", run.Changed()},
+                       {"error", {{"before", JsonNumber(run.error_before)}, {"now", JsonNumber(run.error_now)}}},
+                       {"parameters", ordered_json::array()},
+                       {"logs", {{"before", run.before}, {"now", run.now}}},
+                       {"problems", run.problems},
+                       {"versions", JsonVersions()}};
+  for (const auto& [name, unit, step] : run.parameters)
+    json["parameters"].push_back({{"name", name},
+                                  {"unit", unit},
+                                  {"before", JsonNumber(step.before)},
+                                  {"now", JsonNumber(step.after)},
+                                  {"chance", JsonNumber(step.chance)}});
+  return json;
+}
+
+std::string ToTable(const MonitorRun& run) {
+  std::string table =
+      fmt::format("error: {:.4g} now, {:.4g} before: {:.3g} times\n", run.error_now, run.error_before, run.Ratio());
+  for (const auto& problem : run.problems) table += "not refitted: " + problem + "\n";
+  if (!run.Changed()) return table + "the same as before: no parameter moved by more than its intervals allow\n";
+  for (const auto& [name, unit, step] : run.parameters) {
+    if (step.chance <= kFalseChange)
+      table += fmt::format("changed: {} from {:.4g} to {:.4g} {} (chance {:.1g})\n", name, step.before, step.after,
+                           unit, step.chance);
+  }
+  return table;
+}
+
+Result<int> RunMonitor(const MonitorFlags& flags) {
+  GS_ASSIGN(const MonitorRun run, Monitor(flags));
+  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  if (flags.fail_above > 0 && !(run.Ratio() <= flags.fail_above)) {
+    if (!flags.common.quiet)
+      fmt::print(stderr, "gapscope: {:.3g} times the error is above --fail-above {:.4g}\n", run.Ratio(),
+                 flags.fail_above);
+    return kBelowThreshold;
+  }
+  return flags.fail_on_change && run.Changed() ? kBelowThreshold : kDone;
+}
+
+}  // namespace
+
+Command MonitorCommand() {
+  auto flags = std::make_shared<MonitorFlags>();
+  const std::vector<Option> own = {
+      {.flag = "result",
+       .value = &flags->source.path,
+       .required = true,
+       .help = "Folder of a finished tune or diagnosis",
+       .more = "Its logs must still be there: new ones are compared with them, log by log"},
+      {.flag = "logs", .value = &flags->logs, .required = true, .help = "New hardware logs"},
+      {.flag = "--experiment",
+       .value = &flags->source.experiment,
+       .unset = "the one that the result names",
+       .help = "Experiment file of the result"},
+      WhileOption(flags->source.while_column),
+      {.flag = "--fail-above",
+       .value = &flags->fail_above,
+       .range = Above(0, 0),
+       .unset = "never",
+       .help = "Exit status 1 where the error is more than this many times the result's on its held-out logs"},
+      {.flag = "--fail-on-change",
+       .value = &flags->fail_on_change,
+       .help = "Exit status 1 where a parameter has changed",
+       .more =
+           fmt::format("Changed: the step between the result's logs and the new ones would be chance, in any of the "
+                       "parameters, in at most {} of 1",
+                       kFalseChange)}};
+  return {.name = "monitor",
+          .what = "A new log against a finished result: the same as before, or which parameter changed",
+          .options = Join({own, CommonOptions(flags->common)}),
+          .example = "gapscope monitor diagnosis today.csv --fail-above 1.5",
+          .run = [flags] { return RunMonitor(*flags); }};
+}
+
+}  // namespace gapscope::cli

@@ -138,6 +138,7 @@ Status WriteTune(const std::string& out, const Session& session, const DataSplit
 }
 
 Result<int> RunTune(const TuneFlags& flags) {
+  StageClock clock(flags.common);
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
   ModelFlags model = flags.model;
   model.logs = logs.all;
@@ -146,13 +147,16 @@ Result<int> RunTune(const TuneFlags& flags) {
   PrintFindings(session.recordings, flags.common.quiet);
   GS_ASSIGN(TuneOptions options, OptionsOf(flags, session));
   const DataSplit data = SplitData(std::move(session.recordings), logs.held_out);
+  clock.Enter("tune");
   const auto tuned = [&] {
-    ProgressLine line(flags.common);
+    ProgressLine line(flags.common, &clock);
     if (line.live()) ShowProgress(flags.budget_s, line, &options);
     options.solve.deadline.stop = CatchInterrupts();
     return Tune(*session.model, data, session.values, options, *session.pool);
   }();
   if (!tuned.ok()) return tuned.error();
+  clock.Enter("write");
+  clock.Count(tuned.value().replays, 0);
   for (const auto& warning : tuned.value().warnings) fmt::print(stderr, "warning: {}\n", warning);
   const TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
   if (!flags.common.out.empty())
@@ -239,6 +243,7 @@ Command TuneCommand() {
                            SolveOptionsOf(*flags),
                            EffectOptions(flags->model),
                            {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
+                           ProfileOptions(flags->common),
                            CommonOptions(flags->common)}),
           .example =
               "gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm "

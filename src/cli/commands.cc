@@ -16,13 +16,13 @@ Command WithPlugins(Command command) {
   if (!command.run) return command;
   auto files = std::make_shared<std::vector<std::string>>();
   command.options.push_back({.flag = "--plugin",
-                             .value = files.get(),
+                             .value = command.plugins ? command.plugins : files.get(),
                              .help = "Library of MuJoCo plugins, loaded first; more than once",
                              .more = "For plugins of your own in the MJCF, or as candidates of the experiment file "
                                      "(docs/candidates.md). It runs in this program: load only what you trust. One "
                                      "that does not load is left out, and stderr says so"});
-  command.run = [files, run = command.run]() -> Result<int> {
-    GS_ASSIGN(const std::vector<std::string> left_out, LoadPluginLibraries(*files));
+  command.run = [files, plugins = command.plugins, run = command.run]() -> Result<int> {
+    GS_ASSIGN(const std::vector<std::string> left_out, LoadPluginLibraries(plugins ? *plugins : *files));
     for (const std::string& text : left_out) fmt::print(stderr, "warning: {}\n", text);
     return run();
   };
@@ -48,7 +48,9 @@ std::vector<Command> AllCommands() {
           WithPlugins(RunCommand()),
           MergeCommand(),
           WithPlugins(FleetCommand()),
-          WithPlugins(MonitorCommand())};
+          WithPlugins(MonitorCommand()),
+          DoctorCommand(),
+          CiteCommand()};
 }
 
 }  // namespace gapscope::cli

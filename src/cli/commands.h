@@ -18,6 +18,7 @@ struct Command {
   std::string example;               // "gapscope replay ..."
   std::function<Result<int>()> run;  // gives the exit status; none where there are commands below this one
   std::vector<Command> commands;
+  std::vector<std::string>* plugins = nullptr;  // where the words of --plugin go, of a command that has to know them
 };
 
 Command InitCommand();
@@ -41,6 +42,8 @@ Command RunCommand();
 Command MergeCommand();
 Command FleetCommand();  // the same, of robots and days
 Command MonitorCommand();
+Command DoctorCommand();
+Command CiteCommand();
 
 std::vector<Command> AllCommands();
 

@@ -172,7 +172,7 @@ Result<DiagnoseOptions> OptionsOf(const DiagnoseFlags& flags, const Experiment& 
 
 }  // namespace
 
-Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags) {
+Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags, StageClock* clock) {
   if (flags.resume && flags.common.out.empty())
     return Error{
         .what = "nothing to resume from", .where = "--resume", .cure = "name the interrupted run's folder with --out"};
@@ -187,16 +187,24 @@ Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags) {
   GS_ASSIGN(DiagnoseOptions options, OptionsOf(flags, experiment));
   GS_RETURN_IF_ERROR(AddKnown(flags, experiment, data, &options));
   options.stop = CatchInterrupts();
+  if (clock) clock->Enter("diagnose");
   auto diagnosed = [&] {
-    ProgressLine line(flags.common);
+    ProgressLine line(flags.common, clock);
     if (line.live())
       options.progress = [&line](const DiagnoseProgress& p) {
-        line.Show({p.stage, static_cast<double>(p.steps), p.most_steps > 0 ? static_cast<double>(p.most_steps) : kNaN},
+        line.Show({.stage = p.stage,
+                   .done = static_cast<double>(p.steps),
+                   .total = p.most_steps > 0 ? static_cast<double>(p.most_steps) : kNaN,
+                   .steps = p.steps},
                   p.stage);
       };
     return Diagnose(experiment, data, options, pool);
   }();
   if (!diagnosed.ok()) return diagnosed.error();
+  if (clock) {
+    clock->Enter("write");
+    clock->Count(diagnosed.value().work.replays, diagnosed.value().work.steps);
+  }
   PrintLeftOut(*diagnosed.value().model->rig());
   DiagnoseRun run{.info = {.seed = flags.common.seed}, .diagnosis = std::move(diagnosed).value()};
   if (!flags.common.out.empty()) {

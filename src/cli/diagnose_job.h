@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "src/cli/profile.h"
 #include "src/cli/session.h"
 #include "src/report/diagnose_report.h"
 
@@ -21,7 +22,8 @@ struct DiagnoseFlags {
 };
 
 // What --from, --with, --set, --params and --prior say is built in; common.out is written. Messages on stderr.
-Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags);
+// `clock`: told the stages; null: none.
+Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags, StageClock* clock = nullptr);
 
 }  // namespace gapscope::cli
 

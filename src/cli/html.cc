@@ -10,8 +10,9 @@ std::string& Line() {
   return line;
 }
 
-// In single quotes where a shell would take it apart.
-std::string Quoted(const std::string& word) {
+}  // namespace
+
+std::string ShellQuoted(const std::string& word) {
   const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
     return std::isalnum(c) || std::string_view("_-./@=:,+%").find(static_cast<char>(c)) != std::string_view::npos;
   });
@@ -21,11 +22,9 @@ std::string Quoted(const std::string& word) {
   return quoted + "'";
 }
 
-}  // namespace
-
 void SetCommandLine(int argc, char** argv) {
   Line() = "gapscope";
-  for (int i = 1; i < argc; ++i) Line().append(" ").append(Quoted(argv[i]));
+  for (int i = 1; i < argc; ++i) Line().append(" ").append(ShellQuoted(argv[i]));
 }
 const std::string& CommandLine() { return Line(); }
 

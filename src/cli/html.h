@@ -14,6 +14,8 @@ namespace gapscope::cli {
 // The program's own command line, as one would type it again.
 void SetCommandLine(int argc, char** argv);
 const std::string& CommandLine();
+// In single quotes where a shell would take it apart.
+std::string ShellQuoted(const std::string& word);
 
 // A model whose predictions the report shows.
 struct ReportModel {

@@ -41,9 +41,10 @@ std::string Dumped(const ordered_json& json) {
 
 }  // namespace
 
-ProgressLine::ProgressLine(const CommonFlags& flags)
+ProgressLine::ProgressLine(const CommonFlags& flags, StageClock* clock)
     : people_(!flags.quiet && flags.progress == ProgressForm::kText && isatty(2)),
       json_(!flags.quiet && flags.progress == ProgressForm::kJson),
+      clock_(clock),
       begin_(std::chrono::steady_clock::now()) {}
 
 ProgressLine::~ProgressLine() {
@@ -55,6 +56,7 @@ double ProgressLine::elapsed_s() const {
 }
 
 void ProgressLine::Show(const ProgressPoint& point, const std::string& text) {
+  if (clock_) clock_->EnterPart(point.stage, point.steps);
   if (people_) fmt::print(stderr, "\r\033[K{}", text);
   const auto now = std::chrono::steady_clock::now();
   const bool soon = point.stage == stage_ && point.done != point.total && now - last_ < std::chrono::milliseconds(50);

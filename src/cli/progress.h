@@ -6,6 +6,7 @@
 #include <chrono>
 #include <string>
 
+#include "src/cli/profile.h"
 #include "src/cli/session.h"
 #include "src/core/statistics.h"
 
@@ -15,25 +16,28 @@ namespace gapscope::cli {
 struct ProgressPoint {
   std::string stage;
   double done = kNaN, total = kNaN;
-  double best = kNaN;  // cost
+  double best = kNaN;     // cost
+  std::size_t steps = 0;  // of the simulator so far, where that is known
 };
 
 // On stderr: for people one line that is written over, where stderr is a terminal; with `--progress json` an object a
 // line, at most twenty a second of one stage. Nothing with --quiet.
 class ProgressLine {
  public:
-  explicit ProgressLine(const CommonFlags& flags);
+  // `clock` is told the stages too.
+  explicit ProgressLine(const CommonFlags& flags, StageClock* clock = nullptr);
   ~ProgressLine();
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  bool live() const { return people_ || json_; }
+  bool live() const { return people_ || json_ || (clock_ && clock_->on()); }
   double elapsed_s() const;
   // `text`: for people.
   void Show(const ProgressPoint& point, const std::string& text);
 
  private:
   bool people_, json_;
+  StageClock* clock_;
   std::chrono::steady_clock::time_point begin_, last_;
   std::string stage_;
 };

@@ -101,6 +101,7 @@ RenderRun RunOf(const RenderFlags& flags, const std::vector<VideoModel>& models,
 }
 
 Result<int> RunRender(RenderFlags flags) {
+  StageClock clock(flags.common);
   VideoOptions options{.out = flags.out,
                        .view = flags.view,
                        .layout = flags.layout,
@@ -119,8 +120,9 @@ Result<int> RunRender(RenderFlags flags) {
   GS_ASSIGN(const auto models, ModelsOf(flags, session));
 
   options.stop = CatchInterrupts();
+  clock.Enter("render");
   auto rendered = [&] {
-    ProgressLine line(flags.common);
+    ProgressLine line(flags.common, &clock);
     if (line.live())
       options.progress = [&line](std::size_t done, std::size_t all) {
         line.Show({"frames", static_cast<double>(done), static_cast<double>(all)},
@@ -129,6 +131,7 @@ Result<int> RunRender(RenderFlags flags) {
     return RenderVideo(session.recordings.front(), models, options, *session.pool);
   }();
   if (!rendered.ok()) return rendered.error();
+  clock.Enter("write");
   const VideoSummary& summary = rendered.value();
   RenderRun run = RunOf(flags, models, options, summary);
   const std::filesystem::path out = flags.out;
@@ -211,7 +214,8 @@ Command RenderCommand() {
       WhileOption(flags->model.while_column)};
   return {.name = "render",
           .what = "Draw the measured mechanism against the simulated one: a video, a GIF or a still",
-          .options = Join({own, PictureOptions(*flags), EffectOptions(flags->model), CommonOptions(flags->common)}),
+          .options = Join({own, PictureOptions(*flags), EffectOptions(flags->model), ProfileOptions(flags->common),
+                           CommonOptions(flags->common)}),
           .example =
               "gapscope render models/qube/experiment.yaml log.csv --compare nominal --compare out/tuned --speed 0.5 "
               "--out video.mp4",

@@ -5,6 +5,7 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
+#include "src/cli/profile.h"
 #include "src/cli/session.h"
 #include "src/report/replay_report.h"
 #include "src/report/write_run.h"
@@ -73,6 +74,7 @@ Status WriteReplay(const std::string& out, const Session& session, const ReplayR
 }
 
 Result<int> RunReplay(const ReplayFlags& flags) {
+  StageClock clock(flags.common);
   GS_ASSIGN(const Session session, LoadSession(flags.model, flags.common));
   PrintFindings(session.recordings, flags.common.quiet);
   const ReplayOptions options = OptionsOf(flags, session);
@@ -84,22 +86,28 @@ Result<int> RunReplay(const ReplayFlags& flags) {
                    .cure = "leave it out, or replay in windows"};
     GS_ASSIGN(controller, LoadController(session.experiment));
   }
+  clock.Enter("replay");
   GS_ASSIGN(ClosedLoopResult replayed, ReplayLogs(*session.model, session, options, controller));
   ReplayResult& result = replayed.result;
+  clock.Count(session.recordings.size(), result.steps);
   if (flags.nuisances) {
+    clock.Enter("nuisances");
     const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
     result.logs =
         Evaluate(*session.model, session.recordings, {session.values, std::nullopt}, options.mode, fit, *session.pool);
   }
+  clock.Enter("compare");
   std::optional<LoopStatistics> loop;
   if (controller) loop = LoopStatisticsOf(replayed, session.recordings, *controller);
   Comparison comparison = Compare(*session.model->rig(), result, session.recordings, *session.pool);
   ReplayRun run = ReplayRunOf(*session.model, session.values, std::move(result), std::move(comparison));
   run.info.seed = flags.common.seed;
+  clock.Enter("replay beside it");  // windows beside a free run, the nominal model beside a changed one
   run.other_error = OtherError(session, options, run.result.time_step_s);
   run.loop = std::move(loop);
   GS_ASSIGN(std::vector<LogReplay> nominal, ReplayNominal(session, options, controller));
   if (!nominal.empty()) run.nominal_error = ReplayError(nominal);
+  clock.Enter("write");
   if (!flags.common.out.empty()) {
     std::vector<RunTable> sent;
     if (controller) sent = SentTables(run.result.logs, replayed.sent, session.recordings, *controller);
@@ -148,6 +156,7 @@ Command ReplayCommand() {
                            own,
                            EffectOptions(flags->model),
                            {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
+                           ProfileOptions(flags->common),
                            CommonOptions(flags->common)}),
           .example =
               "gapscope replay models/qube/experiment.yaml log.csv --with cable_spring@arm --set "

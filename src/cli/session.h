@@ -22,7 +22,7 @@ enum class ProgressForm { kText, kJson };
 
 struct CommonFlags {
   ProgressForm progress = ProgressForm::kText;
-  bool json = false, quiet = false;
+  bool json = false, quiet = false, verbose = false, profile = false;
   int jobs = 0;
   std::uint64_t seed = 0;
   std::string out;

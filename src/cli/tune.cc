@@ -147,6 +147,7 @@ std::vector<TuneRun::LogFit> FitAlone(const Session& session, const DataSplit& d
 }
 
 Result<int> RunTune(const TuneFlags& flags) {
+  StageClock clock(flags.common);
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
   ModelFlags model = flags.model;
   model.logs = logs.all;
@@ -161,13 +162,16 @@ Result<int> RunTune(const TuneFlags& flags) {
                  .actual = fmt::format("{} fitted", data.train.size()),
                  .allowed = "two logs or more that are not held out",
                  .cure = "give more logs, or leave --each-log out"};
+  clock.Enter("tune");
   const auto tuned = [&] {
-    ProgressLine line(flags.common);
+    ProgressLine line(flags.common, &clock);
     if (line.live()) ShowProgress(flags.budget_s, line, &options);
     options.solve.deadline.stop = CatchInterrupts();
     return Tune(*session.model, data, session.values, options, *session.pool);
   }();
   if (!tuned.ok()) return tuned.error();
+  clock.Enter("write");
+  clock.Count(tuned.value().replays, 0);
   for (const auto& warning : tuned.value().warnings) fmt::print(stderr, "warning: {}\n", warning);
   TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
   if (flags.each_log) run.per_log = FitAlone(session, data, tuned.value(), options);
@@ -260,6 +264,7 @@ Command TuneCommand() {
                            SolveOptionsOf(*flags),
                            EffectOptions(flags->model),
                            {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
+                           ProfileOptions(flags->common),
                            CommonOptions(flags->common)}),
           .example =
               "gapscope tune models/qube/experiment.yaml a.csv b.csv --hold-out c.csv --with coulomb_friction@arm "

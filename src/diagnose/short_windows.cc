@@ -14,7 +14,8 @@ double ShortestWindow(const DataSplit& data) {
   for (const auto* logs : {&data.train, &data.held_out}) {
     for (const auto& recording : *logs) step_s = std::max(step_s, recording.timeline.median_step_s);
   }
-  return std::max(kDiagnosePolicy.search.least_window_s, static_cast<double>(kDiagnosePolicy.search.least_samples) * step_s);
+  return std::max(kDiagnosePolicy.search.least_window_s,
+                  static_cast<double>(kDiagnosePolicy.search.least_samples) * step_s);
 }
 
 // As many windows as take the same steps.
@@ -26,7 +27,8 @@ Workbench WithWindows(const Workbench& bench, const Model& model, double window_
   other.windows =
       std::make_shared<const std::vector<LogWindow>>(TakenWindows(other.data.train, other.Options(model, true)));
   other.work = std::make_shared<Work>();
-  other.most_steps = static_cast<std::size_t>(kDiagnosePolicy.search.short_share * static_cast<double>(bench.most_steps));
+  other.most_steps =
+      static_cast<std::size_t>(kDiagnosePolicy.search.short_share * static_cast<double>(bench.most_steps));
   other.bounds = std::make_shared<std::map<std::string, std::pair<double, double>>>();
   other.coupling = std::make_shared<Coupling>();
   return other;

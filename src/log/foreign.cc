@@ -1,10 +1,6 @@
 #include "src/log/foreign.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -14,11 +10,10 @@
 #include <filesystem>
 #include <sstream>
 
+#include "src/core/child.h"
 #include "src/core/file.h"
 #include "src/log/npz_reader.h"
 #include "src/log/npz_writer.h"
-
-extern char** environ;
 
 namespace gapscope {
 namespace {
@@ -31,61 +26,6 @@ const ForeignFormat kMat{"MAT file", "'gapscope[mat]'"}, kHdf5{"HDF5 file", "gap
     kPace{"PACE recording", "gapscope torch"};
 
 constexpr int kRefused = 2;  // the converter's status for what it refuses, then five lines on stdout
-
-// "dataset#3" names an episode of "dataset".
-std::string WithoutEpisodes(const std::string& path) {
-  std::error_code failed;
-  const std::size_t mark = path.rfind('#');
-  return mark == std::string::npos || fs::exists(path, failed) ? path : path.substr(0, mark);
-}
-
-// A folder of its own that goes with what is in it.
-class ScratchFolder {
- public:
-  ScratchFolder() : path_((fs::temp_directory_path() / "gapscope_convert_XXXXXX").string()) {
-    made_ = mkdtemp(path_.data()) != nullptr;
-  }
-  ~ScratchFolder() {
-    std::error_code failed;
-    if (made_) fs::remove_all(path_, failed);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  bool made() const { return made_; }
-  std::string Path(const char* name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-  bool made_ = false;
-};
-
-std::string Converter() {
-  if (const char* given = std::getenv("GAPSCOPE_CONVERT"); given && *given) return given;
-  std::error_code failed;
-  const fs::path beside = fs::read_symlink("/proc/self/exe", failed).parent_path() / "gapscope-convert";
-  return !failed && fs::exists(beside, failed) ? beside.string() : "gapscope-convert";
-}
-
-// Exit status; negative: it could not be started (an errno), or did not end by itself.
-int Run(const std::vector<std::string>& words, const std::string& out) {
-  std::vector<char*> arguments;
-  arguments.reserve(words.size() + 1);
-  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0) return -failed;
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) return -errno;
-  }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -EINTR;
-}
 
 Error RefusedBy(const std::string& said, const std::string& path) {
   std::istringstream lines(said);
@@ -105,9 +45,9 @@ struct Conversion {
 };
 
 Status Convert(const Conversion& conversion, const std::string& said) {
-  std::vector<std::string> words = {Converter()};
+  std::vector<std::string> words = {ConverterProgram()};
   words.insert(words.end(), conversion.words.begin(), conversion.words.end());
-  const int status = Run(words, said);
+  const int status = RunChild(words, said);
   if (status == -ENOENT || status == -EACCES || status == 127) {
     return Error{.what = conversion.needed,
                  .where = conversion.path,
@@ -134,6 +74,19 @@ Error NoRoom(const std::string& path) {
 }
 
 }  // namespace
+
+std::string WithoutEpisodes(const std::string& path) {
+  std::error_code failed;
+  const std::size_t mark = path.rfind('#');
+  return mark == std::string::npos || fs::exists(path, failed) ? path : path.substr(0, mark);
+}
+
+std::string ConverterProgram() {
+  if (const char* given = std::getenv("GAPSCOPE_CONVERT"); given && *given) return given;
+  std::error_code failed;
+  const fs::path beside = fs::read_symlink("/proc/self/exe", failed).parent_path() / "gapscope-convert";
+  return !failed && fs::exists(beside, failed) ? beside.string() : "gapscope-convert";
+}
 
 const ForeignFormat* ForeignFormatOf(const std::string& path) {
   const fs::path place(WithoutEpisodes(path));

@@ -16,9 +16,14 @@ struct ForeignFormat {
 // By the name of a file, or by what a folder holds; null: none of them, or nothing is there.
 const ForeignFormat* ForeignFormatOf(const std::string& path);
 
-// Starts the converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH; no shell. Errors:
-// there is none (says what to install); what the converter refuses, in its own words; it fails. `source` is handed on
-// as it stands: a JSON object with the keys of docs/formats.md, or nothing.
+// "dataset#3" names an episode of "dataset".
+std::string WithoutEpisodes(const std::string& path);
+
+// The converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH.
+std::string ConverterProgram();
+
+// Starts it, without a shell. Errors: there is none (says what to install); what the converter refuses, in its own
+// words; it fails. `source` is handed on as it stands: a JSON object with the keys of docs/formats.md, or nothing.
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, const std::string& source);
 
 // Columns /TOPIC/JOINT/position, velocity and effort as messages sensor_msgs/JointState in the MCAP file `path`, whole

@@ -217,6 +217,17 @@ std::string StateFileOf(const std::string& path) {
                                                                                                 : path;
 }
 
+std::vector<std::string> FilesBesideLists(const std::string& path) {
+  std::vector<std::string> files;
+  std::error_code failed;
+  for (const std::string_view name : {kJoints, kControl}) {
+    const auto beside = std::filesystem::path(path).parent_path() / name;
+    const bool read = name != kControl || std::filesystem::path(path).filename() == kState;
+    if (read && std::filesystem::is_regular_file(beside, failed)) files.push_back(beside.string());
+  }
+  return files;
+}
+
 Status JoinControl(Log* log) {
   const std::filesystem::path path(log->path), other = path.parent_path() / kControl;
   std::error_code failed;

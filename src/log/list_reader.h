@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "src/core/result.h"
 #include "src/log/log.h"
@@ -22,6 +23,9 @@ Result<Log> ReadCsvLists(const std::string& path, std::string_view bytes);
 
 // The state_motor.csv in it if `path` is a folder with one, else `path`.
 std::string StateFileOf(const std::string& path);
+
+// joint_list.txt and, of a state_motor.csv, control.csv beside the file, where they are there.
+std::vector<std::string> FilesBesideLists(const std::string& path);
 
 // Adds to the log of a state_motor.csv the columns of the control.csv beside it, if there is one, as control/NAME: at
 // each row what was commanded last, NaN before the first command.

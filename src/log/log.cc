@@ -12,6 +12,7 @@
 #include "src/log/csv_reader.h"
 #include "src/log/foreign.h"
 #include "src/log/list_reader.h"
+#include "src/log/log_files.h"
 #include "src/log/npz_reader.h"
 #include "src/log/text.h"
 
@@ -40,22 +41,6 @@ Result<Log> ReadOne(const std::string& path, const LogReader* format) {
                  .allowed = "",
                  .cure = "split it, or leave out columns"};
   }
-}
-
-Result<std::string> CompanionPath(const std::string& path, const Companion& companion) {
-  const std::filesystem::path whole(path);
-  std::string name = whole.filename().string();
-  const std::size_t at = companion.find.empty() ? std::string::npos : name.rfind(companion.find);
-  if (at == std::string::npos || companion.find == companion.replace) {
-    return Error{.what = "no name for the file that belongs to this log",
-                 .where = At(path, 1),
-                 .actual = Quoted(name, 200),
-                 .allowed = fmt::format("a name with {}, to be replaced by {}", Quoted(companion.find),
-                                        Quoted(companion.replace)),
-                 .cure = "name the right log, or correct 'companions' in the experiment file"};
-  }
-  name.replace(at, companion.find.size(), companion.replace);
-  return (whole.parent_path() / name).string();
 }
 
 // Pairs the rows of `other` with those of `log`.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import pickle
@@ -463,6 +464,21 @@ def test_the_program_starts_the_converter_by_itself(experiment: str, demo: str, 
     gone = {**os.environ, "GAPSCOPE_CONVERT": str(tmp_path / "gone")}
     run = subprocess.run(command, capture_output=True, text=True, env=gone)
     assert run.returncode == 2 and "pip install 'gapscope[mat]'" in run.stderr
+
+
+def test_the_doctor_asks_the_converter_for_its_extras(tmp_path: Path) -> None:
+    there = tmp_path / "there"
+    there.mkdir()
+    (there / "torch.py").touch()  # found, never imported
+    env = converter(tmp_path)
+    script = Path(env["GAPSCOPE_CONVERT"])
+    script.write_text(script.read_text().replace("PYTHONPATH=", f"PYTHONPATH={there}:"))
+    command = [str(program()), "doctor", "--json"]
+    checks = json.loads(subprocess.run(command, capture_output=True, text=True, env=env).stdout)["checks"]
+    found = next(check for check in checks if check["name"] == "converter")
+    assert found["good"] == (found["cure"] == "") and "torch" not in found["found"]
+    lacking = "hdf5" if importlib.util.find_spec("h5py") is None else "all extras"
+    assert lacking in found["found"]
 
 
 def split_demo(demo: str, path: Path) -> None:

@@ -8,6 +8,7 @@ import json
 import re
 import subprocess
 import typing
+import zipfile
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -121,8 +122,12 @@ def test_a_diagnosis_and_its_evidence(
     experiment: str, short: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = str(tmp_path / "out")
-    found = ask("diagnose", experiment, short, "--effort", "quick", "--out", out)
+    bundle = str(tmp_path / "bundle.zip")
+    found = ask("diagnose", experiment, short, "--effort", "quick", "--out", out, "--bundle", bundle)
     check(found, "diagnosis")
+    with zipfile.ZipFile(bundle) as packed:
+        check(json.loads(packed.read("bundle.json")), "bundle")
+        assert packed.testzip() is None
     told = [statement for statement in found["statements"] if "numbers" in statement]
     assert told  # else the evidence is not looked at
     for number in {1, len(found["statements"])}:
@@ -141,6 +146,10 @@ def test_logs(experiment: str, demo: str, tmp_path: Path) -> None:
     check(ask("convert", demo, "--out", str(tmp_path)), "convert")
     check(ask("identify", "cable", experiment, demo), "identify")
     check(ask("render", experiment, demo, "--out", str(tmp_path / "still.png")), "render")
+
+
+def test_the_doctor() -> None:
+    check(ask("doctor"), "doctor")
 
 
 def test_designs(experiment: str, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ status 2, and five lines on stdout: what, where, actual, allowed, cure.
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import os
 import resource
@@ -20,6 +21,26 @@ from gapscope.formats._cache import through_cache
 from gapscope.formats.apart import load_table
 
 _MOST_BYTES = 16 << 30  # of memory, and no more than the machine has, and of a file: a small one may unpack to more
+
+# What pip installs as gapscope[EXTRA], and the modules that must be there then; of PACE it is torch itself.
+_EXTRAS = {
+    "mat": ("scipy", "h5py"),
+    "hdf5": ("h5py",),
+    "parquet": ("pyarrow",),
+    "ros": ("rosbags",),
+    "mcap": ("mcap", "mcap_protobuf"),
+    "torch": ("torch",),
+}
+
+
+class _PrintExtras(argparse.Action):
+    """A line for each extra, "EXTRA: MODULE...": the modules that are missing. `gapscope doctor` reads it."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object, **__: object) -> None:
+        for extra, modules in _EXTRAS.items():
+            missing = [module for module in modules if importlib.util.find_spec(module) is None]
+            print(" ".join([f"{extra}:", *missing]))
+        parser.exit()
 
 
 def _limit(what: int, most: int) -> None:
@@ -55,6 +76,7 @@ def main() -> int:
     parser.add_argument("--all", action="store_true", help="every recording of the file, 000000.npz and so on")
     parser.add_argument("--to", choices=("npz", "mcap"), default="npz", help="mcap: of a table, joint states in MCAP")
     parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable, time, joints (docs/formats.md)")
+    parser.add_argument("--extras", action=_PrintExtras, nargs=0, help="say which modules of formats are missing")
     given = parser.parse_args()
     _limit(resource.RLIMIT_AS, min(_MOST_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))
     _limit(resource.RLIMIT_FSIZE, _MOST_BYTES)

@@ -155,7 +155,7 @@ Result<ControllerSpec> LoadController(const Experiment& experiment) {
   if (!node.IsDefined()) {
     return Error{.what = "no controller is described",
                  .where = path,
-                 .cure = "add 'controller:' (docs/experiment.md), or replay in free_run or windows"};
+                 .cure = "add 'controller:' (docs/reference/experiment.md), or replay in free_run or windows"};
   }
   YamlMap map(node, path, "'controller'");
   ControllerSpec spec{.actuator = map.Text("actuator"),

@@ -1,4 +1,4 @@
-// A MuJoCo plugin of one's own that gapscope can ask about (docs/candidates.md): a gear that runs out of true.
+// A MuJoCo plugin of one's own that gapscope can ask about (docs/how-to/candidates.md): a gear that runs out of true.
 // gapscope gives each instance the text INSTANCE.joint and, for each parameter, a numeric INSTANCE.PARAMETER that it
 // changes between runs. A plugin that reads them on each compute needs nothing else of gapscope.
 #include <mujoco/mujoco.h>

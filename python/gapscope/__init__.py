@@ -4,7 +4,7 @@
 >>> gs.replay("experiment.yaml", gs.Log(df, time="t"), with_="cable_spring@arm")    # doctest: +SKIP
 
 The program does the work, as a child process: no call of this package can take the interpreter down with it, and
-Ctrl-C gives what a search has found so far. docs/python.md tells more.
+Ctrl-C gives what a search has found so far. docs/reference/python.md tells more.
 """
 
 from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune

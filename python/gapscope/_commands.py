@@ -24,8 +24,8 @@ Logs: TypeAlias = OneLog | Sequence[OneLog]
 Texts: TypeAlias = str | Sequence[str]
 Values: TypeAlias = Mapping[str, float] | None
 Folder: TypeAlias = str | os.PathLike[str] | None
-# Any other option of the program's command (docs/options.md), without its dashes: {"huber": 2, "no-next-experiment":
-# True}.
+# Any other option of the program's command (docs/reference/options.md), without its dashes:
+# {"huber": 2, "no-next-experiment": True}.
 Options: TypeAlias = Mapping[str, object] | None
 R = TypeVar("R", bound=Run)
 
@@ -271,7 +271,7 @@ def render(
 
 
 def identify(method: str, exp: Source, logs: Logs, *, out: Folder = None, options: Options = None) -> dict[str, Any]:
-    """Parameters straight from logs: ``method`` is "pd", "friction", "inertia" ... (docs/identify.md).
+    """Parameters straight from logs: ``method`` is "pd", "friction", "inertia" ... (docs/reference/identify.md).
 
     The result as the program writes it: values with 95 % intervals, SI.
     """

@@ -12,7 +12,7 @@ from gapscope._errors import InputError
 
 
 class Experiment:
-    """What binds a log to a model: the experiment file (docs/experiment.md), or a mapping with the same keys.
+    """What binds a log to a model: the experiment file (docs/reference/experiment.md), or a mapping with the same keys.
 
     ``base`` is the folder that the mapping's ``model`` is relative to; without it the working folder. ``model`` may be
     an MjSpec of the mujoco that is installed, as it is now.

@@ -32,8 +32,8 @@ class Log:
     """A hardware log.
 
     ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), or one of another tool's
-    format (docs/formats.md: MAT, HDF5, Parquet, ROS bags, MCAP, LeRobot), a pandas DataFrame, a structured array, or a
-    mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ... ``NAME[n - 1]``. Values are
+    format (docs/reference/formats.md: MAT, HDF5, Parquet, ROS bags, MCAP, LeRobot), a pandas DataFrame, a structured
+    array, or a mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ... ``NAME[n - 1]``. Values are
     in the units that the experiment file states; NaN is a missing value.
 
     ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
@@ -347,7 +347,7 @@ def read(
     exp: Experiment | str | os.PathLike[str] | Mapping[str, Any] | None = None,
     **source: str | Sequence[str],
 ) -> Log:
-    """A log in a file of any format that is known (docs/formats.md). Of a dataset of several episodes: "dataset#3".
+    """A log in a file of any format that is known (docs/reference/formats.md). Of a dataset's episodes: "dataset#3".
 
     ``exp`` is an experiment whose ``log: {source: {...}}`` says what to take of the file. ``source`` are the same keys,
     before those of the experiment: ``topics`` of a bag, else all; ``msgs``, a folder of .msg files; ``variable`` of a

@@ -184,17 +184,17 @@ class _WithModel(Run):
         seed: int | None = None,
         experiment: str | None = None,
     ) -> Exported:
-        """Writes OUT/model.xml, what ``target`` has beside it (docs/export.md) and OUT/fidelity.json.
+        """Writes OUT/model.xml, what ``target`` has beside it (docs/reference/export.md) and OUT/fidelity.json.
 
         ``timestep``, s: of the written MJCF. ``draws``, of a tune: also OUT/randomization.json and
-        OUT/randomization.npz, whose arrays of (draws, ...) are named as MuJoCo's (docs/export.md). ``experiment``:
-        where its file has moved since.
+        OUT/randomization.npz, whose arrays of (draws, ...) are named as MuJoCo's (docs/how-to/randomize.md).
+        ``experiment``: where its file has moved since.
         """
         options = {"timestep": timestep, "draws": draws, "seed": seed, "experiment": experiment}
         return from_json(Exported, self._go_on("export", to=target, out=out, **options))
 
     def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> dict[str, Any]:
-        """Writes the result into the text of the experiment's own MJCF (docs/apply.md); what changed there."""
+        """Writes the result into the text of the experiment's own MJCF (docs/how-to/apply.md); what changed there."""
         return self._go_on("apply", out=out, experiment=experiment)
 
     def mcap(self, out: str | os.PathLike[str]) -> tuple[Path, ...]:

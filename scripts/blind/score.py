@@ -1,4 +1,4 @@
-"""Scores verdicts of `gapscope diagnose` against sealed labels: the targets of docs/results_diagnose.md, baselines,
+"""Scores verdicts of `gapscope diagnose` against sealed labels: the targets of docs/results/diagnosis.md, baselines,
 confusions."""
 import json, math, random
 from collections import Counter

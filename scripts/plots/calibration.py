@@ -2,7 +2,7 @@
 """Draws stated probability against share of verdicts that were right, from `scripts/blind_check --json FILE`.
 
     python3 -m venv V && V/bin/pip install matplotlib && V/bin/python scripts/plots/calibration.py FIGURES.json
-        docs/calibration.png
+        docs/pictures/calibration.png
 """
 import json
 import math

@@ -41,7 +41,7 @@ bundle.json  the command as it was given, versions, and every file with its dige
 result.json  what the diagnosis said
 files/       experiment file, MJCF and what it includes, logs; logs whose digests alone were taken belong here too
 
-The same version of gapscope and of MuJoCo gives the same digits (docs/diagnosis.md).
+The same version of gapscope and of MuJoCo gives the same digits (docs/how-to/bundle.md).
 )";
 
 // Lexically, so that a file beside a symbolic link stays beside it, where that names the same file.

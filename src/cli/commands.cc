@@ -19,8 +19,8 @@ Command WithPlugins(Command command) {
                              .value = command.plugins ? command.plugins : files.get(),
                              .help = "Library of MuJoCo plugins, loaded first; more than once",
                              .more = "For plugins of your own in the MJCF, or as candidates of the experiment file "
-                                     "(docs/candidates.md). It runs in this program: load only what you trust. One "
-                                     "that does not load is left out, and stderr says so"});
+                                     "(docs/how-to/candidates.md). It runs in this program: load only what you trust. "
+                                     "One that does not load is left out, and stderr says so"});
   command.run = [files, plugins = command.plugins, run = command.run]() -> Result<int> {
     GS_ASSIGN(const std::vector<std::string> left_out, LoadPluginLibraries(plugins ? *plugins : *files));
     for (const std::string& text : left_out) fmt::print(stderr, "warning: {}\n", text);

@@ -1,5 +1,5 @@
 // The subcommands, each as data: its options, and what to run once they are read. The command line, `--help` and
-// docs/options.md are made from these; only cli/arguments.cc knows the library that reads a command line.
+// docs/reference/options.md are made from these; only cli/arguments.cc knows the library that reads a command line.
 #ifndef GAPSCOPE_CLI_COMMANDS_H_
 #define GAPSCOPE_CLI_COMMANDS_H_
 

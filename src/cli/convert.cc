@@ -130,7 +130,7 @@ Command ConvertCommand() {
                          .required = true,
                          .help = "Logs; of a LeRobot dataset an episode, dataset#3. For mcap results of replay, tune "
                                  "or diagnose",
-                         .more = "docs/formats.md tells the formats"},
+                         .more = "docs/reference/formats.md tells the formats"},
                         folder,
                         {.flag = "--to",
                          .value = ChoiceOf(flags->form),
@@ -142,7 +142,7 @@ Command ConvertCommand() {
                          .value = &flags->source,
                          .unset = "all of it",
                          .help = "What to take of a file, as JSON: {\"topics\": [\"/joint_states\"]}",
-                         .more = "The keys that an experiment has under 'log: source'; docs/formats.md"}},
+                         .more = "The keys that an experiment has under 'log: source'; docs/reference/formats.md"}},
                        PrintOptions(flags->common)}),
       .example = "gapscope convert run.mcap --out tables",
       .run = [flags] { return RunConvert(*flags); }};

@@ -151,7 +151,7 @@ std::vector<Option> BundleOptions(CommandFlags& flags) {
            .unset = "none",
            .help = "FILE.zip for all that this diagnosis read, its command, versions and result",
            .more = "`unzip FILE.zip && sh run.sh` runs it again on any machine and compares the digits "
-                   "(docs/diagnosis.md)"},
+                   "(docs/how-to/bundle.md)"},
           {.flag = "--bundle-digests",
            .value = &flags.bundle_digests,
            .help = "Of the logs, put only the digests into the bundle",

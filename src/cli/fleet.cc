@@ -24,7 +24,8 @@ Command FleetPlanCommand() {
        .value = &flags->file,
        .required = true,
        .help = "Fleet file (YAML)",
-       .more = "It says which logs, of which robot and day, and what is done with them; docs/fleet.md tells its keys"},
+       .more = "It says which logs, of which robot and day, and what is done with them; "
+               "docs/reference/fleet.md tells its keys"},
       {.flag = "--shards",
        .value = &flags->shards,
        .range = Between(1, 1000000),

@@ -1,5 +1,5 @@
 // A fleet's file (gapscope.fleet/1): which logs, of which robot and day by their paths, and what is done with each
-// group of them. docs/fleet.md tells its keys.
+// group of them. docs/reference/fleet.md tells its keys.
 #ifndef GAPSCOPE_CLI_FLEET_FILE_H_
 #define GAPSCOPE_CLI_FLEET_FILE_H_
 

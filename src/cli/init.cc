@@ -153,7 +153,8 @@ Command InitCommand() {
                        .value = &flags->logs,
                        .required = true,
                        .help = "Hardware logs; the first one is looked at",
-                       .more = "The draft is then tried on all of them. docs/init.md tells how columns are paired"},
+                       .more = "The draft is then tried on all of them. docs/reference/init.md tells how columns are "
+                               "paired"},
                       {.flag = "--servo",
                        .value = &flags->servo,
                        .unset = "by regression where the log allows it, else made up and marked",

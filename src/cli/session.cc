@@ -55,7 +55,7 @@ Option ExperimentOption(std::string& path) {
           .value = &path,
           .required = true,
           .help = "Experiment file (YAML)",
-          .more = "It binds logs to a model; docs/experiment.md tells its keys, `gapscope init` drafts one"};
+          .more = "It binds logs to a model; docs/reference/experiment.md tells its keys, `gapscope init` drafts one"};
 }
 
 Option WhileOption(std::string& column) {
@@ -71,7 +71,7 @@ std::vector<Option> LogOptions(ModelFlags& flags) {
            .value = &flags.logs,
            .required = true,
            .help = "Hardware logs",
-           .more = "CSV or what else docs/experiment.md names; they are read by path and may lie anywhere"},
+           .more = "CSV or what else docs/reference/experiment.md names; they are read by path and may lie anywhere"},
           WhileOption(flags.while_column)};
 }
 
@@ -88,14 +88,15 @@ std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std:
 }
 
 std::vector<Option> EffectOptions(ModelFlags& flags) {
-  return Join({{{.flag = "--with",
-                 .value = &flags.with,
-                 .help = "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL|all], more than once, of " +
-                         gapscope::Join(EffectNames()) + ", or a candidate of the experiment file",
-                 .more = "docs/effects.md lists the effects, docs/experiment.md tells of candidates. Without a place "
-                         "it goes where it can act, if there is one "
-                         "such place; its parameters are then known to --set as EFFECT@PLACE.NAME"}},
-               ValueOptions(flags.set, flags.params)});
+  return Join(
+      {{{.flag = "--with",
+         .value = &flags.with,
+         .help = "Add an effect: EFFECT[@JOINT|ACTUATOR|SIGNAL|all], more than once, of " +
+                 gapscope::Join(EffectNames()) + ", or a candidate of the experiment file",
+         .more = "docs/reference/effects.md lists the effects, docs/reference/experiment.md tells of candidates. "
+                 "Without a place it goes where it can act, if there is one such place; its parameters are then known "
+                 "to --set as EFFECT@PLACE.NAME"}},
+       ValueOptions(flags.set, flags.params)});
 }
 
 Option WindowOption(double& window_s) {

@@ -1,5 +1,6 @@
 // Options, each described once: name, value, range, unit, what it is for. From one table are made the flags of the
-// command line, `--help`, docs/options.md and the check of a value that a program sets without a command line.
+// command line, `--help`, docs/reference/options.md and the check of a value that a program sets without a command
+// line.
 //
 // A struct of options has a function `std::vector<Option> OptionsOf(T&)` that lists its members; its default is the
 // value that the member has in a struct nobody has touched.
@@ -74,7 +75,7 @@ struct Option {
   bool required = false;
   bool commas = false;  // a list's items are parted by commas, rather than the flag given again
   std::string help;     // a line for `--help`
-  std::string more;     // the rest of its paragraph in docs/options.md
+  std::string more;     // the rest of its paragraph in docs/reference/options.md
 
   // Reads the words that were given. Errors: not a number, out of range, not one of the words; nothing is written then.
   Status Read(const std::vector<std::string>& given) const;

@@ -1,5 +1,5 @@
 // Which unmodelled effect causes the gap between prediction and measurement, and how far the gap shrinks with it.
-// Method: docs/diagnosis_method.md.
+// Method: docs/explanation/method.md.
 #ifndef GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 #define GAPSCOPE_DIAGNOSE_DIAGNOSIS_H_
 

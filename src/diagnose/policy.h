@@ -57,7 +57,7 @@ struct EvidencePolicy {
   double alone = 0.5, alike = 0.5;
 };
 
-// P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results_diagnose.md).
+// P = 1 / (1 + exp(-x)): weights of a statement's numbers, fitted to a rough bank (docs/results/diagnosis.md).
 struct ProbabilityPolicy {
   double constant = -3.51, gain = 0.88, discrepancy = 0.68, clear = 0.27, smooth = -1.84, dry = 0.86;
   double most_discrepancy = 6, most_clear = 2, least_clear = -3;  // beyond them they say nothing more

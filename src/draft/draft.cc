@@ -53,7 +53,7 @@ class Drafter {
                    .where = "",
                    .allowed = "an angle of at least one joint, which moves",
                    .cure = "name a column after its joint (\"" + example +
-                           "_rad\"), or write the experiment file by hand (docs/experiment.md)"};
+                           "_rad\"), or write the experiment file by hand (docs/reference/experiment.md)"};
     }
     draft_.head =
         "# Drafted by `gapscope init`. Check every line marked \"unsure\", then: gapscope replay THIS_FILE LOG\n"

@@ -1,4 +1,4 @@
-// The experiment file: how a log is bound to a model. docs/experiment.md documents it key by key.
+// The experiment file: how a log is bound to a model. docs/reference/experiment.md documents it key by key.
 #ifndef GAPSCOPE_EXPERIMENT_EXPERIMENT_H_
 #define GAPSCOPE_EXPERIMENT_EXPERIMENT_H_
 

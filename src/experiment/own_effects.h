@@ -11,8 +11,8 @@
 namespace gapscope {
 
 // `candidates:` into experiment->candidates; `parameters` and `values` must have been read. Errors, with their place:
-// as docs/experiment.md says of each key; an expression with an unknown name, or without one of its parameters. Whether
-// joints, fields and names of effects exist is the model's to say.
+// as docs/reference/experiment.md says of each key; an expression with an unknown name, or without one of its
+// parameters. Whether joints, fields and names of effects exist is the model's to say.
 Status ReadOwnEffects(const std::vector<YAML::Node>& items, const std::string& path, Experiment* experiment);
 // `without:`, a list of EFFECT or EFFECT@PLACE.
 Status ReadSwitchedOff(const YAML::Node& node, const std::string& path, Experiment* experiment);

@@ -1,5 +1,5 @@
-// Formats of other tools, which the Python package reads and writes (docs/formats.md): its converter makes one NPZ
-// table of them, and an MCAP file of one.
+// Formats of other tools, which the Python package reads and writes (docs/reference/formats.md): its converter makes
+// one NPZ table of them, and an MCAP file of one.
 #ifndef GAPSCOPE_LOG_FOREIGN_H_
 #define GAPSCOPE_LOG_FOREIGN_H_
 
@@ -23,7 +23,8 @@ std::string WithoutEpisodes(const std::string& path);
 std::string ConverterProgram();
 
 // Starts it, without a shell. Errors: there is none (says what to install); what the converter refuses, in its own
-// words; it fails. `source` is handed on as it stands: a JSON object with the keys of docs/formats.md, or nothing.
+// words; it fails. `source` is handed on as it stands: a JSON object with the keys of docs/reference/formats.md, or
+// nothing.
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, const std::string& source);
 
 // Columns /TOPIC/JOINT/position, velocity and effort as messages sensor_msgs/JointState in the MCAP file `path`, whole

@@ -1,7 +1,7 @@
 // NPZ, the archive of arrays that numpy.savez and numpy.savez_compressed write: a table of this program's own
-// (`gapscope.log/1`, what its Python package hands over) or a user's own arrays. docs/experiment.md says which arrays
-// become which columns. Nothing in a file is executed: arrays of Python objects, which numpy would unpickle, are
-// refused.
+// (`gapscope.log/1`, what its Python package hands over) or a user's own arrays. docs/reference/experiment.md says
+// which arrays become which columns. Nothing in a file is executed: arrays of Python objects, which numpy would
+// unpickle, are refused.
 #ifndef GAPSCOPE_LOG_NPZ_READER_H_
 #define GAPSCOPE_LOG_NPZ_READER_H_
 

@@ -1,6 +1,6 @@
 // The catalogue of effects that a model may lack, and a rig's own candidates beside it. One file per effect under
 // src/model/effects/ states its parameters and how it enters a model; adding a file there adds the effect everywhere.
-// Meaning and names: docs/effects.md.
+// Meaning and names: docs/reference/effects.md.
 #ifndef GAPSCOPE_MODEL_EFFECT_H_
 #define GAPSCOPE_MODEL_EFFECT_H_
 

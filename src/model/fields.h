@@ -33,9 +33,9 @@ struct Field {
   std::optional<Inertial> inertial = {};
 };
 
-// Resolves KIND/NAME/FIELD; the fields are listed in docs/experiment.md. `where` is for errors: unknown kind, no such
-// element (with the nearest name), unknown field (with the nearest one), a native actuator's gain on a plugin actuator
-// without such a stage.
+// Resolves KIND/NAME/FIELD; the fields are listed in docs/reference/experiment.md. `where` is for errors: unknown kind,
+// no such element (with the nearest name), unknown field (with the nearest one), a native actuator's gain on a plugin
+// actuator without such a stage.
 Result<Field> ResolveField(const mjModel& model, const std::string& field, const std::string& where);
 
 // An error when the setting has another number of expressions than the field has numbers.

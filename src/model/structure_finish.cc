@@ -224,7 +224,7 @@ Status Structure::FinishMotor(const std::string& joint, const Terms& terms) {
   return Ok();
 }
 
-// MuJoCo's defaults creep: make the friction rows stiff (see docs/effects.md).
+// MuJoCo's defaults creep: make the friction rows stiff (see docs/reference/effects.md).
 void Structure::Stiffen(mjsJoint* joint) {
   const mjtNum solimp[] = {0.9999, 0.9999, 0.001, 0.5, 2};
   std::copy_n(solimp, mjNIMP, joint->solimp_friction);

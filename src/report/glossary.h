@@ -1,4 +1,4 @@
-// The words of docs/glossary.md, for who reads a page: the file itself is in the program.
+// The words of docs/reference/glossary.md, for who reads a page: the file itself is in the program.
 #ifndef GAPSCOPE_REPORT_GLOSSARY_H_
 #define GAPSCOPE_REPORT_GLOSSARY_H_
 

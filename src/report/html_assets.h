@@ -12,7 +12,7 @@ extern const char* const kDygraphsStyle;
 extern const char* const kFleetPage;
 extern const char* const kFleetStyle;  // beside kStyle
 extern const char* const kFleetScript;
-extern const char* const kGlossary;  // docs/glossary.md
+extern const char* const kGlossary;  // docs/reference/glossary.md
 
 }  // namespace gapscope::assets
 

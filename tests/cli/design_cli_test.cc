@@ -85,7 +85,7 @@ TEST_F(DesignCliTest, OptimalPrintsACommandThatWorks) {
   EXPECT_TRUE(std::filesystem::exists(scratch_.Path("input.csv")));
 }
 
-// The Qube report's law and poles (docs/results.md), with the arm of 0.04 kg that its gains imply.
+// The Qube report's law and poles (docs/results/documents.md), with the arm of 0.04 kg that its gains imply.
 TEST_F(DesignCliTest, StateFeedbackOfTheQubeReport) {
   const std::string up = Rig("qube") + " --at pendulum=3.141592653589793 --set arm.mass=0.04 --json";
   const Answer lqr = Run("lqr " + up + " --q 10,10,1,10 --r 1");

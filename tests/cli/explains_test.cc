@@ -69,7 +69,7 @@ TEST_F(CliTest, AProfileIsATableOnStderr) {
   EXPECT_EQ(Run(replay + "--profile --verbose --quiet").err, "");
 }
 
-// As docs/machines.md tells it: lines of JSON with these keys, and at least one.
+// As docs/reference/machines.md tells it: lines of JSON with these keys, and at least one.
 void ExpectProgress(const std::string& err) {
   std::istringstream lines(err);
   int seen = 0;

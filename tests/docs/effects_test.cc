@@ -1,4 +1,4 @@
-// docs/effects.md says what the catalogue says. Between its markers it is made from the catalogue:
+// docs/reference/effects.md says what the catalogue says. Between its markers it is made from the catalogue:
 // GAPSCOPE_WRITE_DOCS=1 build/tests/docs_effects_test rewrites it, without that the test compares.
 #include <gtest/gtest.h>
 

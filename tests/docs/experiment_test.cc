@@ -1,5 +1,5 @@
-// docs/experiment.md names every key and every field that the program knows, and its example loads. What the program
-// knows is asked from its own error messages, which list what is allowed.
+// docs/reference/experiment.md names every key and every field that the program knows, and its example loads. What the
+// program knows is asked from its own error messages, which list what is allowed.
 #include "src/experiment/experiment.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace gapscope {
 namespace {
 
 std::string Doc() {
-  const auto file = ReadFile(std::string(GAPSCOPE_SOURCE_DIR) + "/docs/experiment.md");
+  const auto file = ReadFile(std::string(GAPSCOPE_SOURCE_DIR) + "/docs/reference/experiment.md");
   return file.ok() ? file.value() : "";
 }
 

@@ -26,11 +26,11 @@ inline std::string Wrapped(const std::string& text) {
   return lines + line + "\n";
 }
 
-// docs/NAME.md holds `made` between "<!-- made from SOURCE -->" and "<!-- end -->"; with GAPSCOPE_WRITE_DOCS set it is
-// written there. `test`: the program to do that with.
+// docs/reference/NAME.md holds `made` between "<!-- made from SOURCE -->" and "<!-- end -->"; with GAPSCOPE_WRITE_DOCS
+// set it is written there. `test`: the program to do that with.
 inline void ExpectMadePart(const std::string& name, const std::string& source, const std::string& made,
                            const std::string& test) {
-  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/" + name + ".md",
+  const std::string path = std::string(GAPSCOPE_SOURCE_DIR) + "/docs/reference/" + name + ".md",
                     begin = "<!-- made from " + source + " -->\n\n", end = "\n<!-- end -->";
   const auto file = ReadFile(path);
   ASSERT_TRUE(file.ok()) << file.error().Text();

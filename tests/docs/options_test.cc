@@ -1,4 +1,4 @@
-// docs/options.md says what the commands' tables of options say. Between its markers it is made from them:
+// docs/reference/options.md says what the commands' tables of options say. Between its markers it is made from them:
 // GAPSCOPE_WRITE_DOCS=1 build/tests/docs_options_test rewrites it, without that the test compares.
 #include <gtest/gtest.h>
 

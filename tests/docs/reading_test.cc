@@ -1,6 +1,6 @@
-// docs/diagnosis.md can be read by a stranger: short sentences, no word of the trade that docs/glossary.md does not
-// explain, no name that the program does not have, no figure that docs/results_diagnose.md does not have. And links of
-// all pages lead somewhere.
+// docs/how-to/read-a-verdict.md can be read by a stranger: short sentences, no word of the trade that
+// docs/reference/glossary.md does not explain, no name that the program does not have, no figure that
+// docs/results/diagnosis.md does not have. And links of all pages lead somewhere.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -122,7 +122,7 @@ Problems UnknownTerms(const std::string& page) {
   Problems problems;
   for (const std::string& block : Blocks(PartsOf(page).prose)) {
     for (const std::string& bold : Found(block, R"(\*\*([^*]+)\*\*)")) {
-      if (!terms.contains(Lower(bold))) problems.push_back("not in docs/glossary.md: " + bold);
+      if (!terms.contains(Lower(bold))) problems.push_back("not in docs/reference/glossary.md: " + bold);
     }
   }
   return problems;
@@ -182,7 +182,7 @@ Problems ProblemsOfName(const std::string& span, const std::string& options, con
   if (first.starts_with("--")) {
     const bool has =
         options.find("`" + first + "`") != std::string::npos || options.find("`" + first + " ") != std::string::npos;
-    return has ? Problems() : Problems{"not in docs/options.md: " + span};
+    return has ? Problems() : Problems{"not in docs/reference/options.md: " + span};
   }
   if (known.contains(first) || fs::exists(kRoot / first)) return {};
   const std::string file = fs::path(first).filename();
@@ -191,7 +191,7 @@ Problems ProblemsOfName(const std::string& span, const std::string& options, con
 }
 
 Problems UnknownNames(const std::string& page) {
-  const std::string options = TextOf(kRoot / "docs/options.md");
+  const std::string options = TextOf(kRoot / "docs/reference/options.md");
   std::set<std::string> known = WordsOfResults();
   for (const Effect& effect : Catalogue()) known.insert(effect.name);
   for (const std::string& choices : Found(options, R"(\{([a-z,_]+)\})")) {
@@ -235,7 +235,7 @@ Problems FiguresWithoutSource(const std::string& page, const std::string& result
     quoting = quoting || link != std::string::npos;
     if (!quoting) continue;
     for (const std::string& figure : FiguresOf(link == std::string::npos ? block : block.substr(link))) {
-      if (!known.contains(figure)) problems.push_back("not in docs/results_diagnose.md: " + figure);
+      if (!known.contains(figure)) problems.push_back("not in docs/results/diagnosis.md: " + figure);
     }
   }
   return problems;
@@ -273,13 +273,13 @@ Problems DeadLinks(const std::string& page, const fs::path& at) {
   return problems;
 }
 
-const fs::path kPage = kRoot / "docs/diagnosis.md";
+const fs::path kPage = kRoot / "docs/how-to/read-a-verdict.md";
 
 TEST(DiagnosisPageTest, SentencesAreShort) { EXPECT_EQ(LongSentences(TextOf(kPage)), Problems()); }
 TEST(DiagnosisPageTest, BoldWordsAreInTheGlossary) { EXPECT_EQ(UnknownTerms(TextOf(kPage)), Problems()); }
 TEST(DiagnosisPageTest, NamesAreTheProgramsOwn) { EXPECT_EQ(UnknownNames(TextOf(kPage)), Problems()); }
 TEST(DiagnosisPageTest, FiguresAreThoseOfTheResults) {
-  EXPECT_EQ(FiguresWithoutSource(TextOf(kPage), TextOf(kRoot / "docs/results_diagnose.md")), Problems());
+  EXPECT_EQ(FiguresWithoutSource(TextOf(kPage), TextOf(kRoot / "docs/results/diagnosis.md")), Problems());
 }
 
 TEST(DocumentsTest, LinksLeadSomewhere) {
@@ -308,7 +308,7 @@ TEST(ReadingRulesTest, ASentenceMayHaveThirtyWords) {
 
 TEST(ReadingRulesTest, ABoldWordIsATerm) {
   EXPECT_EQ(UnknownTerms("the **gap** of **Rough twins**, **held\nout**"), Problems());
-  EXPECT_EQ(UnknownTerms("a **quasi-likelihood**"), Problems{"not in docs/glossary.md: quasi-likelihood"});
+  EXPECT_EQ(UnknownTerms("a **quasi-likelihood**"), Problems{"not in docs/reference/glossary.md: quasi-likelihood"});
 }
 
 TEST(ReadingRulesTest, ANameIsOneThatTheProgramHas) {
@@ -316,7 +316,7 @@ TEST(ReadingRulesTest, ANameIsOneThatTheProgramHas) {
       UnknownNames("`gapscope explain`, `--prior backlash=0.9`, `quick`, `seen_beside`, `cable_spring`, `unseen`, "
                    "`out/report.html`, `scripts/demo`\n\n    build/bin/gapscope diagnose a \\\n      --accept 1\n"),
       Problems());
-  EXPECT_EQ(UnknownNames("`--guess`"), Problems{"not in docs/options.md: --guess"});
+  EXPECT_EQ(UnknownNames("`--guess`"), Problems{"not in docs/reference/options.md: --guess"});
   EXPECT_EQ(UnknownNames("`seen_behind`"), Problems{"no name of the program: seen_behind"});
   EXPECT_EQ(UnknownNames("`gapscope divine`"), Problems{"no command: gapscope divine"});
   EXPECT_EQ(UnknownNames("\n    build/bin/gapscope explain a \\\n      --effort quick\n").size(), 1u)
@@ -327,7 +327,7 @@ TEST(ReadingRulesTest, AFigureAfterTheLinkIsOneOfTheResults) {
   const std::string results = "| 23 of 32 | 72 % |\nand 0.5\n", link = "[there](results_diagnose.md): ";
   EXPECT_EQ(FiguresWithoutSource("99 " + link + "23 of\n32, 72 %, 0.5.\n\n# Next\n\n98\n", results), Problems());
   EXPECT_EQ(FiguresWithoutSource(link + "24 of 32 and 0.50", results),
-            (Problems{"not in docs/results_diagnose.md: 24 of 32", "not in docs/results_diagnose.md: 0.50"}));
+            (Problems{"not in docs/results/diagnosis.md: 24 of 32", "not in docs/results/diagnosis.md: 0.50"}));
   EXPECT_EQ(FiguresWithoutSource(link + "\n\n| 73 % |\n", results).size(), 1u);
 }
 

@@ -96,7 +96,7 @@ TEST_P(EffectsTest, EachIsNeutralAtNeutralAndActsElsewhere) {
     EXPECT_GT(acting, 1e-3) << "the strongest trial does nothing";
     EXPECT_GT(acting, 3 * neutral);
   }
-  // Every effect of docs/effects.md finds a place on one rig or another; on these at least the general ones.
+  // Every effect of docs/reference/effects.md finds a place on one rig or another; on these at least the general ones.
   for (const char* name : {"command_delay", "actuator_lag", "torque_limit", "torque_bias", "quadratic_drag",
                            "sensor_delay", "backlash", "cogging"})
     EXPECT_TRUE(names.contains(name)) << name;

@@ -98,7 +98,7 @@ TEST_F(VideoTest, FramesRateDurationAndWhatIsInThem) {
 }
 
 TEST_F(VideoTest, LooksLikeThePictureInTheDocs) {
-  // docs/render.png, made by scripts/pictures, which also says how: run it when the look is meant to change.
+  // docs/pictures/render.png, made by scripts/pictures, which also says how: run it when the look is meant to change.
   const std::string result = scratch_.Path("repaired"), png = Out("now.png");
   ASSERT_EQ(Shell(std::string("'") + GAPSCOPE_PROGRAM + "' replay " + kQube +
                   " --with cable_spring@arm --with coulomb_friction@arm --set "
@@ -115,7 +115,7 @@ TEST_F(VideoTest, LooksLikeThePictureInTheDocs) {
   EXPECT_LT(json["models"][1]["error"].get<double>(), 0.01);
   EXPECT_NEAR(json["first_s"].get<double>(), 8.7, 1e-12);
   // Levels of 255: another Mesa or font version moves edges, not parts.
-  EXPECT_LT(MeanDifference(Pixels(png, 0), Pixels(kSource + "/docs/render.png", 0)), 1.5);
+  EXPECT_LT(MeanDifference(Pixels(png, 0), Pixels(kSource + "/docs/pictures/render.png", 0)), 1.5);
 }
 
 TEST_F(VideoTest, TheSameFramesForAnyNumberOfWorkers) {

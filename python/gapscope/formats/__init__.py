@@ -1,4 +1,4 @@
-"""Logs in the formats of other tools, each read into one table (docs/formats.md)."""
+"""Logs in the formats of other tools, each read into one table (docs/reference/formats.md)."""
 
 from __future__ import annotations
 

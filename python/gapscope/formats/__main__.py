@@ -75,7 +75,7 @@ def main() -> int:
     parser.add_argument("--out", required=True, help="the table, .npz; with --all a folder")
     parser.add_argument("--all", action="store_true", help="every recording of the file, 000000.npz and so on")
     parser.add_argument("--to", choices=("npz", "mcap"), default="npz", help="mcap: of a table, joint states in MCAP")
-    parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable, time, joints (docs/formats.md)")
+    parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable ... (docs/reference/formats.md)")
     parser.add_argument("--extras", action=_PrintExtras, nargs=0, help="say which modules of formats are missing")
     given = parser.parse_args()
     _limit(resource.RLIMIT_AS, min(_MOST_BYTES, os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")))

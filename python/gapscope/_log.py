@@ -33,8 +33,8 @@ class Log:
 
     ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), or one of another tool's
     format (docs/reference/formats.md: MAT, HDF5, Parquet, ROS bags, MCAP, LeRobot), a pandas DataFrame, a structured
-    array, or a mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ... ``NAME[n - 1]``. Values are
-    in the units that the experiment file states; NaN is a missing value.
+    array, or a mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ...
+    ``NAME[n - 1]``. Values are in the units that the experiment file states; NaN is a missing value.
 
     ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
     time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so.

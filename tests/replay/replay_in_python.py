@@ -1,8 +1,8 @@
 """Replays a log with the stock `mujoco` package: PLUGIN_LIBRARY MODEL LOG MAX_STEP_S OUT.
 
 LOG is a CSV file: time_s, then one column per actuator, named after it. OUT receives qpos and qvel at every stamp, as
-raw doubles. Written from the description of the replay (docs/how-to/replay.md, mujoco.h), not from its code: a command is
-held from its stamp to the next, and every interval is cut in the fewest equal steps that are at most MAX_STEP_S
+raw doubles. Written from the description of the replay (docs/how-to/replay.md, mujoco.h), not from its code: a command
+is held from its stamp to the next, and every interval is cut in the fewest equal steps that are at most MAX_STEP_S
 long.
 """
 

@@ -66,7 +66,7 @@ class Options(unittest.TestCase):
         return check.unknown_options(page, OPTIONS, others or {})
 
     def test_of_a_command(self):
-        good = "`gapscope replay a.yaml --window 1 --json`, `replay --window`\n\n    gapscope design chirp --rate 5 # --x\n"
+        good = "`gapscope replay a.yaml --window 1 --json`, `replay --window`\n\n    gapscope design chirp --rate 5\n"
         self.assertEqual(self.found(good), [])
         wrong = "gapscope replay --rate 1"
         self.assertEqual(self.found(f"`{wrong}`"), [f"no option of replay: --rate in {wrong}"])

@@ -109,34 +109,33 @@ class Judging {
     return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& m) { return m.use == use; });
   }
 
-  // The weakest first: a member that is not sure and hardly gains takes evidence from those that it stands in for. It
-  // goes, and they are judged without it.
+  // A member that is not sure and hardly gains, or only on the logs that were fitted, takes evidence from the others.
+  // It goes, the most harmful one first, and they are judged without it.
   void JudgeMembers(Judgement* result, std::vector<Statement>* dropped) {
-    std::stable_sort(found_.members.begin(), found_.members.end(),
-                     [](const Member& a, const Member& b) { return a.gain < b.gain; });
     auto& all = result->statements;
-    while (all.size() < found_.members.size()) {
-      all.push_back(Of(found_.members[all.size()].use));
-      for (auto spare = TakeOutSpare(all); spare != all.end(); spare = TakeOutSpare(all)) {
-        dropped->push_back(*spare);
-        dropped->back().rule = "hardly gains beside the others";
-        const EffectUse gone = spare->use;
-        all.erase(spare);
-        std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
-        for (Statement& s : all) {
-          if (ImitatedBy(s.use, gone) >= kDiagnosePolicy.search.imitates) s = Of(s.use);
-        }
+    for (const Member& member : found_.members) all.push_back(Of(member.use));
+    for (auto spare = TakeOutSpare(all); spare != all.end(); spare = TakeOutSpare(all)) {
+      const EffectUse gone = spare->use;
+      const bool hardly = spare->numbers.gain < kDiagnosePolicy.search.tie;
+      dropped->push_back(*spare);
+      dropped->back().rule = hardly ? "hardly gains beside the others" : "gains on the logs that were fitted alone";
+      all.erase(spare);
+      std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
+      for (Statement& s : all) {
+        if (!hardly || ImitatedBy(s.use, gone) >= kDiagnosePolicy.search.imitates) s = Of(s.use);
       }
     }
   }
 
-  // The weakest of those judged if the set can do without it, which is then chosen.
+  // The one that helps least on held-out logs of those that the set can do without; what is left is then chosen.
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
-    const auto least = std::min_element(
-        all.begin(), all.end(), [](const Statement& a, const Statement& b) { return a.numbers.gain < b.numbers.gain; });
-    if (found_.members.size() < 2 || least == all.end() || least->probability >= kDiagnosePolicy.probability.present ||
-        least->numbers.gain >= kDiagnosePolicy.search.tie)
-      return all.end();
+    auto least = all.end();
+    for (auto s = all.begin(); s != all.end(); ++s) {
+      const bool is_spare = s->probability < kDiagnosePolicy.probability.present &&
+                            (s->numbers.gain < kDiagnosePolicy.search.tie || s->numbers.gain_held_out < 0);
+      if (is_spare && (least == all.end() || s->numbers.gain_held_out < least->numbers.gain_held_out)) least = s;
+    }
+    if (found_.members.size() < 2 || least == all.end()) return all.end();
     Candidate* without = found_.ledger.Find(Without(found_.chosen->effects, least->use));
     if (!without) return all.end();
     evidence_.Choose(without);
@@ -283,7 +282,9 @@ class Judging {
           own.group = static_cast<int>(result->groups.size());
           result->groups.push_back({own.use});
         }
-        result->groups[static_cast<std::size_t>(own.group)].push_back(rival.use);
+        auto& group = result->groups[static_cast<std::size_t>(own.group)];
+        if (Has(group, rival.use)) continue;  // told with another member of it
+        group.push_back(rival.use);
         Statement other{.use = rival.use,
                         .probability = AtPrior(own.evidence, PriorOf(rival.use)),
                         .prior = PriorOf(rival.use),

@@ -9,6 +9,14 @@ namespace {
 
 bool IsLost(const Candidate& base) { return !(base.held_out_error <= kDiagnosePolicy.search.lost); }
 
+// In the windows of a bench, at the base model's values.
+Result<bool> IsLostIn(const Workbench& bench, const Candidate& base) {
+  GS_ASSIGN(Candidate same, MakeCandidate(bench, {}));
+  same.values = base.values;
+  ScoreCandidate(bench, &same);
+  return IsLost(same);
+}
+
 double ShortestWindow(const DataSplit& data) {
   double step_s = 0;
   for (const auto* logs : {&data.train, &data.held_out}) {
@@ -47,14 +55,17 @@ Result<ShortSearch> SearchShortWindows(const Workbench& bench, const Candidate& 
   ShortSearch result;
   if (!IsLost(base)) return result;
   const double shortest_s = ShortestWindow(bench.data);
-  for (double window_s = bench.window_s / 2; window_s >= shortest_s && result.hints.empty(); window_s /= 2) {
+  for (double window_s = bench.window_s / 2; window_s >= shortest_s; window_s /= 2) {
     const Workbench shorter = WithWindows(bench, *base.model, window_s);
-    GS_ASSIGN(const auto found, FitBase(shorter, say));
-    if (!IsLost(*found->base) || window_s / 2 < shortest_s) {
+    GS_ASSIGN(const bool lost, IsLostIn(shorter, base));
+    const bool last = !lost || window_s / 2 < shortest_s;
+    if (last) {
+      GS_ASSIGN(const auto found, FitBase(shorter, say));
       FindEffects(shorter, {}, say, found.get());
       result.hints = {HintOf(*found->base), HintOf(*found->chosen)};
     }
     result.work += *shorter.work;
+    if (last) break;
   }
   return result;
 }

@@ -15,7 +15,9 @@
 namespace gapscope {
 
 // What a call at a point is told by.
-Hasher HashOf(const FitPoint& point, Hasher hasher = Hasher());
+Hasher HashOf(const FitPoint& point, Hasher hasher);
+// Of one kind, in a word: results of different kinds at one point are not each other's.
+inline Hasher CallAt(const std::string& kind, const FitPoint& point) { return HashOf(point, Hasher().Text(kind)); }
 
 class Journal {
  public:
@@ -29,9 +31,6 @@ class Journal {
   // than is recorded next, and what follows is dropped.
   bool Next(Hasher call, std::vector<double>* record);
   void Append(Hasher call, const std::vector<double>& record);
-  // The same of an evaluation.
-  bool Next(const FitPoint& point, std::vector<double>* record) { return Next(HashOf(point), record); }
-  void Append(const FitPoint& point, const std::vector<double>& record) { Append(HashOf(point), record); }
   // Records are left to hand out; the next one is of this call.
   bool replaying() const { return next_ < records_.size(); }
   bool IsNext(Hasher call) const;

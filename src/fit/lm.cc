@@ -216,7 +216,7 @@ void LmRun::Iterate() {
 void Run(const SolveTask& task, const SolveOptions& options, LmState* s) {
   LmRun run(task.problem, options, s);
   while (s->iterations < options.max_iterations && !s->done) {
-    if (std::vector<double> record; task.journal && task.journal->Next(s->point, &record)) {
+    if (std::vector<double> record; task.journal && task.journal->Next(CallAt("iterate", s->point), &record)) {
       Unpack(record, s);
       s->residuals.clear();
       continue;
@@ -236,7 +236,7 @@ void Run(const SolveTask& task, const SolveOptions& options, LmState* s) {
     if (options.progress)
       options.progress({.best = s->cost, .evaluations = s->work.evaluations, .iteration = s->iterations});
     // An iteration that the deadline cut short is made anew.
-    if (task.journal && !IsLate(options.deadline)) task.journal->Append(before, Pack(*s));
+    if (task.journal && !IsLate(options.deadline)) task.journal->Append(CallAt("iterate", before), Pack(*s));
   }
 }
 

@@ -284,7 +284,7 @@ SolveResult Locally(const SolveTask& task, const FitPoint& start, const SolveOpt
   if (!std::isfinite(first.cost)) s.done = true, s.termination = Termination::kNotSimulated;
   if (start.y.size() == 0) s.done = true, s.termination = Termination::kConverged;
   while (!s.done && s.iterations < kPolicy.most_rounds) {
-    if (std::vector<double> record; task.journal && task.journal->Next(s.point, &record)) {
+    if (std::vector<double> record; task.journal && task.journal->Next(CallAt("iterate", s.point), &record)) {
       Unpack(record, &s);
       continue;
     }
@@ -295,7 +295,7 @@ SolveResult Locally(const SolveTask& task, const FitPoint& start, const SolveOpt
     const FitPoint before = s.point;
     Advance(task.problem, options, algorithm, &s);
     // A round that the deadline cut short is made anew.
-    if (task.journal && !IsLate(options.deadline)) task.journal->Append(before, Pack(s));
+    if (task.journal && !IsLate(options.deadline)) task.journal->Append(CallAt("iterate", before), Pack(s));
   }
   return {.point = s.point, .cost = s.cost, .termination = s.termination, .iterations = s.iterations, .work = s.work};
 }

@@ -3,16 +3,18 @@
 namespace gapscope {
 
 Evaluation JournaledObjective::Evaluate(const FitPoint& point, Keep keep) {
-  if (std::vector<double> record; journal_.Next(point, &record)) return UnpackEvaluation(record);
+  const Hasher call = CallAt("evaluate", point);
+  if (std::vector<double> record; journal_.Next(call, &record)) return UnpackEvaluation(record);
   Evaluation result = inner_.Evaluate(point, keep);
-  journal_.Append(point, Pack(result));
+  journal_.Append(call, Pack(result));
   return result;
 }
 
 Linearization JournaledObjective::Linearize(const FitPoint& point, const DifferenceOptions& options) {
-  if (std::vector<double> record; journal_.Next(point, &record)) return UnpackLinearization(record);
+  const Hasher call = CallAt("linearize", point).Number(options.step).Number(static_cast<int>(options.columns));
+  if (std::vector<double> record; journal_.Next(call, &record)) return UnpackLinearization(record);
   Linearization result = inner_.Linearize(point, options);
-  journal_.Append(point, Pack(result));
+  journal_.Append(call, Pack(result));
   return result;
 }
 

@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "src/core/file.h"
 #include "src/report/tune_report.h"
@@ -41,6 +43,11 @@ class JournalTest : public ::testing::Test {
     options.solve.seed = seed;
     options.solve.max_iterations = 8;
     options.solve.optimizer = optimizer_;
+    std::atomic<bool> stop = false;
+    if (stop_at_ > 0) {
+      options.solve.deadline.stop = &stop;
+      options.solve.progress = [&, calls = 0](const auto&) mutable { stop = ++calls >= stop_at_; };
+    }
     return Tune(*rig_.model, SplitData(logs_, {}), rig_.model->Nominal(), options, pool);
   }
   // The whole result but the time that it took.
@@ -49,6 +56,7 @@ class JournalTest : public ::testing::Test {
   }
 
   std::string optimizer_ = "lm";
+  int stop_at_ = 0;  // the iteration at whose end the run is interrupted; 0: none
   std::filesystem::path folder_;
   Rig rig_;
   std::vector<Recording> logs_;
@@ -65,6 +73,19 @@ TEST_F(JournalTest, ResumedRunEndsInTheSameBytes) {
     EXPECT_TRUE(whole == Bytes(Run(Path("cut"), true))) << "cut after " << size << " bytes";
     // What was lost has been written again.
     EXPECT_TRUE(bytes == ReadFile(Path("cut")).value()) << "cut after " << size << " bytes";
+  }
+}
+
+// It ends in order, with a result of what it has, whose numbers are in the journal too.
+TEST_F(JournalTest, InterruptedRunGoesOnToTheSameBytes) {
+  const std::string whole = Bytes(Run("", false));
+  for (stop_at_ = 1; stop_at_ <= 16; ++stop_at_) {
+    ASSERT_TRUE(Run(Path("stopped"), false).ok());
+    const int stopped = std::exchange(stop_at_, 0);
+    const auto resumed = Run(Path("stopped"), true);
+    stop_at_ = stopped;
+    ASSERT_TRUE(resumed.ok()) << stopped << ": " << resumed.error().Text();
+    EXPECT_TRUE(whole == Bytes(resumed)) << "interrupted in iteration " << stopped;
   }
 }
 

@@ -49,8 +49,11 @@ struct EvidencePolicy {
   double per_block = 4;                         // what half a second of residuals counts for
   double free_run_s = 20;                       // free runs: of logs twice as long as this only parts this long
   std::size_t free_runs = 8;                    // so many of them
-  std::size_t draws = 200;                      // of held-out half seconds, for the intervals of shares
-  double most_gain = 3;                         // above it a gain says nothing more
+  // By which intervals of sizes are wider than their covariance says: a set that is not quite right leaves more than
+  // noise and torques. Fitted to banks (docs/results/diagnosis.md).
+  double interval_factor = 1.6;
+  std::size_t draws = 200;  // of held-out half seconds, for the intervals of shares
+  double most_gain = 3;     // above it a gain says nothing more
   // For two to be told as one: most of their gain that shows when one of them is taken out, or least share of the
   // larger gain that the lesser one is. For two to be there both or neither: most of what one gains that it also gains
   // without the other.

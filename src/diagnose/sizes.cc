@@ -17,6 +17,12 @@ Eigen::Index LogarithmOf(const SearchSpace& space, int parameter) {
   return found == coordinates.end() ? -1 : found - coordinates.begin();
 }
 
+// An interval's end, as much farther from the value as the policy says: of a logarithm by a factor.
+double Widened(double value, double end, bool logarithmic) {
+  const double factor = kDiagnosePolicy.evidence.interval_factor;
+  return logarithmic && end / value > 0 ? value * std::pow(end / value, factor) : value + factor * (end - value);
+}
+
 // The base parameter that a size is known best beside. Its deviation is that of ln(size / parameter).
 void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int parameter, EffectEstimate* size) {
   const SearchSpace& space = candidate.problem->space();
@@ -36,7 +42,10 @@ void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int pa
                  factor =
                      std::exp(HalfInterval(c, uncertainty.of_prior, uncertainty.freedom,
                                            Eigen::VectorXd::Unit(c.rows(), own) - Eigen::VectorXd::Unit(c.rows(), k)));
-    size->ratio = {.to = space.parameter(other).name, .value = value, .low = value / factor, .high = value * factor};
+    size->ratio = {.to = space.parameter(other).name,
+                   .value = value,
+                   .low = Widened(value, value / factor, true),
+                   .high = Widened(value, value * factor, true)};
   }
 }
 
@@ -61,8 +70,12 @@ std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& 
       for (std::size_t i = 0; i < uncertainty.tuned.size(); ++i) {
         const TunedParameter &tuned = uncertainty.tuned[i], &coarse = over_kinks.tuned[i];
         if (candidate.model->parameters()[tuned.index].name != p.name) continue;
-        EffectEstimate size{p.key, p.unit, tuned.value, std::min(tuned.low, coarse.low),
-                            std::max(tuned.high, coarse.high)};
+        const bool logarithmic = LogarithmOf(candidate.problem->space(), tuned.index) >= 0;
+        const auto end = [&](double narrow) {
+          return std::clamp(Widened(tuned.value, narrow, logarithmic), p.low, p.high);
+        };
+        EffectEstimate size{p.key, p.unit, tuned.value, end(std::min(tuned.low, coarse.low)),
+                            end(std::max(tuned.high, coarse.high))};
         if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, tuned.index, &size);
         sizes[use].push_back(std::move(size));
       }

@@ -241,6 +241,7 @@ ordered_json JsonPolicy() {
                                {"evidence.per_block", policy.evidence.per_block},
                                {"evidence.free_run_s", policy.evidence.free_run_s},
                                {"evidence.free_runs", policy.evidence.free_runs},
+                               {"evidence.interval_factor", policy.evidence.interval_factor},
                                {"evidence.draws", policy.evidence.draws},
                                {"evidence.most_gain", policy.evidence.most_gain},
                                {"evidence.alone", policy.evidence.alone},

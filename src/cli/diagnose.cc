@@ -67,15 +67,16 @@ Status WriteBundle(const CommandFlags& flags, const Bundle& bundle, const Diagno
 // With --expect: are the digits those of `expected`?
 int StatusOf(const CommandFlags& flags, const nlohmann::ordered_json& expected, const DiagnoseRun& run) {
   if (flags.expect.empty()) return kDone;
-  const std::string differences = Differences(expected, ToJson(run));
+  const nlohmann::ordered_json got = ToJson(run);
+  const std::string differences = Differences(expected, got);
   if (differences.empty()) {
     if (!flags.common.quiet) fmt::print(stderr, "gapscope: the same digits as {}\n", flags.expect);
     return kDone;
   }
   fmt::print(stderr, "gapscope: other digits than {}\n{}", flags.expect, differences);
   const auto versions = expected.value("versions", nlohmann::ordered_json::object());
-  if (const auto own = ToJson(run)["versions"]; versions != own)
-    fmt::print(stderr, "it was made by {}, this is {}\n", versions.dump(), own.dump());
+  if (versions != got["versions"])
+    fmt::print(stderr, "it was made by {}, this is {}\n", versions.dump(), got["versions"].dump());
   return kBelowThreshold;
 }
 

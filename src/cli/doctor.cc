@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -25,6 +26,7 @@
 #include "src/core/names.h"
 #include "src/log/foreign.h"
 #include "src/model/rig.h"
+#include "src/report/json.h"
 #include "src/report/version.h"
 #include "src/video/cairo_library.h"
 #include "src/video/encoder.h"
@@ -93,14 +95,21 @@ Health LookAtPlugins(const std::string&) {
           .cure = "libgapscope_plugins.so must be of this program's version: install the two together"};
 }
 
+// In a process of its own: what MuJoCo or a driver ends must not end this one. Empty: nothing is wrong.
+std::string FaultOf(const std::function<std::string()>& work) {
+  return TryApart([&] {
+    mju_user_error = [](const char* message) { throw std::runtime_error(message); };
+    return work();
+  });
+}
+
 Health LookAtModel(const std::string&) {
   // As an effect would be added to a rig: a joint with a plugin on it, stepped.
   constexpr const char* kMjcf =
       "<mujoco><extension><plugin plugin='gapscope.friction'><instance name='f'><config key='joint' value='j'/>"
       "</instance></plugin></extension><worldbody><body><joint name='j' frictionloss='1e-9'/><geom size='0.1'/>"
       "<plugin plugin='gapscope.friction' instance='f'/></body></worldbody></mujoco>";
-  const std::string fault = TryApart([&]() -> std::string {
-    mju_user_error = [](const char* message) { throw std::runtime_error(message); };
+  const std::string fault = FaultOf([&]() -> std::string {
     char message[512] = "";
     const SpecPtr spec(mj_parseXMLString(kMjcf, nullptr, message, sizeof message));
     if (!spec) return message;
@@ -114,10 +123,9 @@ Health LookAtModel(const std::string&) {
   return {.good = false, .found = fault, .cure = "install the program again; then please report this"};
 }
 
-// A context in which MuJoCo's renderer starts: in a process of its own, for one opens one library only.
+// A context in which MuJoCo's renderer starts: apart, for a process opens one library only.
 Health LookAtGl(GlBackend backend, const char* cure) {
-  const std::string fault = TryApart([&]() -> std::string {
-    mju_user_error = [](const char* message) { throw std::runtime_error(message); };
+  const std::string fault = FaultOf([&]() -> std::string {
     if (const auto opened = OpenGl(backend, 1, nullptr); !opened.ok()) return opened.error().actual;
     const auto context = GlContext::Make();
     if (!context.ok()) return context.error().what;
@@ -270,10 +278,8 @@ Result<int> RunDoctor(const DoctorFlags& flags) {
     if (!flags.common.json) PrintHealth(check, health);
   }
   if (flags.common.json) {
-    const nlohmann::ordered_json json = {{"schema", "gapscope.doctor/1"},
-                                         {"good", lacking.empty()},
-                                         {"checks", checks},
-                                         {"versions", {{"gapscope", GapscopeVersion()}, {"mujoco", MujocoVersion()}}}};
+    const nlohmann::ordered_json json = {
+        {"schema", "gapscope.doctor/1"}, {"good", lacking.empty()}, {"checks", checks}, {"versions", JsonVersions()}};
     // Paths may hold any bytes.
     fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else if (lacking.empty()) {

@@ -83,9 +83,7 @@ Result<ResultLogs> LogsOf(const ordered_json& json, const std::string& where) {
 
 LogFindings Look(const ResultModel& result, Recording recording, const CommonFlags& common, ThreadPool& pool) {
   const ReplayDefaults& replay = result.model->rig()->experiment().replay;
-  TuneOptions options{.window_s = replay.window_s, .starts = 1};
-  options.solve.seed = common.seed;
-  if (replay.mode == ReplayMode::kWindows) options.objective = ObjectiveKind::kWindows;
+  const TuneOptions options = DefaultTuneOptions(replay, 1, common.seed);
   LogFindings found{.sizes = std::vector<SeriesValue>(result.model->parameters().size(), {.value = kNaN})};
   std::vector<Recording> one;
   one.push_back(std::move(recording));

@@ -17,9 +17,8 @@ using nlohmann::ordered_json;
 
 // The fit of a unit's logs. Nothing in it depends on when, where or how fast it was made.
 Result<ordered_json> TuneUnit(const Plan& plan, Session session) {
-  TuneOptions options{.window_s = session.experiment.replay.window_s, .starts = plan.options.at("starts")};
-  options.solve.seed = plan.options.at("seed");
-  if (session.experiment.replay.mode == ReplayMode::kWindows) options.objective = ObjectiveKind::kWindows;
+  const TuneOptions options =
+      DefaultTuneOptions(session.experiment.replay, plan.options.at("starts"), plan.options.at("seed"));
   GS_ASSIGN(const TuneSummary tuned,
             Tune(*session.model, SplitData(std::move(session.recordings), {}), session.values, options, *session.pool));
   return ToJson(TuneRunOf(tuned, *session.model, options.solve.seed), Timing::kLeaveOut);

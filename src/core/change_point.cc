@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "src/core/statistics.h"
 
@@ -135,20 +134,6 @@ ChangePoint StepAt(std::span<const SeriesValue> series, std::size_t first) {
   const double scale = std::max(least, left / static_cast<double>(freedom));
   const double t = (b.mean - a.mean) / std::sqrt(scale * (1 / a.weight + 1 / b.weight));
   return {.first = first, .before = a.mean, .after = b.mean, .chance = StudentTails(t, freedom)};
-}
-
-double StudentTails(double t, std::size_t freedom) {
-  // The finite sums of Abramowitz & Stegun 26.7.3 and 26.7.4.
-  const double angle = std::atan(std::abs(t) / std::sqrt(static_cast<double>(freedom)));
-  const double cosine = std::cos(angle), square = cosine * cosine;
-  const bool odd = freedom % 2 == 1;
-  double term = odd ? cosine : 1, sum = freedom == 1 ? 0 : term;
-  for (std::size_t k = odd ? 3 : 2; k + 2 <= freedom; k += 2) {
-    term *= square * static_cast<double>(k - 1) / static_cast<double>(k);
-    sum += term;
-  }
-  const double within = std::sin(angle) * sum;
-  return std::max(1e-15, 1 - (odd ? 2 / std::numbers::pi * (angle + within) : within));
 }
 
 std::vector<ChangePoint> FindChanges(std::span<const SeriesValue> series, double chance) {

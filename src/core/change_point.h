@@ -33,9 +33,6 @@ std::vector<ChangePoint> FindChanges(std::span<const SeriesValue> series, double
 // this place alone. Of two estimates the variance is what they state, and they must state one.
 ChangePoint StepAt(std::span<const SeriesValue> series, std::size_t first);
 
-// That Student's t with `freedom` degrees of freedom, 1 or more, lies further from zero than `t` on either side.
-double StudentTails(double t, std::size_t freedom);
-
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_CORE_CHANGE_POINT_H_

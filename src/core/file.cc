@@ -77,33 +77,6 @@ Result<std::string> TemporaryBeside(const std::string& path) {
   return name;
 }
 
-Status WriteFile(const std::string& path, std::string_view bytes) {
-  GS_ASSIGN(const std::string temporary, TemporaryBeside(path));
-  const Descriptor file(open(temporary.c_str(), O_WRONLY | O_CLOEXEC));
-  if (file.get() < 0) {
-    const Error error = SystemError("cannot write the file", path);
-    unlink(temporary.c_str());
-    return error;
-  }
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t put = write(file.get(), bytes.data() + done, bytes.size() - done);
-    if (put < 0 && errno == EINTR) continue;
-    if (put < 0) {
-      const Error error = SystemError("cannot write the file", path);
-      unlink(temporary.c_str());
-      return error;
-    }
-    done += static_cast<std::size_t>(put);
-  }
-  if (rename(temporary.c_str(), path.c_str()) != 0) {
-    const Error error = SystemError("cannot rename the finished file to its place", path);
-    unlink(temporary.c_str());
-    return error;
-  }
-  return Ok();
-}
-
 PartWriter::PartWriter(std::string path, std::string temporary, FILE* file)
     : path_(std::move(path)), temporary_(std::move(temporary)), file_(file, &std::fclose) {}
 
@@ -121,15 +94,22 @@ PartWriter::~PartWriter() {
 }
 
 void PartWriter::Write(std::string_view bytes) {
-  failed_ = failed_ || std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size();
+  if (status_.ok() && std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
+    status_ = SystemError("cannot write the file", path_);
 }
 
 Status PartWriter::Finish() {
-  const bool written = std::fclose(file_.release()) == 0 && !failed_;
-  if (written && rename(temporary_.c_str(), path_.c_str()) == 0) return Ok();
-  const Error error = SystemError("cannot write the file", path_);
-  unlink(temporary_.c_str());
-  return error;
+  if (std::fclose(file_.release()) != 0 && status_.ok()) status_ = SystemError("cannot write the file", path_);
+  if (status_.ok() && rename(temporary_.c_str(), path_.c_str()) != 0)
+    status_ = SystemError("cannot rename the finished file to its place", path_);
+  if (!status_.ok()) unlink(temporary_.c_str());
+  return status_;
+}
+
+Status WriteFile(const std::string& path, std::string_view bytes) {
+  GS_ASSIGN(PartWriter file, PartWriter::Open(path));
+  file.Write(bytes);
+  return file.Finish();
 }
 
 }  // namespace gapscope

@@ -39,7 +39,7 @@ class PartWriter {
 
   std::string path_, temporary_;
   std::unique_ptr<FILE, int (*)(FILE*)> file_;
-  bool failed_ = false;
+  Status status_ = Ok();  // of what was written so far
 };
 
 }  // namespace gapscope

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 namespace gapscope {
 namespace {
@@ -55,9 +56,23 @@ double StudentQuantile(double freedom) {
   if (freedom <= 2) return 4.303;
   if (freedom <= 3) return 3.182;
   // Cornish and Fisher's expansion about the normal quantile.
-  const double n = freedom, z = 1.959964, z2 = z * z;
+  const double n = freedom, z = kNormalQuantile, z2 = z * z;
   return z + z * (z2 + 1) / (4 * n) + z * (5 * z2 * z2 + 16 * z2 + 3) / (96 * n * n) +
          z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
+}
+
+double StudentTails(double t, std::size_t freedom) {
+  // The finite sums of Abramowitz & Stegun 26.7.3 and 26.7.4.
+  const double angle = std::atan(std::abs(t) / std::sqrt(static_cast<double>(freedom)));
+  const double cosine = std::cos(angle), square = cosine * cosine;
+  const bool odd = freedom % 2 == 1;
+  double term = odd ? cosine : 1, sum = freedom == 1 ? 0 : term;
+  for (std::size_t k = odd ? 3 : 2; k + 2 <= freedom; k += 2) {
+    term *= square * static_cast<double>(k - 1) / static_cast<double>(k);
+    sum += term;
+  }
+  const double within = std::sin(angle) * sum;
+  return std::max(1e-15, 1 - (odd ? 2 / std::numbers::pi * (angle + within) : within));
 }
 
 }  // namespace gapscope

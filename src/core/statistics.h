@@ -28,9 +28,14 @@ double Quantile(std::vector<double> values, double share);
 // The middle value, of an even number the upper of the two; NaN of none.
 double Median(std::vector<double> values);
 
+inline constexpr double kNormalQuantile = 1.959964;  // 95 % of a normal distribution lie within so many deviations
+
 // 97.5 % quantile of Student's t with `freedom` degrees of freedom (Abramowitz & Stegun 26.7.5 with three terms; up to
 // 3 the value of the next whole number).
 double StudentQuantile(double freedom);
+
+// That Student's t with `freedom` degrees of freedom, 1 or more, lies further from zero than `t` on either side.
+double StudentTails(double t, std::size_t freedom);
 
 }  // namespace gapscope
 

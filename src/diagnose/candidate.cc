@@ -34,6 +34,13 @@ std::string Candidate::Name() const {
   return name.empty() ? "none" : name;
 }
 
+void ChooseWindows(const Model& model, std::size_t max_windows, Workbench* bench) {
+  bench->max_windows = max_windows;
+  bench->windows.reset();
+  bench->windows =
+      std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
+}
+
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use) {
   return std::find(set.begin(), set.end(), use) != set.end();
 }

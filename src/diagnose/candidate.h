@@ -88,6 +88,9 @@ struct Workbench {
   bool TimeIsOver() const { return !(journal && journal->replaying()) && IsLate(deadline); }
 };
 
+// The windows to fit are chosen once, not by every candidate: of long logs that is a look at every row.
+void ChooseWindows(const Model& model, std::size_t max_windows, Workbench* bench);
+
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use);
 
 // The model of `effects`, unfitted. Errors: effects that do not go together.

@@ -194,15 +194,6 @@ std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& be
       1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }
 
-// The windows to fit are chosen once, not by every candidate: of long logs that is a look at every row.
-void ChooseFitted(const Model& model, std::size_t steps, bool by_windows, Workbench* bench) {
-  bench->by_windows = by_windows;
-  bench->max_windows = WindowsIn(steps, model, *bench);
-  bench->windows.reset();
-  bench->windows =
-      std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
-}
-
 // One replay of the training windows.
 struct OneReplay {
   std::size_t steps = 0;
@@ -224,8 +215,8 @@ std::size_t KeepToTime(const Model& model, const DiagnoseOptions& options, Workb
   const double needed_s = all.seconds * static_cast<double>(kDiagnosePolicy.search.least_replays);
   if (!(options.budget_s > 0) || needed_s <= options.budget_s) return all.steps;
   *fewer_windows = true;
-  ChooseFitted(model, static_cast<std::size_t>(options.budget_s / needed_s * static_cast<double>(options.replay_steps)),
-               bench->by_windows, bench);
+  const auto steps = static_cast<std::size_t>(options.budget_s / needed_s * static_cast<double>(options.replay_steps));
+  ChooseWindows(model, WindowsIn(steps, model, *bench), bench);
   return ReplayOnce(*bench).steps;
 }
 
@@ -288,7 +279,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     bench.time_step_s =
         ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
             .step_s;
-    ChooseFitted(*model, options.replay_steps, by_windows, &bench);
+    bench.by_windows = by_windows;
+    ChooseWindows(*model, WindowsIn(options.replay_steps, *model, bench), &bench);
     bench.most_steps = MostSteps(options.effort, KeepToTime(*model, options, &bench, &fewer_windows));
     bench.deadline = deadline;
     bench.journal = journal.get();

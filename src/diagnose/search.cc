@@ -74,6 +74,7 @@ class Searcher {
     if (!result_.columns.valid) return;
     RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
     for (const Hint& hint : hints) {
+      if (hint.effects.empty()) continue;
       say_("refitting " + NameOfSet(hint.effects));
       result_.ledger.Refit(hint.effects, *result_.base, hint.values, {}, Effort::kTry);
     }

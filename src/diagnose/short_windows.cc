@@ -30,10 +30,8 @@ double ShortestWindow(const DataSplit& data) {
 Workbench WithWindows(const Workbench& bench, const Model& model, double window_s) {
   Workbench other = bench;
   other.window_s = window_s;
-  other.max_windows = static_cast<std::size_t>(static_cast<double>(bench.max_windows) * bench.window_s / window_s);
-  other.windows.reset();
-  other.windows =
-      std::make_shared<const std::vector<LogWindow>>(TakenWindows(other.data.train, other.Options(model, true)));
+  const double count = static_cast<double>(bench.max_windows) * bench.window_s / window_s;
+  ChooseWindows(model, static_cast<std::size_t>(count), &other);
   other.work = std::make_shared<Work>();
   other.most_steps =
       static_cast<std::size_t>(kDiagnosePolicy.search.short_share * static_cast<double>(bench.most_steps));

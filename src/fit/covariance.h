@@ -28,8 +28,6 @@ struct FlatDirection {
   double deviation = 0;  // standard deviation along it, as a share of the range
 };
 
-inline constexpr double kNormalQuantile = 1.959964;  // 95 % of a normal distribution lie within so many deviations
-
 // How parameters vary together: the covariance of ln |value| where `logarithmic`, of the value elsewhere. Few blocks
 // count: kNormalQuantile deviations are the 95 % interval.
 struct Spread {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "src/core/change_point.h"
+#include "src/core/statistics.h"
 
 namespace gapscope {
 namespace {
@@ -33,7 +34,7 @@ SeriesValue OfProbability(double probability) {
 }
 
 std::map<std::string, Series> SeriesOf(std::span<const UnitResult> units) {
-  constexpr double kIntervalWidth = 2 * 1.959964;  // of a 95 % interval, in standard errors
+  constexpr double kIntervalWidth = 2 * kNormalQuantile;  // of a 95 % interval, in standard errors
   std::map<std::string, Series> all;
   for (std::size_t i = 0; i < units.size(); ++i) {
     const UnitResult& unit = units[i];

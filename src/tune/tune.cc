@@ -254,6 +254,13 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   return problem.Predict(found.point);
 }
 
+TuneOptions DefaultTuneOptions(const ReplayDefaults& replay, int starts, unsigned long seed) {
+  TuneOptions options{.window_s = replay.window_s, .starts = starts};
+  options.solve.seed = seed;
+  if (replay.mode == ReplayMode::kWindows) options.objective = ObjectiveKind::kWindows;
+  return options;
+}
+
 Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::vector<double>& start,
                          const TuneOptions& asked, ThreadPool& pool) {
   const auto begin = std::chrono::steady_clock::now();

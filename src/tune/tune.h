@@ -28,6 +28,9 @@ struct TuneOptions {
   bool resume = false;
 };
 
+// Of a fit that is asked for nothing but starts and a seed: windows as the experiment's replays.
+TuneOptions DefaultTuneOptions(const ReplayDefaults& replay, int starts, unsigned long seed);
+
 struct TuneSummary {
   std::string optimizer;
   Termination termination = Termination::kConverged;

@@ -33,5 +33,12 @@ TEST(StatisticsTest, StudentQuantilesAreThoseOfTheTables) {
     EXPECT_NEAR(StudentQuantile(n), t, 0.01 * t) << n;
 }
 
+TEST(StatisticsTest, StudentTailsAreThoseOfTheTables) {
+  // Two-sided 95 %, and 99 % at the end.
+  for (const auto& [n, t] : {std::pair{1u, 12.706}, {2u, 4.303}, {5u, 2.571}, {10u, 2.228}, {1000u, 1.962}})
+    EXPECT_NEAR(StudentTails(t, n), 0.05, 1e-4) << n;
+  EXPECT_NEAR(StudentTails(-3.169, 10), 0.01, 1e-5);
+}
+
 }  // namespace
 }  // namespace gapscope

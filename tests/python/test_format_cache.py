@@ -15,7 +15,8 @@ from gapscope._program import program
 from gapscope.formats import Source, _cache
 from gapscope.formats._cache import through_cache
 
-from test_formats import converter, write_mcap_json
+from test_converter import converter
+from test_formats import write_mcap_json
 
 
 class Converter:

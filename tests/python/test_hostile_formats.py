@@ -16,7 +16,8 @@ import gapscope as gs
 import numpy as np
 import pytest
 from gapscope._program import program
-from test_formats import Q, ROWS, TIME, converter, write_bag, write_ros1_bag
+from test_converter import converter
+from test_formats import Q, ROWS, TIME, write_bag, write_ros1_bag
 
 pytest.importorskip("scipy")
 pa = pytest.importorskip("pyarrow")

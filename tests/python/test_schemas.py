@@ -22,7 +22,7 @@ from gapscope._results import Open
 from referencing import Registry, Resource
 
 from conftest import ROOT
-from test_formats import converter
+from test_converter import converter
 
 Schema: typing.TypeAlias = dict[str, Any]
 FILES = {path.name: path for path in sorted((ROOT / "schemas").iterdir())}

@@ -14,7 +14,7 @@ from gapscope._program import program
 from gapscope.formats import Table, _joint_states, read_table
 
 from conftest import ROOT
-from test_formats import converter
+from test_converter import converter
 
 
 @pytest.fixture(autouse=True)

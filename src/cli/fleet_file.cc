@@ -95,12 +95,12 @@ Result<std::vector<PlanUnit>> UnitsOf(const std::string& file, const std::vector
       groups[alone ? std::vector<std::string>{log.path} : log.columns].insert(log.path);
     }
   }
-  std::vector<PlanUnit> units;
-  for (const auto& [group, logs] : groups)
-    units.push_back({.id = {},
-                     .group = plan->columns.empty() ? std::vector<std::string>{} : group,
-                     .logs = {logs.begin(), logs.end()}});
-  return units;
+  return Collect(groups, [&](const auto& unit) {
+    const auto& [group, logs] = unit;
+    return PlanUnit{.id = {},
+                    .group = plan->columns.empty() ? std::vector<std::string>{} : group,
+                    .logs = {logs.begin(), logs.end()}};
+  });
 }
 
 // The tables of a merge have these of their own.

@@ -26,10 +26,11 @@ Result<ordered_json> TuneUnit(const Plan& plan, Session session) {
 
 // Empty: it was interrupted.
 Result<ordered_json> DiagnoseUnit(const Plan& plan, const PlanUnit& unit, const PlanFolderFlags& flags) {
-  DiagnoseFlags diagnose{.common = flags.common,
-                         .model = ModelOf(plan, unit),
-                         .effort = *ValueOf<SearchEffort>(plan.options.at("effort").get<std::string>()),
-                         .no_next_experiment = true};
+  const std::string name = plan.options.at("effort");
+  const auto effort = ValueOf<SearchEffort>(name);
+  if (!effort) return NoSuch("no such effort", name, NamesOf<SearchEffort>(), flags.folder + "/plan.json");
+  DiagnoseFlags diagnose{
+      .common = flags.common, .model = ModelOf(plan, unit), .effort = *effort, .no_next_experiment = true};
   diagnose.common.seed = plan.options.at("seed");
   diagnose.common.out = plan.reports ? ReportFolder(flags.folder, unit).string() : "";
   GS_ASSIGN(const DiagnoseRun run, DiagnoseLogs(diagnose));

@@ -44,8 +44,8 @@ std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& d
 }
 
 std::vector<double> WeightsOf(const Experiment& experiment, const std::vector<double>& noise) {
-  std::vector<double> weights;
-  for (std::size_t i = 0; i < noise.size(); ++i) weights.push_back(experiment.measured[i].scored ? 1 / noise[i] : 0);
+  std::vector<double> weights(noise.size());
+  for (std::size_t i = 0; i < noise.size(); ++i) weights[i] = experiment.measured[i].scored ? 1 / noise[i] : 0;
   return weights;
 }
 

@@ -2,7 +2,6 @@
 # what the package depends on from the libraries that its programs are linked with.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "The gapscope maintainers")
-set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)

@@ -2,7 +2,9 @@
 # Struct layouts change from minor version to minor version, so each is compiled against the headers of its own wheel.
 # A version whose wheel scripts/wheel has not fetched is left out.
 set(_destination plugins)
-install(TARGETS gapscope_plugins LIBRARY DESTINATION ${_destination}/${GAPSCOPE_MUJOCO_VERSION} COMPONENT program)
+# A component of its own: `cmake --install` without --component leaves it out.
+install(TARGETS gapscope_plugins LIBRARY DESTINATION ${_destination}/${GAPSCOPE_MUJOCO_VERSION}
+        COMPONENT wheel EXCLUDE_FROM_ALL)
 add_custom_target(gapscope_wheel_plugins DEPENDS gapscope_plugins)
 
 get_target_property(_sources gapscope_plugins SOURCES)
@@ -27,6 +29,7 @@ foreach(_wheel mujoco_core-4.0.0 mujoco-3.17.0 mujoco-3.16.0 mujoco-3.15.0 mujoc
   file(GLOB _lib ${_sdk}/mujoco/libmujoco.so.*)
   target_link_libraries(${_target} PRIVATE ${_lib} muparser::muparser gapscope::warnings)
   add_dependencies(gapscope_wheel_plugins ${_target})
-  install(TARGETS ${_target} LIBRARY DESTINATION ${_destination}/${_version} COMPONENT program OPTIONAL)
+  install(TARGETS ${_target} LIBRARY DESTINATION ${_destination}/${_version}
+          COMPONENT wheel EXCLUDE_FROM_ALL OPTIONAL)
 endforeach()
 set(CMAKE_SKIP_RPATH OFF)

@@ -119,7 +119,7 @@ class Solver:
                 lines.append(f"| {name} | {value:.8g} | {truth:.8g} | {off} |")
                 continue
             interval = inside = ""
-            if low is not None:
+            if low is not None and high is not None:
                 interval = f"{low:.6g} .. {high:.6g}"
                 inside = "yes" if low <= truth <= high else "no"
                 self.intervals += name in command.table

@@ -150,9 +150,9 @@ class Solver:
             self.write_levels(name, given)
         for line in experiment.design:
             self.show(line, self.shell(line))
-        made = [f"logs/{name}: `{self.make_log(name, line)}`" for name, line in experiment.twin.items()]
+        made = [f"$ {' '.join(self.make_log(*log).split())}   # logs/{log[0]}" for log in experiment.twin.items()]
         if made:
-            self.parts.append("The twin's logs:\n\n" + "\n".join(f"- {' '.join(line.split())}" for line in made))
+            self.parts.append("\n".join(["The twin makes:\n\n```text", *made, "```"]))
         for command in experiment.commands:
             self.run(command)
 

@@ -39,6 +39,11 @@ def arguments(words: list[str]) -> argparse.Namespace:
         parser.error(f"no system {unknown[0]!r} in {COURSE}; allowed: {', '.join(systems())}")
     if given.seed is not None and (given.check or given.seed < 0):
         parser.error(f"--seed {given.seed}: allowed: a whole number from 0, without --check; leave one out")
+    if not given.check:
+        try:
+            given.out.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            parser.error(f"--out {given.out}: {problem.strerror}; allowed: a folder that can be written; take another")
     for program in ("gapscope", "gapscope_twin"):
         if not (BIN / program).is_file():
             parser.error(f"{BIN / program} is not there; build it: cmake --build build --target {program}")
@@ -80,7 +85,6 @@ def zipped(folder: Path, to: Path) -> None:
 
 def hand_out(system: System, work: Path, to: Path) -> None:
     """The folder and its zip: written beside, then renamed."""
-    to.parent.mkdir(parents=True, exist_ok=True)
     partial = to.with_name(to.name + ".partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir()
@@ -102,6 +106,9 @@ def make(name: str, given: argparse.Namespace) -> bool:
     """False where --check finds another text."""
     system = read_system(COURSE / name)
     check_handout(system)
+    to = given.out.resolve() / (name if given.seed is None else f"{name}-{given.seed}")
+    if to.exists() and ((to / "course.yaml").exists() or not (to / "handout.md").exists()):
+        raise BadCourse(f"{to} is there and is no handout; allowed: none, or an older handout; choose another --out")
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         lay_out(system, work)
@@ -112,7 +119,6 @@ def make(name: str, given: argparse.Namespace) -> bool:
             sys.stdout.writelines(difflib.unified_diff(old.splitlines(True), text.splitlines(True),
                                                        str(path.relative_to(ROOT)), "the program"))
             return old == text
-        to = given.out.resolve() / (name if given.seed is None else f"{name}-{given.seed}")
         hand_out(system, work, to)
         written(path if given.seed is None else to.with_name(f"{to.name}-solution.md"), text)
     print(f"{to}.zip", file=sys.stderr)

@@ -67,6 +67,8 @@ def test_another_rig_has_a_handout_of_its_own(tmp_path: Path) -> None:
         (["cube"], "no system 'cube'"),
         (["--seed", "-1"], "--seed -1: allowed: a whole number from 0"),
         (["--check", "--seed", "2"], "without --check"),
+        (["--out", "/proc/nothing"], "--out /proc/nothing: No such file or directory; allowed"),
+        (["--out", str(ROOT / "course"), "flexible"], "is there and is no handout"),
     ],
 )
 def test_bad_arguments(words: list[str], says: str) -> None:

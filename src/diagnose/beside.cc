@@ -8,6 +8,7 @@
 #include "src/core/dense.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/discrepancy.h"
+#include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/torques.h"
 
@@ -150,6 +151,18 @@ BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::ve
     result.free_form = FreeFormShare(free_form, TorquesBeside(free_form, residuals));
   final.derivatives.reset();
   return result;
+}
+
+bool IsExcludedBeyond(const Workbench& bench, Candidate& at, const EffectUse& simpler, const EffectUse& richer) {
+  const auto shapes = UsualBeyond(bench, at, simpler, richer);
+  if (shapes.empty()) return true;
+  auto child = MakeCandidate(bench, With(Without(at.effects, simpler), richer));
+  if (!child.ok()) return true;
+  const ColumnTable table = MakeInPlace(bench, at, child.value(), richer, shapes, MakeTorques(bench));
+  if (!table.valid) return true;
+  const TorquePrior torques = TorquesBeside(table, at.problem->residuals());
+  return std::all_of(table.trials.begin(), table.trials.end(),
+                     [&](const Trial& trial) { return UpperCoefficient(table, trial, false, torques) < 1; });
 }
 
 }  // namespace gapscope

@@ -24,6 +24,11 @@ struct BesideTorques {
 // `final`: a fitted set. `uses`: of which bounds are wanted.
 BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::vector<EffectUse>& uses);
 
+// Whether the logs would show what `richer` usually is beyond `simpler` of the fitted set `at`, whose place it takes,
+// and do not: each of its shapes is excluded beside the torques (EvidencePolicy::bound_deviations). True where nothing
+// is known of its shapes.
+bool IsExcludedBeyond(const Workbench& bench, Candidate& at, const EffectUse& simpler, const EffectUse& richer);
+
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_DIAGNOSE_BESIDE_H_

@@ -301,6 +301,19 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
   return Finish(bench, parent, std::move(wanted), torques);
 }
 
+ColumnTable MakeInPlace(const Workbench& bench, Candidate& parent, Candidate& child, const EffectUse& use,
+                        const std::vector<std::vector<double>>& values, const std::vector<ProbeTorque>& torques) {
+  Wanted wanted = WantedOf(parent);
+  Asked asked{.use = use, .moved = {}};
+  for (const auto& shape : values) {
+    asked.of_trial.push_back(asked.trials.size());
+    asked.trials.push_back({.use = use, .values = shape});
+    asked.columns.push_back(shape);
+  }
+  AddTrials(bench, child, {std::move(asked)}, &wanted);
+  return Finish(bench, parent, std::move(wanted), torques);
+}
+
 ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques) {
   constexpr long kHalfSeconds = 4;
   return Finish(bench, parent, WantedOf(parent), torques,

@@ -228,6 +228,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.where = Locate(*bench.rig, PredictHeldOut(bench, base), bench.data.held_out, seed);
   result.remains = &chosen == &base ? result.where : Locate(*bench.rig, predicted, bench.data.held_out, seed);
   result.cut = found.cut;
+  if (bench.TimeIsOver()) result.cut.emplace_back("fits while judging");
   result.work = *bench.work;
   for (const auto* part : {&bench.data.train, bench.by_windows ? nullptr : &bench.data.held_out}) {
     if (!part) continue;

@@ -1,5 +1,7 @@
 #include "src/diagnose/exchange.h"
 
+#include <algorithm>
+
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
 
@@ -37,6 +39,24 @@ void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution
   for (std::size_t i = 0; i < placed.size(); ++i) (*values)[placed[i].name] = at[i];
 }
 
+std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candidate& at, const EffectUse& simpler,
+                                             const EffectUse& richer) {
+  std::vector<std::vector<double>> all;
+  const StartsFrom& from = EffectOf(richer, *bench.rig).starts_from;
+  if (from.effect != simpler.effect || richer.on != simpler.on || !Has(at.effects, simpler)) return all;
+  const std::string name = PlacedParameters(simpler, *bench.rig, bench.scales).front().name;
+  const double size = at.values[static_cast<std::size_t>(at.model->IndexOf(name))];
+  const auto placed = PlacedParameters(richer, *bench.rig, bench.scales);
+  for (const auto& start : from.starts) {
+    auto& values = all.emplace_back();
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      const double value = start[i].of_simpler * size + start[i].value;
+      values.push_back(value == 0 ? placed[i].start : std::clamp(value, placed[i].low, placed[i].high));
+    }
+  }
+  return all;
+}
+
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort) {
   const ColumnTable& table = found.columns;
@@ -44,7 +64,16 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
   if (trials.empty()) return nullptr;
   std::map<std::string, double> values;
   SetValues(bench, table.trials[trials.back()], SolveSet(table, trials), &values);
-  return found.ledger.Refit(With(Without(found.chosen->effects, members), use), *found.chosen, values, {}, effort);
+  const EffectSet set = With(Without(found.chosen->effects, members), use);
+  Candidate* other = found.ledger.Refit(set, *found.chosen, values, {}, effort);
+  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+  for (const EffectUse& member : members) {
+    for (const auto& start : UsualBeyond(bench, *found.chosen, member, use)) {
+      for (std::size_t i = 0; i < placed.size(); ++i) values[placed[i].name] = start[i];
+      other = found.ledger.Refit(set, *found.chosen, values, {}, effort);
+    }
+  }
+  return other;
 }
 
 }  // namespace gapscope

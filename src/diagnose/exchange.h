@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "src/diagnose/search.h"
 
@@ -13,9 +14,15 @@ namespace gapscope {
 void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution& solution,
                std::map<std::string, double>* values);
 
+// What `richer` usually is where `simpler`, of the fitted set `at`, is all that was looked for: values of its
+// parameters (in the order of PlacedParameters), one list a shape (Effect::starts_from). Empty: nothing is known.
+std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candidate& at, const EffectUse& simpler,
+                                             const EffectUse& richer);
+
 // The chosen set with `use` in the place of `members`, begun from the chosen set's optimum: a set that starts elsewhere
 // and is not at its end looks exactly like a worse one. `use` starts at the trial that does best beside the other
-// members, by arithmetic at the base. Null: it has no column there, or the set cannot be built or simulated.
+// members, by arithmetic at the base, and at what it usually is beyond a member. Null: it has no column there, or the
+// set cannot be built or simulated.
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort);
 

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "src/core/statistics.h"
+#include "src/diagnose/beside.h"
 #include "src/diagnose/evidence.h"
 #include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
@@ -27,7 +28,11 @@ class Judging {
     Couple(&result);
     JudgeComplements(&result);
     AddRivals(&result);
-    result.statements.insert(result.statements.end(), dropped.begin(), dropped.end());
+    AddRicher(&result);
+    for (const Statement& s : dropped) {
+      const auto is_told = [&](const Statement& told) { return told.use == s.use; };
+      if (std::none_of(result.statements.begin(), result.statements.end(), is_told)) result.statements.push_back(s);
+    }
     for (Statement& s : result.statements)
       s.answer = s.probability >= kDiagnosePolicy.probability.present ? Answer::kPresent : Answer::kAbsent;
     AddOthers(&result);
@@ -277,26 +282,45 @@ class Judging {
         const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
         if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;
         if (IsLessLikely(rival.use, member.use, base)) continue;
-        Statement& own = result->statements[m];
-        if (own.group < 0) {
-          own.group = static_cast<int>(result->groups.size());
-          result->groups.push_back({own.use});
-        }
-        auto& group = result->groups[static_cast<std::size_t>(own.group)];
-        if (Has(group, rival.use)) continue;  // told with another member of it
-        group.push_back(rival.use);
-        Statement other{.use = rival.use,
-                        .probability = AtPrior(own.evidence, PriorOf(rival.use)),
-                        .prior = PriorOf(rival.use),
-                        .evidence = own.evidence,
-                        .group = own.group,
-                        .beside = own.beside,
-                        .numbers = own.numbers,
-                        .sets = own.sets,
-                        .rule = "costs as little in its place"};
-        result->statements.push_back(std::move(other));
+        TellWith(m, rival.use, "costs as little in its place", result);
       }
     }
+  }
+
+  // A simpler effect is told alone only where the logs would show what a richer one usually does beyond it.
+  void AddRicher(Judgement* result) {
+    const std::size_t members = found_.members.size();
+    for (std::size_t m = 0; m < members; ++m) {
+      const EffectUse simple = found_.members[m].use;
+      if (result->statements[m].probability < kDiagnosePolicy.probability.present) continue;
+      for (const EffectUse& use : found_.uses) {
+        if (!Contains(use, simple, *bench_.rig, true) || HasMember(use)) continue;
+        if (!IsExcludedBeyond(bench_, *found_.chosen, simple, use))
+          TellWith(m, use, "would not show in these logs beyond " + simple.Text(), result);
+      }
+    }
+  }
+
+  // Told together with a member, as likely.
+  void TellWith(std::size_t member, const EffectUse& use, const std::string& rule, Judgement* result) {
+    Statement& own = result->statements[member];
+    if (own.group < 0) {
+      own.group = static_cast<int>(result->groups.size());
+      result->groups.push_back({own.use});
+    }
+    auto& group = result->groups[static_cast<std::size_t>(own.group)];
+    if (Has(group, use)) return;
+    group.push_back(use);
+    Statement other{.use = use,
+                    .probability = AtPrior(own.evidence, PriorOf(use)),
+                    .prior = PriorOf(use),
+                    .evidence = own.evidence,
+                    .group = own.group,
+                    .beside = own.beside,
+                    .numbers = own.numbers,
+                    .sets = own.sets,
+                    .rule = rule};
+    result->statements.push_back(std::move(other));
   }
 
   // Effects that were looked at and did not enter the set.

@@ -9,8 +9,9 @@
 namespace gapscope {
 namespace {
 
-FitLimits LimitsOf(Effort effort) {
-  switch (effort) {
+// After the time that was asked for no fit goes far: judging is not cut, so it must not take long.
+FitLimits LimitsOf(Effort effort, bool time_is_over) {
+  switch (time_is_over ? Effort::kTaste : effort) {
     case Effort::kTaste:
       return {.iterations = 2, .tolerance = 1e-2};
     case Effort::kTry:
@@ -89,7 +90,7 @@ void Ledger::Try(Candidate* candidate, const Start& start, Effort effort, double
   const bool converged = candidate->converged, scored = candidate->scored;
   const StampShift stamps = candidate->stamps;
   const auto derivatives = candidate->derivatives;
-  FitLimits limits = LimitsOf(effort);
+  FitLimits limits = LimitsOf(effort, bench_.TimeIsOver());
   // An effect that is not there costs nothing more, so that a part's cost is within reach.
   const Candidate* part = BestSubset(*candidate);
   limits.least_known = std::min({start.cost, known, part ? part->train_cost : kInfinity});

@@ -33,7 +33,9 @@ Effect Effect_direction_friction() {
       .of_motion = true,
       .character = EffectCharacter::kDryFriction,
       .contains = {{.effect = "coulomb_friction"}, {.effect = "torque_bias"}},
-      .starts_from = {.effect = "coulomb_friction", .starts = {{{.of_simpler = 1}, {.of_simpler = 1}}}},
+      .starts_from = {.effect = "coulomb_friction",
+                      .starts = {{{.of_simpler = 1.3}, {.of_simpler = 0.7}},
+                                 {{.of_simpler = 0.7}, {.of_simpler = 1.3}}}},
       .same_but_constant = "coulomb_friction",
       .apply = [](Structure& structure, const std::string& on, const std::vector<std::string>& names) -> Status {
         GS_RETURN_IF_ERROR(structure.AddFrictionTerm(on, "friction_positive_n_m", names[0]));

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""site/look.py SITE: scripts/site --look. Opens pages from disk in Chromium at two widths, light and dark; keeps pictures
-in SITE.look; prints what is wrong, exit status 1 then."""
+"""site/look.py SITE: scripts/site --look. Opens pages from disk in Chromium at two widths, light and dark; keeps
+pictures in SITE.look; prints what is wrong, exit status 1 then."""
 import base64
 import hashlib
 import io

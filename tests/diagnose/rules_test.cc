@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 #include <tuple>
 
@@ -29,6 +30,20 @@ TEST(RulesTest, OnlyEffectsOnOnePlaceContainEachOther) {
   EXPECT_TRUE(IsUsual({"stribeck_friction", "arm"}, coulomb, known)) << "a hump at low speed";
   EXPECT_FALSE(IsUsual({"stribeck_friction", "pendulum"}, coulomb, known));
   EXPECT_FALSE(IsUsual({"direction_asymmetry", "arm"}, coulomb, known)) << "mostly alike both ways";
+}
+
+// What a richer effect usually is beyond a simpler one (UsualBeyond) has a value for each of its parameters.
+TEST(RulesTest, StartsFromASimplerEffectAreWholeAndOfOneThatIsContained) {
+  int with_starts = 0;
+  for (const Effect& effect : Catalogue()) {
+    if (effect.starts_from.starts.empty()) continue;
+    ++with_starts;
+    EXPECT_NE(std::ranges::find(effect.contains, effect.starts_from.effect, &Contained::effect), effect.contains.end())
+        << effect.name;
+    for (const auto& start : effect.starts_from.starts)
+      EXPECT_EQ(start.size(), effect.parameters.size()) << effect.name;
+  }
+  EXPECT_GT(with_starts, 0);
 }
 
 TEST(RulesTest, ABiasIsNoFindingOnAPositionServo) {

@@ -153,16 +153,28 @@ BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::ve
   return result;
 }
 
-bool IsExcludedBeyond(const Workbench& bench, Candidate& at, const EffectUse& simpler, const EffectUse& richer) {
-  const auto shapes = UsualBeyond(bench, at, simpler, richer);
-  if (shapes.empty()) return true;
-  auto child = MakeCandidate(bench, With(Without(at.effects, simpler), richer));
-  if (!child.ok()) return true;
-  const ColumnTable table = MakeInPlace(bench, at, child.value(), richer, shapes, MakeTorques(bench));
-  if (!table.valid) return true;
+std::vector<Beyond> NotExcluded(const Workbench& bench, Candidate& at, const std::vector<Beyond>& asked) {
+  std::vector<Beyond> known, open;
+  std::vector<InPlace> children;
+  for (const Beyond& one : asked) {
+    auto shapes = UsualBeyond(bench, at, one.simpler, one.richer);
+    if (shapes.empty()) continue;
+    auto child = MakeCandidate(bench, With(Without(at.effects, one.simpler), one.richer));
+    if (!child.ok()) continue;
+    known.push_back(one);
+    children.push_back({.child = std::move(child).value(), .use = one.richer, .values = std::move(shapes)});
+  }
+  if (children.empty()) return open;
+  const ColumnTable table = MakeInPlace(bench, at, children, MakeTorques(bench));
+  if (!table.valid) return open;
   const TorquePrior torques = TorquesBeside(table, at.problem->residuals());
-  return std::all_of(table.trials.begin(), table.trials.end(),
-                     [&](const Trial& trial) { return UpperCoefficient(table, trial, false, torques) < 1; });
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (std::any_of(table.trials.begin(), table.trials.end(), [&](const Trial& trial) {
+          return trial.effect == i && !(UpperCoefficient(table, trial, false, torques) < 1);
+        }))
+      open.push_back(known[i]);
+  }
+  return open;
 }
 
 }  // namespace gapscope

@@ -4,6 +4,7 @@
 #define GAPSCOPE_DIAGNOSE_BESIDE_H_
 
 #include <map>
+#include <vector>
 
 #include "src/diagnose/columns.h"
 #include "src/diagnose/diagnosis.h"
@@ -24,10 +25,14 @@ struct BesideTorques {
 // `final`: a fitted set. `uses`: of which bounds are wanted.
 BesideTorques LookBeside(const Workbench& bench, Candidate& final, const std::vector<EffectUse>& uses);
 
-// Whether the logs would show what `richer` usually is beyond `simpler` of the fitted set `at`, whose place it takes,
-// and do not: each of its shapes is excluded beside the torques (EvidencePolicy::bound_deviations). True where nothing
-// is known of its shapes.
-bool IsExcludedBeyond(const Workbench& bench, Candidate& at, const EffectUse& simpler, const EffectUse& richer);
+// An effect and one that contains it and would take its place.
+struct Beyond {
+  EffectUse simpler, richer;
+};
+// Of those whose simpler effect is in the fitted set `at`: those of which a usual shape of the richer one would not
+// show in the logs. Any other is excluded beside the torques (EvidencePolicy::bound_deviations), or nothing is known of
+// its shapes.
+std::vector<Beyond> NotExcluded(const Workbench& bench, Candidate& at, const std::vector<Beyond>& asked);
 
 }  // namespace gapscope
 

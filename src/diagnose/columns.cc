@@ -109,19 +109,21 @@ struct Asked {
   std::vector<Trial> trials;
   std::vector<std::vector<double>> columns;
   std::vector<std::size_t> of_trial;  // each column's
+
+  // Of the trial that comes next.
+  void AddColumn(std::vector<double> values) {
+    columns.push_back(std::move(values));
+    of_trial.push_back(trials.size());
+  }
 };
 
 Asked Ask(const Workbench& bench, const EffectUse& use, std::size_t effect, const ColumnTable* scan) {
   Asked asked{.use = use, .moved = bench.coupling->OfPlace(use.on, *bench.rig)};
   const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
   const Pair pair = PairOf(use, *bench.rig);
-  const auto add = [&](std::vector<double> values) {
-    asked.columns.push_back(std::move(values));
-    asked.of_trial.push_back(asked.trials.size());
-  };
   for (const auto& values : TrialValues(bench, use, scan)) {
     Trial trial{.use = use, .effect = effect, .values = values};
-    add(values);
+    asked.AddColumn(values);
     if (pair.other >= 0) {
       const auto other = static_cast<std::size_t>(pair.other);
       const bool angle = pair.with == Parameter::With::kAngle;
@@ -129,7 +131,7 @@ Asked Ask(const Workbench& bench, const EffectUse& use, std::size_t effect, cons
       std::vector<double> turned = values;
       turned[other] =
           angle ? std::numbers::pi / 2 : *std::max_element(placed[other].trials.begin(), placed[other].trials.end());
-      add(std::move(turned));
+      asked.AddColumn(std::move(turned));
     }
     asked.trials.push_back(std::move(trial));
   }
@@ -301,16 +303,17 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
   return Finish(bench, parent, std::move(wanted), torques);
 }
 
-ColumnTable MakeInPlace(const Workbench& bench, Candidate& parent, Candidate& child, const EffectUse& use,
-                        const std::vector<std::vector<double>>& values, const std::vector<ProbeTorque>& torques) {
+ColumnTable MakeInPlace(const Workbench& bench, Candidate& parent, std::vector<InPlace>& children,
+                        const std::vector<ProbeTorque>& torques) {
   Wanted wanted = WantedOf(parent);
-  Asked asked{.use = use, .moved = {}};
-  for (const auto& shape : values) {
-    asked.of_trial.push_back(asked.trials.size());
-    asked.trials.push_back({.use = use, .values = shape});
-    asked.columns.push_back(shape);
+  for (std::size_t i = 0; i < children.size(); ++i) {
+    Asked asked{.use = children[i].use, .moved = {}};
+    for (const auto& values : children[i].values) {
+      asked.AddColumn(values);
+      asked.trials.push_back({.use = asked.use, .effect = i, .values = values});
+    }
+    AddTrials(bench, children[i].child, {std::move(asked)}, &wanted);
   }
-  AddTrials(bench, child, {std::move(asked)}, &wanted);
   return Finish(bench, parent, std::move(wanted), torques);
 }
 

@@ -45,10 +45,15 @@ struct ColumnTable {
 // there (SearchPolicy::scan).
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
                         const std::vector<ProbeTorque>& torques, const ColumnTable* scan = nullptr);
-// Columns of sets that could be in the parent's place, and of `torques`: a `child` with an effect that the parent
-// lacks, `use`, at each list of its values, less the parent.
-ColumnTable MakeInPlace(const Workbench& bench, Candidate& parent, Candidate& child, const EffectUse& use,
-                        const std::vector<std::vector<double>>& values, const std::vector<ProbeTorque>& torques);
+// A set that could be in a parent's place, with an effect that the parent lacks, at each list of its values.
+struct InPlace {
+  Candidate child;
+  EffectUse use;
+  std::vector<std::vector<double>> values;
+};
+// Columns of such sets, less the parent, and of `torques`. Trial::effect: which child.
+ColumnTable MakeInPlace(const Workbench& bench, Candidate& parent, std::vector<InPlace>& children,
+                        const std::vector<ProbeTorque>& torques);
 // Columns of torques alone, their products apart by two folds of each log (GramSystem::parts): two seconds in turn.
 inline constexpr std::size_t kFolds = 2;
 ColumnTable MakeFolds(const Workbench& bench, Candidate& parent, const std::vector<ProbeTorque>& torques);

@@ -30,13 +30,19 @@ std::vector<std::size_t> TrialsInPlace(const SearchResult& found, const EffectSe
   return trials;
 }
 
+// Values in the order of PlacedParameters, by their names.
+void SetValues(const Workbench& bench, const EffectUse& use, const std::vector<double>& at,
+               std::map<std::string, double>* values) {
+  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
+  for (std::size_t i = 0; i < placed.size(); ++i) (*values)[placed[i].name] = at[i];
+}
+
 }  // namespace
 
 void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution& solution,
                std::map<std::string, double>* values) {
   const auto at = ValuesAt(bench, trial, Collect(trial.columns, [&](Eigen::Index c) { return solution.values[c]; }));
-  const auto placed = PlacedParameters(trial.use, *bench.rig, bench.scales);
-  for (std::size_t i = 0; i < placed.size(); ++i) (*values)[placed[i].name] = at[i];
+  SetValues(bench, trial.use, at, values);
 }
 
 std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candidate& at, const EffectUse& simpler,
@@ -66,10 +72,9 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
   SetValues(bench, table.trials[trials.back()], SolveSet(table, trials), &values);
   const EffectSet set = With(Without(found.chosen->effects, members), use);
   Candidate* other = found.ledger.Refit(set, *found.chosen, values, {}, effort);
-  const auto placed = PlacedParameters(use, *bench.rig, bench.scales);
   for (const EffectUse& member : members) {
     for (const auto& start : UsualBeyond(bench, *found.chosen, member, use)) {
-      for (std::size_t i = 0; i < placed.size(); ++i) values[placed[i].name] = start[i];
+      SetValues(bench, use, start, &values);
       other = found.ledger.Refit(set, *found.chosen, values, {}, effort);
     }
   }

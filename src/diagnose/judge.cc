@@ -30,8 +30,7 @@ class Judging {
     AddRivals(&result);
     AddRicher(&result);
     for (const Statement& s : dropped) {
-      const auto is_told = [&](const Statement& told) { return told.use == s.use; };
-      if (std::none_of(result.statements.begin(), result.statements.end(), is_told)) result.statements.push_back(s);
+      if (!FindTold(s.use, &result)) result.statements.push_back(s);
     }
     for (Statement& s : result.statements)
       s.answer = s.probability >= kDiagnosePolicy.probability.present ? Answer::kPresent : Answer::kAbsent;
@@ -108,6 +107,12 @@ class Judging {
     if (open) joined.rivals.push_back({.use = members.front(), .behind = -rise});
     found_.members.push_back(joined);
     evidence_.Choose(simpler);
+  }
+
+  // The first statement about a use; null: there is none.
+  static Statement* FindTold(const EffectUse& use, Judgement* result) {
+    const auto found = std::ranges::find(result->statements, use, &Statement::use);
+    return found == result->statements.end() ? nullptr : &*found;
   }
 
   bool HasMember(const EffectUse& use) const {
@@ -282,28 +287,30 @@ class Judging {
         const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
         if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;
         if (IsLessLikely(rival.use, member.use, base)) continue;
-        TellWith(m, rival.use, "costs as little in its place", result);
+        TellWith(member.use, rival.use, "costs as little in its place", result);
       }
     }
   }
 
   // A simpler effect is told alone only where the logs would show what a richer one usually does beyond it.
   void AddRicher(Judgement* result) {
-    const std::size_t members = found_.members.size();
-    for (std::size_t m = 0; m < members; ++m) {
-      const EffectUse simple = found_.members[m].use;
-      if (result->statements[m].probability < kDiagnosePolicy.probability.present) continue;
+    std::vector<Beyond> asked;
+    for (const Member& member : found_.members) {
+      const Statement& own = *FindTold(member.use, result);
+      if (own.probability < kDiagnosePolicy.probability.present) continue;
       for (const EffectUse& use : found_.uses) {
-        if (!Contains(use, simple, *bench_.rig, true) || HasMember(use)) continue;
-        if (!IsExcludedBeyond(bench_, *found_.chosen, simple, use))
-          TellWith(m, use, "would not show in these logs beyond " + simple.Text(), result);
+        const bool is_told = own.group >= 0 && Has(result->groups[static_cast<std::size_t>(own.group)], use);
+        if (Contains(use, member.use, *bench_.rig, true) && !HasMember(use) && !is_told)
+          asked.push_back({.simpler = member.use, .richer = use});
       }
     }
+    for (const Beyond& one : NotExcluded(bench_, *found_.chosen, asked))
+      TellWith(one.simpler, one.richer, "would not show in these logs beyond " + one.simpler.Text(), result);
   }
 
   // Told together with a member, as likely.
-  void TellWith(std::size_t member, const EffectUse& use, const std::string& rule, Judgement* result) {
-    Statement& own = result->statements[member];
+  void TellWith(const EffectUse& member, const EffectUse& use, const std::string& rule, Judgement* result) {
+    Statement& own = *FindTold(member, result);
     if (own.group < 0) {
       own.group = static_cast<int>(result->groups.size());
       result->groups.push_back({own.use});
@@ -327,9 +334,7 @@ class Judging {
   void AddOthers(Judgement* result) {
     const ColumnTable& table = found_.columns;
     for (const EffectUse& use : found_.uses) {
-      if (std::any_of(result->statements.begin(), result->statements.end(),
-                      [&](const Statement& s) { return s.use == use; }))
-        continue;
+      if (FindTold(use, result)) continue;
       double seen = 0;
       for (std::size_t t = 0; t < table.trials.size(); ++t) {
         if (table.trials[t].use != use) continue;

@@ -84,8 +84,9 @@ struct Contained {
   bool exactly = true;
   bool usual = false;  // where the simpler one is there, this one mostly is
 };
-// Where a fit of this effect starts from a simpler one that is fitted already: each start gives every parameter
-// `of_simpler` times the simpler one's first, plus `value` (SI); both 0: its own `start`.
+// What this effect usually is where a simpler one is fitted already: fits start from there, and the simpler one is told
+// alone only where the logs exclude it. Each start gives every parameter `of_simpler` times the simpler one's first,
+// plus `value` (SI); both 0: its own `start`.
 struct StartValue {
   double of_simpler = 0, value = 0;
 };

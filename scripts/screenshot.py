@@ -35,17 +35,30 @@ def save(driver, out, parts):
     pathlib.Path(out).write_bytes(base64.b64decode(shot["data"]))
 
 
-page, out, *parts = sys.argv[1:]
-with tempfile.TemporaryDirectory() as profile:
+def browser(profile):
     options = Options()
     options.binary_location = shutil.which("chromium")
     for flag in ["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
                  "--disable-component-update", "--disable-sync", f"--user-data-dir={profile}"]:
         options.add_argument(flag)
-    driver = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+    return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+
+
+def set_size(driver, width, height, mobile=False):
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
-                           {"width": WIDTH, "height": HEIGHT, "deviceScaleFactor": 1, "mobile": False})
-    driver.get(pathlib.Path(page).resolve().as_uri())
-    time.sleep(0.5)  # fonts and charts
-    save(driver, out, parts)
-    driver.quit()
+                           {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": mobile})
+
+
+def main():
+    page, out, *parts = sys.argv[1:]
+    with tempfile.TemporaryDirectory() as profile:
+        driver = browser(profile)
+        set_size(driver, WIDTH, HEIGHT)
+        driver.get(pathlib.Path(page).resolve().as_uri())
+        time.sleep(0.5)  # fonts and charts
+        save(driver, out, parts)
+        driver.quit()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,26 +1,22 @@
 #!/usr/bin/env python3
 """site/look.py SITE: scripts/site --look. Opens pages from disk in Chromium at two widths, light and dark; keeps
 pictures in SITE.look; prints what is wrong, exit status 1 then."""
-import base64
-import hashlib
-import io
-import os
 import pathlib
-import shutil
 import sys
-import tarfile
 import tempfile
 import time
-import urllib.request
 
-from selenium import webdriver
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
+from selenium.common.exceptions import TimeoutException
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.expected_conditions import element_to_be_clickable, presence_of_element_located
+from selenium.webdriver.support.wait import WebDriverWait
 
-AXE = "https://registry.npmjs.org/axe-core/-/axe-core-4.10.2.tgz"
-AXE_SHA256 = "9ea2d2d6917da998122bdacfd3b473e31ead53f4b87146c716a12edf89158100"
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "scripts"))
+sys.dont_write_bytecode = True
+from fetched import npm_file  # noqa: E402
+from screenshot import browser, set_size  # noqa: E402
+
 PAGES = ["index.html", "gallery.html", "docs/index.html", "docs/tutorials/first-diagnosis.html",
          "docs/reference/options.html", "docs/results/diagnosis.html", "models/index.html"]
 WIDTHS, SCHEMES = (1440, 390), ("light", "dark")
@@ -31,35 +27,8 @@ axe.run({resultTypes: ["violations"]}).then((result) => done(result.violations.m
 """
 
 
-def axe():
-    """The checker's source, from the cache."""
-    cache = pathlib.Path(os.environ.get("GAPSCOPE_CACHE_DIR", pathlib.Path.home() / ".cache/gapscope"))
-    kept = cache / AXE.rsplit("/", 1)[1]
-    if not kept.exists():
-        data = urllib.request.urlopen(AXE, timeout=60).read()
-        cache.mkdir(parents=True, exist_ok=True)
-        part = kept.with_suffix(".partial")
-        part.write_bytes(data)
-        part.rename(kept)
-    data = kept.read_bytes()
-    if hashlib.sha256(data).hexdigest() != AXE_SHA256:
-        print(f"look: {kept} is not {AXE}; delete it", file=sys.stderr)
-        sys.exit(2)
-    with tarfile.open(fileobj=io.BytesIO(data)) as archive:
-        return archive.extractfile("package/axe.min.js").read().decode()
-
-
-def browser(profile):
-    options = Options()
-    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files",
-                 f"--user-data-dir={profile}"):
-        options.add_argument(flag)
-    return webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
-
-
 def set_look(driver, width, scheme):
-    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
-                           {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600})
+    set_size(driver, width, 900, mobile=width < 600)
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia",
                            {"features": [{"name": "prefers-color-scheme", "value": scheme}]})
 
@@ -95,19 +64,20 @@ def keyboard(driver):
 
 def search(driver):
     """What the search finds of a word, from disk."""
-    driver.find_element(By.CSS_SELECTOR, "[data-md-component=search-query]").send_keys("backlash")
-    for _ in range(50):
-        time.sleep(0.1)
-        if driver.find_elements(By.CSS_SELECTOR, ".md-search-result__item a"):
-            return []
-    return ["the search finds nothing for 'backlash'"]
+    wait = WebDriverWait(driver, 10)
+    try:
+        wait.until(element_to_be_clickable((By.CSS_SELECTOR, "[data-md-component=search-query]"))).send_keys("backlash")
+        wait.until(presence_of_element_located((By.CSS_SELECTOR, ".md-search-result__item a")))
+    except TimeoutException:
+        return ["the search finds nothing for 'backlash'"]
+    return []
 
 
 def main():
     site = pathlib.Path(sys.argv[1]).resolve()
     kept = site.with_name(site.name + ".look")
     kept.mkdir(parents=True, exist_ok=True)
-    checker, wrong = axe(), []
+    checker, wrong = npm_file("axe-core-4.10.2", "axe.min.js"), []
     with tempfile.TemporaryDirectory() as profile:
         driver = browser(profile)
         for page in PAGES:
@@ -118,18 +88,18 @@ def main():
                     driver.execute_script("localStorage.clear()")  # the scheme that was shown before
                     driver.refresh()
                     time.sleep(0.3)
-                    shot = driver.execute_cdp_cmd("Page.captureScreenshot", {})
                     name = f"{page.removesuffix('.html').replace('/', '_')}_{width}_{scheme}.png"
-                    (kept / name).write_bytes(base64.b64decode(shot["data"]))
+                    driver.save_screenshot(str(kept / name))
                     wrong += [f"{page} at {width} pixels, {scheme}: {what}" for what in faults(driver, checker, scheme)]
         set_look(driver, 1440, "light")
-        for page, look in ((PAGES[0], keyboard), (PAGES[0], search)):
-            driver.get((site / page).as_uri())
-            wrong += [f"{page}: {what}" for what in look(driver)]
+        for look in (keyboard, search):
+            driver.get((site / PAGES[0]).as_uri())
+            wrong += [f"{PAGES[0]}: {what}" for what in look(driver)]
         driver.quit()
     print("\n".join(wrong) or f"{len(PAGES)} pages are well, at {WIDTHS} pixels, {SCHEMES}")
     print(f"pictures: {kept}", file=sys.stderr)
     sys.exit(1 if wrong else 0)
 
 
-main()
+if __name__ == "__main__":
+    main()

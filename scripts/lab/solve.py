@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,6 +48,12 @@ def at_path(result: Any, path: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {"value": found}
 
 
+def broken(command: str) -> str:
+    """A command in lines that a page holds."""
+    return " \\\n".join(textwrap.wrap(command, 116, subsequent_indent="    ", break_long_words=False,
+                                    break_on_hyphens=False))
+
+
 @dataclass
 class Solver:
     """Works in a folder that looks like the handout's; `parts` is the solution's text."""
@@ -72,7 +79,7 @@ class Solver:
 
     def show(self, command: str, output: str) -> None:
         lines = [line.rstrip() for line in output.strip("\n").splitlines()]
-        self.parts.append("\n".join(["```text", f"$ {' '.join(command.split())}", *lines, "```"]))
+        self.parts.append("\n".join(["```text", broken(f"$ {command}"), *lines, "```"]))
 
     def write_levels(self, name: str, given: Mapping[str, Any]) -> None:
         rate, time, rows = given["rate_hz"], 0, []
@@ -150,7 +157,7 @@ class Solver:
             self.write_levels(name, given)
         for line in experiment.design:
             self.show(line, self.shell(line))
-        made = [f"$ {' '.join(self.make_log(*log).split())}   # logs/{log[0]}" for log in experiment.twin.items()]
+        made = [f"# logs/{log[0]}\n" + broken(f"$ {self.make_log(*log)}") for log in experiment.twin.items()]
         if made:
             self.parts.append("\n".join(["The twin makes:\n\n```text", *made, "```"]))
         for command in experiment.commands:

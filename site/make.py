@@ -147,7 +147,7 @@ def gallery(pages, make):
 
 
 def take_shim_in(site):
-    """The search of a page from disk needs a script that the theme's pages fetch: they take it from beside themselves."""
+    """The search of a page from disk needs a script that the theme's pages fetch: they take it from beside them."""
     (site / "iframe-worker.js").write_text(npm_file("iframe-worker-1.0.4", "shim/index.js"))
     for page in site.rglob("*.html"):
         text = page.read_text()

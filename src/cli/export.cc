@@ -121,6 +121,7 @@ Result<int> RunExport(const ExportFlags& flags) {
     run.draws = static_cast<std::size_t>(flags.draws);
     run.fitted_alone = uncertain.logs;
     run.not_of_each = uncertain.not_of_each;
+    run.alike = uncertain.alike;
     GS_ASSIGN(run.randomization,
               Randomize(model, uncertain.values, uncertain.parameters, make, run.draws, flags.common.seed));
   }

@@ -162,6 +162,7 @@ Result<int> RunTune(const TuneFlags& flags) {
                  .actual = fmt::format("{} fitted", data.train.size()),
                  .allowed = "two logs or more that are not held out",
                  .cure = "give more logs, or leave --each-log out"};
+  if (!options.resume) ForgetLogFits(options, data.train.size());
   clock.Enter("tune");
   const auto tuned = [&] {
     ProgressLine line(flags.common, &clock);
@@ -250,7 +251,8 @@ std::vector<Option> SolveOptionsOf(TuneFlags& flags) {
           {.flag = "--resume",
            .value = &flags.resume,
            .help = "Go on with the interrupted run in --out, to the same result",
-           .more = "Each replay of a run is kept in --out/journal.bin; nothing is computed twice"}};
+           .more = "Each replay of a run is kept in --out/journal.bin, of --each-log in journal.log_N.bin; nothing is "
+                   "computed twice"}};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/core/dense.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -30,42 +31,83 @@ void TakeCovariance(const Model& model, const TuneRun& run, Uncertain* uncertain
   uncertain->parameters.covariance = run.spread.covariance(known, known);
 }
 
-// What each log alone says of a parameter, in the coordinate that it is fitted in; empty: some log does not know it.
-std::vector<double> OfEachLog(const TuneRun& run, const std::string& name, bool logarithmic) {
-  std::vector<double> found;
-  for (const auto& fit : run.per_log) {
-    const auto p = std::ranges::find(fit.parameters, name, &TuneRun::Parameter::name);
-    if (p == fit.parameters.end() || !p->identifiable || (logarithmic && p->value == 0)) return {};
-    found.push_back(logarithmic ? std::log(std::abs(p->value)) : p->value);
-  }
-  return found;
+// What a log's own fit says of a parameter, by its place there; -1: the log alone does not know it.
+Eigen::Index PlaceIn(const TuneRun::LogFit& fit, const std::string& name, bool logarithmic) {
+  const auto p = std::ranges::find(fit.parameters, name, &TuneRun::Parameter::name);
+  if (p == fit.parameters.end() || !p->identifiable || (logarithmic && p->value == 0)) return -1;
+  return p - fit.parameters.begin();
 }
+
+// Of the same parameters by log: the fits' values in the coordinates that they are fitted in, and how far the fits
+// themselves may be off.
+struct LogValues {
+  Eigen::MatrixXd values;  // parameters x logs
+  Eigen::MatrixXd within;  // the mean of the fits' covariances
+
+  explicit LogValues(const TuneRun& run, const std::vector<std::size_t>& parameters) {
+    const auto n = static_cast<Eigen::Index>(parameters.size()), logs = static_cast<Eigen::Index>(run.per_log.size());
+    values.resize(n, logs);
+    within = Eigen::MatrixXd::Zero(n, n);
+    for (Eigen::Index l = 0; l < logs; ++l) {
+      const TuneRun::LogFit& fit = run.per_log[static_cast<std::size_t>(l)];
+      std::vector<Eigen::Index> places;
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const std::size_t p = parameters[static_cast<std::size_t>(i)];
+        const bool logarithmic = run.spread.logarithmic[p];
+        places.push_back(PlaceIn(fit, run.parameters[p].name, logarithmic));
+        const double value = fit.parameters[static_cast<std::size_t>(places.back())].value;
+        values(i, l) = logarithmic ? std::log(std::abs(value)) : value;
+      }
+      // A result of an earlier version does not say how far its fits may be off.
+      if (fit.spread.covariance.rows() == static_cast<Eigen::Index>(fit.parameters.size()))
+        within += fit.spread.covariance(places, places) / static_cast<double>(logs);
+    }
+  }
+
+  // How the logs themselves differ: of how their fits do, less what the fits leave open (Hedges' estimator of random
+  // effects). A part of each covariance is taken for chance. It may have negative eigenvalues.
+  Eigen::MatrixXd Between() const {
+    const Eigen::MatrixXd deviations = values.colwise() - values.rowwise().mean();
+    const Eigen::MatrixXd all = deviations * deviations.transpose() / (static_cast<double>(values.cols()) - 1) - within;
+    Eigen::MatrixXd between = (1 - kChance) * all;
+    between.diagonal() = all.diagonal();
+    return between;
+  }
+};
 
 // By the fits to each log alone: how the logs differ.
 void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
-  std::vector<Eigen::VectorXd> deviations;  // of a parameter, by log
+  std::vector<std::size_t> of_each, differing;
   for (std::size_t i = 0; i < run.parameters.size(); ++i) {
     if (!run.parameters[i].identifiable) continue;
-    const UncertainParameter p = ParameterAt(model, run, i);
-    const std::vector<double> found = OfEachLog(run, run.parameters[i].name, p.logarithmic);
-    if (found.empty()) {
+    const bool each = std::ranges::all_of(run.per_log, [&](const TuneRun::LogFit& fit) {
+      return PlaceIn(fit, run.parameters[i].name, run.spread.logarithmic[i]) >= 0;
+    });
+    if (each) {
+      of_each.push_back(i);
+    } else {
       uncertain->not_of_each.push_back(run.parameters[i].name);
-      continue;
     }
-    const Eigen::VectorXd values = Eigen::VectorXd::Map(found.data(), static_cast<Eigen::Index>(found.size()));
-    deviations.emplace_back(values.array() - values.mean());
-    double& centre = uncertain->values[static_cast<std::size_t>(p.index)];
-    centre = p.logarithmic ? std::copysign(std::exp(values.mean()), centre) : values.mean();
-    uncertain->parameters.parameters.push_back(p);
   }
-  const auto n = static_cast<Eigen::Index>(deviations.size());
-  const double freedom = static_cast<double>(run.per_log.size()) - 1;
-  uncertain->parameters.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
-    const double covariance =
-        deviations[static_cast<std::size_t>(a)].dot(deviations[static_cast<std::size_t>(b)]) / freedom;
-    return a == b ? covariance : (1 - kChance) * covariance;
-  });
+  const LogValues all(run, of_each);
+  const Eigen::VectorXd mean = all.values.rowwise().mean(), variance = all.Between().diagonal();
+  for (Eigen::Index k = 0; k < mean.size(); ++k) {
+    const std::size_t i = of_each[static_cast<std::size_t>(k)];
+    const UncertainParameter p = ParameterAt(model, run, i);
+    double& centre = uncertain->values[static_cast<std::size_t>(p.index)];
+    centre = p.logarithmic ? std::copysign(std::exp(mean[k]), centre) : mean[k];
+    if (variance[k] > 0) {
+      differing.push_back(i);
+      uncertain->parameters.parameters.push_back(p);
+    } else {
+      uncertain->alike.push_back(run.parameters[i].name);
+    }
+  }
   uncertain->logs = run.per_log.size();
+  if (differing.empty()) return;
+  const SymmetricEigen eigen(LogValues(run, differing).Between());
+  uncertain->parameters.covariance =
+      eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
 }  // namespace
@@ -85,6 +127,10 @@ Result<Uncertain> UncertainOf(const Model& model, const std::vector<double>& val
   } else {
     TakeCovariance(model, run, &uncertain);
   }
+  if (uncertain.parameters.parameters.empty() && !uncertain.alike.empty())
+    return Error{.what = "the fits to each log alone differ no more than each leaves open: there is nothing to draw",
+                 .where = where,
+                 .cure = "draw of what one fit leaves open: tune without --each-log"};
   if (uncertain.parameters.parameters.empty())
     return Error{.what = "the logs know none of the parameters: there is nothing to draw",
                  .where = where,

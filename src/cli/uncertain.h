@@ -17,6 +17,8 @@ struct Uncertain {
   std::size_t logs = 0;        // whose fits differ so; 0: one fit's own covariance
   // Parameters that all logs together know, and some log alone does not: they stay as they are.
   std::vector<std::string> not_of_each;
+  // Parameters in which the fits to each log differ no more than each leaves open: they stay at the fits' mean.
+  std::vector<std::string> alike;
 };
 
 // From this many fits to a log alone on their mean and covariance are taken. Fewer say little of how logs differ.

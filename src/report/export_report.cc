@@ -28,6 +28,8 @@ std::string RangeLines(const ExportRun& run) {
                         range.conditional ? ", the others as they are" : "",
                         fields.empty() ? "no number of the MJCF, so the host's" : Join(fields));
   }
+  if (!run.alike.empty())
+    text += "  at their mean, for they differ no more than each fit leaves open: " + Join(run.alike) + "\n";
   if (!run.not_of_each.empty())
     text += "  as they are, for not each log alone knows them: " + Join(run.not_of_each) + "\n";
   if (run.fitted_alone == 0)
@@ -75,6 +77,7 @@ ordered_json RandomizationJson(const ExportRun& run) {
                        {"from", run.fitted_alone > 0 ? "logs" : "covariance"},
                        {"fitted_alone", run.fitted_alone},
                        {"not_of_each", run.not_of_each},
+                       {"alike", run.alike},
                        {"parameters", ordered_json::array()},
                        {"fields", ordered_json::object()},
                        {"versions", JsonVersions(run.info)}};

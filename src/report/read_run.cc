@@ -50,10 +50,23 @@ std::vector<TuneRun::Parameter> ParametersFrom(const ordered_json& json) {
   });
 }
 
+// Empty where an earlier version wrote none.
+Spread SpreadFrom(const ordered_json& json) {
+  if (!json.contains("spread")) return {};
+  const auto& from = json["spread"];
+  Spread spread{.logarithmic = from.at("logarithmic").get<std::vector<bool>>(), .covariance = {}};
+  const auto n = static_cast<Eigen::Index>(spread.logarithmic.size());
+  spread.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
+    return NumberFrom(from.at("covariance").at(static_cast<std::size_t>(a)).at(static_cast<std::size_t>(b)));
+  });
+  return spread;
+}
+
 void ReadKnowledge(const ordered_json& json, TuneRun* run) {
   run->parameters = ParametersFrom(json.at("parameters"));
   for (const auto& fit : json.value("per_log", ordered_json::array()))
-    run->per_log.push_back({fit.at("log"), fit.at("termination"), ParametersFrom(fit.at("parameters"))});
+    run->per_log.push_back(
+        {fit.at("log"), fit.at("termination"), ParametersFrom(fit.at("parameters")), SpreadFrom(fit)});
   run->left_frozen = json.value("left_frozen", std::vector<std::string>{});
   for (const auto& entry : json.at("flat")) {
     TuneRun::Flat flat{.direction = {}, .text = entry.at("text")};
@@ -65,13 +78,7 @@ void ReadKnowledge(const ordered_json& json, TuneRun* run) {
     const auto& names = entry.at("parameters");
     run->correlated.push_back({names.at(0), names.at(1), NumberAt(entry, "correlation")});
   }
-  if (!json.contains("spread")) return;
-  const auto& spread = json["spread"];
-  run->spread.logarithmic = spread.at("logarithmic").get<std::vector<bool>>();
-  const auto n = static_cast<Eigen::Index>(run->spread.logarithmic.size());
-  run->spread.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
-    return NumberFrom(spread.at("covariance").at(static_cast<std::size_t>(a)).at(static_cast<std::size_t>(b)));
-  });
+  run->spread = SpreadFrom(json);
 }
 
 TuneRun TuneRunFrom(const ordered_json& json) {

@@ -44,6 +44,12 @@ TuneRun::Parameter ParameterOf(const TunedParameter& t, const Model& model) {
   return {p.name, p.unit, p.nominal, t.value, t.low, t.high, t.at_bound, t.identifiable};
 }
 
+ordered_json Json(const Spread& spread) {
+  ordered_json covariance = ordered_json::array();
+  for (const auto& row : spread.covariance.rowwise()) covariance.push_back(std::vector<double>(row.begin(), row.end()));
+  return {{"logarithmic", spread.logarithmic}, {"covariance", std::move(covariance)}};
+}
+
 ordered_json Json(const std::vector<TuneRun::Parameter>& parameters) {
   ordered_json list = ordered_json::array();
   for (const auto& p : parameters) {
@@ -237,7 +243,8 @@ std::vector<TuneRun::LogFit> PerLogOf(const LogFits& fits, const Model& model) {
   return Collect(fits.logs, [&](const LogFit& fit) -> TuneRun::LogFit {
     return {.log = fit.log,
             .termination = TerminationText(fit.termination),
-            .parameters = Collect(fit.tuned, [&](const TunedParameter& t) { return ParameterOf(t, model); })};
+            .parameters = Collect(fit.tuned, [&](const TunedParameter& t) { return ParameterOf(t, model); }),
+            .spread = fit.spread};
   });
 }
 
@@ -269,11 +276,13 @@ ordered_json ToJson(const TuneRun& run, Timing timing) {
   json["correlated"] = ordered_json::array();
   for (const auto& [a, b, r] : run.correlated)
     json["correlated"].push_back({{"parameters", {a, b}}, {"correlation", r}});
-  json["spread"] = {{"logarithmic", run.spread.logarithmic}, {"covariance", ordered_json::array()}};
-  for (const auto& row : run.spread.covariance.rowwise())
-    json["spread"]["covariance"].push_back(std::vector<double>(row.begin(), row.end()));
-  for (const auto& [log, termination, parameters] : run.per_log)
-    json["per_log"].push_back({{"log", log}, {"termination", termination}, {"parameters", Json(parameters)}});
+  json["spread"] = Json(run.spread);
+  for (const auto& fit : run.per_log) {
+    json["per_log"].push_back({{"log", fit.log},
+                               {"termination", fit.termination},
+                               {"parameters", Json(fit.parameters)},
+                               {"spread", Json(fit.spread)}});
+  }
   json["error"] = JsonErrors(run);
   json["held_out_by"] = run.held_out_by;
   json["train"] = Json(run.train);

@@ -39,6 +39,7 @@ struct TuneRun {
   struct LogFit {
     std::string log, termination;
     std::vector<Parameter> parameters;  // those that all logs together know
+    Spread spread;                      // of them; empty: a result of an earlier version
   };
 
   RunInfo info;

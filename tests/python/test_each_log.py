@@ -77,6 +77,30 @@ def test_each_log_has_its_own_value(fitted: gs.Tune, tmp_path: Path) -> None:
     assert np.array_equal(drawn["dof_damping"][:, 0], drawn["parameters"][:, 0])
 
 
+def with_fits(fitted: gs.Tune, out: Path, values: list[float], deviation: float) -> gs.Tune:
+    """The result as if each log's fit had said this, known so well (standard deviation of its logarithm)."""
+    changed = fitted.json
+    for fit, value in zip(changed["per_log"], values, strict=True):
+        fit["parameters"][0]["value"] = value
+        fit["spread"] = {"logarithmic": [True], "covariance": [[deviation**2]]}
+    out.mkdir()
+    (out / "result.json").write_text(json.dumps(changed))
+    return dataclasses.replace(fitted, out=out)
+
+
+def test_what_each_fit_leaves_open_is_no_difference(fitted: gs.Tune, tmp_path: Path) -> None:
+    values = [2.0, 2.2, 2.5, 2.8, 3.1]
+    logs = np.log(values)
+    told, _ = randomization(with_fits(fitted, tmp_path / "known", values, 0.1), tmp_path / "a")
+    (of_damping,) = told["parameters"]
+    assert told["alike"] == []
+    between = np.sqrt(logs.var(ddof=1) - 0.1**2)
+    assert of_damping["low"] == pytest.approx(np.exp(logs.mean() - 1.96 * between), rel=1e-3)
+    assert of_damping["high"] == pytest.approx(np.exp(logs.mean() + 1.96 * between), rel=1e-3)
+    with pytest.raises(gs.InputError, match="differ no more than each leaves open"):
+        randomization(with_fits(fitted, tmp_path / "open", values, 0.3), tmp_path / "b")
+
+
 def test_few_logs_say_what_the_fit_leaves_open(fitted: gs.Tune, tmp_path: Path) -> None:
     three = fitted.json
     three["per_log"] = three["per_log"][:3]

@@ -177,6 +177,7 @@ OWN = {"out", "messages", "_keep", "extra"}  # not of the JSON
 MADE_BY = {"experiment", "seed", "versions"}
 EXTRA = {
     "Replay": {*MADE_BY, "cost", "effects", "error_free_run", "error_nominal", "model"},
+    "LogFit": {"spread"},
     "LogResult": {"diverged_at_s", "statistics", "windows"},
     "Tune": {*MADE_BY, "command_shift_s", "correlated", "cost", "effects", "force_shift_s", "left_frozen", "model"}
     | {"replays", "solve_s", "spread", "starts", "starts_agree", "time_step_s"},

@@ -10,8 +10,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "src/core/collect.h"
 #include "src/core/file.h"
 #include "src/report/tune_report.h"
+#include "src/tune/each_log.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -33,16 +35,20 @@ class JournalTest : public ::testing::Test {
 
   std::string Path(const std::string& name) const { return (folder_ / name).string(); }
 
-  Result<TuneSummary> Run(const std::string& journal, bool resume, int jobs = 1, unsigned long seed = 0) {
-    ThreadPool pool(jobs);
+  TuneOptions Options(const std::string& journal, bool resume) const {
     TuneOptions options;
     options.free = {rig_.Index("cart.gain"), rig_.Index("cart.damping")};
     options.starts = 2;
     options.journal = journal;
     options.resume = resume;
-    options.solve.seed = seed;
     options.solve.max_iterations = 8;
     options.solve.optimizer = optimizer_;
+    return options;
+  }
+  Result<TuneSummary> Run(const std::string& journal, bool resume, int jobs = 1, unsigned long seed = 0) {
+    ThreadPool pool(jobs);
+    TuneOptions options = Options(journal, resume);
+    options.solve.seed = seed;
     std::atomic<bool> stop = false;
     if (stop_at_ > 0) {
       options.solve.deadline.stop = &stop;
@@ -87,6 +93,30 @@ TEST_F(JournalTest, InterruptedRunGoesOnToTheSameBytes) {
     ASSERT_TRUE(resumed.ok()) << stopped << ": " << resumed.error().Text();
     EXPECT_TRUE(whole == Bytes(resumed)) << "interrupted in iteration " << stopped;
   }
+}
+
+TEST_F(JournalTest, FitsToEachLogGoOnToo) {
+  ThreadPool pool(1);
+  const TuneSummary joint = Run("", false).value();
+  const auto fit = [&](bool resume) {
+    std::vector<double> found;
+    const auto options = Options(Path("journal.bin"), resume);
+    for (const LogFit& log : FitEachLog(*rig_.model, logs_, joint, options, pool).logs) {
+      for (const TunedParameter& tuned : log.tuned) found.insert(found.end(), {tuned.value, tuned.low, tuned.high});
+    }
+    return found;
+  };
+  const std::vector<double> whole = fit(false);
+  ASSERT_EQ(whole.size(), 3 * 2 * 3u);
+  const std::vector<std::string> files = {Path("journal.log_0.bin"), Path("journal.log_1.bin"),
+                                          Path("journal.log_2.bin")};
+  const auto bytes = Collect(files, [](const std::string& file) { return ReadFile(file).value(); });
+  ASSERT_TRUE(WriteFile(files[1], bytes[1].substr(0, bytes[1].size() / 2)).ok());
+  std::filesystem::remove(files[2]);
+  EXPECT_EQ(fit(true), whole);
+  for (std::size_t l = 0; l < files.size(); ++l) EXPECT_TRUE(ReadFile(files[l]).value() == bytes[l]) << l;
+  ForgetLogFits(Options(Path("journal.bin"), false), logs_.size());
+  for (const std::string& file : files) EXPECT_FALSE(std::filesystem::exists(file)) << file;
 }
 
 TEST_F(JournalTest, RoundsOfNloptAreResumedToo) {

@@ -303,6 +303,12 @@ ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::ve
   return Finish(bench, parent, std::move(wanted), torques);
 }
 
+std::size_t ColumnCount(const Workbench& bench, const std::vector<EffectUse>& uses) {
+  std::size_t count = 0;
+  for (const EffectUse& use : uses) count += Ask(bench, use, 0, nullptr).columns.size();
+  return count;
+}
+
 ColumnTable MakeInPlace(const Workbench& bench, Candidate& parent, std::vector<InPlace>& children,
                         const std::vector<ProbeTorque>& torques) {
   Wanted wanted = WantedOf(parent);

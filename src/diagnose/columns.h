@@ -45,6 +45,8 @@ struct ColumnTable {
 // there (SearchPolicy::scan).
 ColumnTable MakeColumns(const Workbench& bench, Candidate& parent, const std::vector<EffectUse>& uses,
                         const std::vector<ProbeTorque>& torques, const ColumnTable* scan = nullptr);
+// Replays that the columns of `uses` take at the base model, where none can be made together.
+std::size_t ColumnCount(const Workbench& bench, const std::vector<EffectUse>& uses);
 // A set that could be in a parent's place, with an effect that the parent lacks, at each list of its values.
 struct InPlace {
   Candidate child;

@@ -11,6 +11,7 @@
 #include "src/core/names.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/coarsen.h"
+#include "src/diagnose/columns.h"
 #include "src/diagnose/describe.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/policy.h"
@@ -209,14 +210,18 @@ OneReplay ReplayOnce(const Workbench& bench) {
 }
 
 // Steps of one replay. Where a time is asked for, fewer windows are fitted if so many replays of them as even a short
-// search and its judging take would not fit into it.
+// search and its judging take would not fit into it. All effects are looked at twice: at the base model, and beside the
+// final set.
 std::size_t KeepToTime(const Model& model, const DiagnoseOptions& options, Workbench* bench, bool* fewer_windows) {
   const OneReplay all = ReplayOnce(*bench);
-  const double needed_s = all.seconds * static_cast<double>(kDiagnosePolicy.search.least_replays);
-  if (!(options.budget_s > 0) || needed_s <= options.budget_s) return all.steps;
+  if (!(options.budget_s > 0)) return all.steps;
+  const std::size_t replays =
+      kDiagnosePolicy.search.least_replays + 2 * ColumnCount(*bench, AllUses(*bench->rig));
+  const double share = options.budget_s / (all.seconds * static_cast<double>(replays));
+  if (share >= 1) return all.steps;
   *fewer_windows = true;
-  const auto steps = static_cast<std::size_t>(options.budget_s / needed_s * static_cast<double>(options.replay_steps));
-  ChooseWindows(model, WindowsIn(steps, model, *bench), bench);
+  const double windows = share * static_cast<double>(bench->windows->size());
+  ChooseWindows(model, std::max<std::size_t>(1, static_cast<std::size_t>(windows)), bench);
   return ReplayOnce(*bench).steps;
 }
 

@@ -1,6 +1,7 @@
 #include "src/diagnose/short_windows.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "src/diagnose/policy.h"
 
@@ -26,6 +27,15 @@ double ShortestWindow(const DataSplit& data) {
                   static_cast<double>(kDiagnosePolicy.search.least_samples) * step_s);
 }
 
+// So much of the time that is left; none asked for: none.
+Deadline ShareOf(Deadline deadline, double share) {
+  if (!deadline.time) return deadline;
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> left = *deadline.time - now;
+  deadline.time = now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(share * left);
+  return deadline;
+}
+
 // As many windows as take the same steps.
 Workbench WithWindows(const Workbench& bench, const Model& model, double window_s) {
   Workbench other = bench;
@@ -35,6 +45,7 @@ Workbench WithWindows(const Workbench& bench, const Model& model, double window_
   other.work = std::make_shared<Work>();
   other.most_steps =
       static_cast<std::size_t>(kDiagnosePolicy.search.short_share * static_cast<double>(bench.most_steps));
+  other.deadline = ShareOf(bench.deadline, kDiagnosePolicy.search.short_share);
   other.bounds = std::make_shared<std::map<std::string, std::pair<double, double>>>();
   other.coupling = std::make_shared<Coupling>();
   return other;

@@ -215,8 +215,7 @@ OneReplay ReplayOnce(const Workbench& bench) {
 std::size_t KeepToTime(const Model& model, const DiagnoseOptions& options, Workbench* bench, bool* fewer_windows) {
   const OneReplay all = ReplayOnce(*bench);
   if (!(options.budget_s > 0)) return all.steps;
-  const std::size_t replays =
-      kDiagnosePolicy.search.least_replays + 2 * ColumnCount(*bench, AllUses(*bench->rig));
+  const std::size_t replays = kDiagnosePolicy.search.least_replays + 2 * ColumnCount(*bench, AllUses(*bench->rig));
   const double share = options.budget_s / (all.seconds * static_cast<double>(replays));
   if (share >= 1) return all.steps;
   *fewer_windows = true;

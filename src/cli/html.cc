@@ -1,6 +1,10 @@
 #include "src/cli/html.h"
 
 #include <algorithm>
+#include <iterator>
+#include <optional>
+
+#include "src/tune/tune.h"
 
 namespace gapscope::cli {
 namespace {
@@ -35,17 +39,31 @@ ReportSource SourceOf(const Experiment& experiment, const ReportLogs& logs) {
   return source;
 }
 
+namespace {
+
+// How each log began is fitted too, as errors have it: of a log that begins in full motion its first samples say too
+// little to run on from there. Of long logs that would take long, and says little of the rest.
+std::vector<LogReplay> FromWhereTheyBegan(const ReportModel& model, const std::vector<Recording>& logs,
+                                          const ReplayDefaults& replay, ThreadPool& pool) {
+  constexpr double kLong_s = 60;
+  const bool is_long = std::any_of(logs.begin(), logs.end(),
+                                   [](const Recording& r) { return r.time_s.back() - r.time_s.front() > kLong_s; });
+  if (!is_long)
+    return Evaluate(*model.model, logs, {model.values, std::nullopt}, replay.mode, {.window_s = replay.window_s}, pool);
+  return Replay(*model.model, logs, {.mode = replay.mode, .window_s = replay.window_s, .values = model.values}, pool)
+      .logs;
+}
+
+}  // namespace
+
 std::vector<ReportPrediction> Predict(const Experiment& experiment, const ReportLogs& logs,
                                       const std::vector<ReportModel>& models, ThreadPool& pool) {
   std::vector<ReportPrediction> predictions;
   for (const auto& model : models) {
     ReportPrediction prediction{.label = model.label, .logs = {}};
-    const ReplayOptions options{
-        .mode = experiment.replay.mode, .window_s = experiment.replay.window_s, .values = model.values};
     for (const auto* part : {&logs.train, &logs.held_out}) {
       if (part->empty()) continue;
-      ReplayResult result = Replay(*model.model, *part, options, pool);
-      std::move(result.logs.begin(), result.logs.end(), std::back_inserter(prediction.logs));
+      std::ranges::move(FromWhereTheyBegan(model, *part, experiment.replay, pool), std::back_inserter(prediction.logs));
     }
     predictions.push_back(std::move(prediction));
   }

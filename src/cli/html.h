@@ -33,7 +33,8 @@ struct ReportLogs {
 // What a page needs of all commands: command line, experiment, logs. They must outlive it.
 ReportSource SourceOf(const Experiment& experiment, const ReportLogs& logs);
 
-// All logs replayed with each model as the experiment says (mode, window).
+// All logs replayed with each model as the experiment says (mode, window), from where they began as far as that can be
+// fitted: initial states and zero offsets.
 std::vector<ReportPrediction> Predict(const Experiment& experiment, const ReportLogs& logs,
                                       const std::vector<ReportModel>& models, ThreadPool& pool);
 

@@ -57,8 +57,8 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
                                 {"diagnosed", diagnosis.model, diagnosis.values}},
                                pool);
   GS_ASSIGN(source.curves, CurvesOf(diagnosis, data.held_out.front(), scales));
-  source.model = diagnosis.refit_model.get();
-  source.values = diagnosis.nominal_values;
+  source.model = diagnosis.model.get();
+  source.values = diagnosis.values;
   source.parameters = diagnosis.model->parameters();
   files.report = &source;
   files.next_experiment = diagnosis.next.input_csv;

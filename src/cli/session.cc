@@ -7,10 +7,14 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "src/core/names.h"
+#include "src/model/run_model.h"
+#include "src/report/read_run.h"
 
 namespace gapscope::cli {
 
@@ -83,8 +87,9 @@ std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std:
                    "with the nearest one that does"},
           {.flag = "--params",
            .value = &params,
-           .help = "YAML file of parameter values, more than once",
-           .more = "Lines `name: value`; a later file is written over an earlier one"}};
+           .help = "Parameter values of a YAML file or of an earlier result, more than once",
+           .more = "Lines `name: value`, or --out of tune, diagnose or replay, whose effects --with must name; a later "
+                   "file is written over an earlier one"}};
 }
 
 std::vector<Option> EffectOptions(ModelFlags& flags) {
@@ -168,10 +173,35 @@ Result<std::pair<std::string, double>> ParseAssignment(const std::string& text, 
   return std::pair{text.substr(0, equal), value};
 }
 
+namespace {
+
+// Of a YAML file, or of a result: the values of its model. Its effects must be in this one.
+Result<std::map<std::string, double>> ValuesOf(const Model& model, const std::string& path) {
+  std::error_code failure;
+  const bool result = path.ends_with(".json") || std::filesystem::is_directory(path, failure);
+  if (!result) return LoadParameterValues(path);
+  GS_ASSIGN(const auto json, ReadJson(path));
+  GS_ASSIGN(const RunModel held, ReadRunModel(json, path));
+  for (const EffectUse& use : held.effects) {
+    if (std::ranges::find(model.effects(), use) == model.effects().end())
+      return Error{.what = "the result has an effect that this model lacks",
+                   .where = "--params " + path,
+                   .actual = use.Text(),
+                   .cure = "add it: --with " + use.Text()};
+  }
+  std::map<std::string, double> values;
+  for (const auto& [name, value] : held.values) {
+    if (!IsScaleName(name)) values[name] = value;
+  }
+  return values;
+}
+
+}  // namespace
+
 Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set,
                       std::vector<double>* values) {
   for (const auto& file : params) {
-    GS_ASSIGN(const auto numbers, LoadParameterValues(file));
+    GS_ASSIGN(const auto numbers, ValuesOf(model, file));
     for (const auto& [name, value] : numbers) {
       GS_ASSIGN(const int index, model.Find(name, file));
       (*values)[index] = value;

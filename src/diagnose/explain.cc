@@ -28,6 +28,33 @@ std::string ExplainEffects(const Diagnosis& d) {
                             d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);
 }
 
+// How far a parameter was moved, as a share of its range.
+double ShareOfRange(const Parameter& p, double from, double to) {
+  if (p.low > 0 && from > 0 && to > 0) return std::abs(std::log(to / from)) / std::log(p.high / p.low);
+  return std::abs(to - from) / (p.high - p.low);
+}
+
+// The base model's parameters that retuning moved, the furthest first: "pan.kp from 500 to 575 N m/rad". None: empty.
+std::string RetunedText(const Diagnosis& d) {
+  constexpr std::size_t kMost = 5;
+  constexpr double kLeast = 0.02;
+  if (!d.refit_model) return "";
+  std::vector<std::pair<double, std::string>> moved;
+  for (std::size_t i = 0; i < d.refit_model->parameters().size(); ++i) {
+    const Parameter& p = d.refit_model->parameters()[i];
+    const double from = d.nominal_values[i], to = d.refit_values[i];
+    const double share = ShareOfRange(p, from, to);
+    if (from == to || !(share > kLeast)) continue;
+    const std::string unit = p.unit == "1" ? "" : " " + p.unit;
+    moved.emplace_back(share, fmt::format("{} from {:.3g} to {:.3g}{}", p.name, from, to, unit));
+  }
+  std::stable_sort(moved.begin(), moved.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, moved.size()); ++i) text += (i > 0 ? ", " : " ") + moved[i].second;
+  if (moved.size() > kMost) text += fmt::format(" and {} more", moved.size() - kMost);
+  return text.empty() ? "" : " Retuning moves" + text + ".";
+}
+
 std::string EarlyEnd(const Diagnosis& d) {
   if (d.interrupted) return " It was interrupted: this is the best so far.";
   return d.cut.empty() ? "" : " The budget ended the search early.";
@@ -47,7 +74,8 @@ std::string Explain(const Diagnosis& d) {
     case Verdict::kParameters:
       text +=
           "Retuned parameters close the gap; no further effect improves the prediction of logs that the fit did not "
-          "see.";
+          "see." +
+          RetunedText(d);
       break;
     case Verdict::kEffects:
     case Verdict::kAmbiguous: {
@@ -71,6 +99,7 @@ std::string Explain(const Diagnosis& d) {
               : ExplainEffects(d) + ", and no known effect explains what remains.";
       if (!d.remains.empty())
         text += " It lies mostly at: " + d.remains.front().signal + ", " + d.remains.front().condition + ".";
+      text += RetunedText(d);
       break;
   }
   const VerdictEvidence& e = d.evidence;

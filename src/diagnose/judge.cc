@@ -335,10 +335,11 @@ class Judging {
     const ColumnTable& table = found_.columns;
     for (const EffectUse& use : found_.uses) {
       if (FindTold(use, result)) continue;
-      double seen = 0;
+      double seen = 0, moved = 0;
       for (std::size_t t = 0; t < table.trials.size(); ++t) {
         if (table.trials[t].use != use) continue;
         const Eigen::Index c = table.trials[t].columns.front();
+        moved = std::max(moved, table.sum(c, c));
         if (table.sum(c, c) > 0)
           seen = std::max(seen, table.reduced(table.Reduced(c), table.Reduced(c)) / table.sum(c, c));
       }
@@ -346,7 +347,8 @@ class Judging {
       Statement statement{
           .use = use, .answer = seen > kNothing ? Answer::kAbsent : Answer::kUnseen, .prior = PriorOf(use)};
       statement.rule = seen > kNothing ? "gains too little beside the effects of the final set"
-                                       : "the base model's parameters imitate it fully";
+                       : moved > 0     ? "the base model's parameters imitate it fully"
+                                       : "these logs do not move what it acts on";
       result->statements.push_back(std::move(statement));
     }
   }

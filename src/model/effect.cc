@@ -90,10 +90,14 @@ bool IsOfTorque(ScaleKind kind) {
   return kind == kTorque || kind == kStiffness || kind == kDrag || kind == kCubic;
 }
 
+constexpr char kScaleHead[] = "scale@";
+
 std::string ScaleName(const std::string& on, RigSize size) {
   const char* of = size == RigSize::kTorque ? ".torque_n_m" : size == RigSize::kPeak ? ".peak_n_m" : ".inertia_kg_m2";
-  return "scale@" + on + of;
+  return kScaleHead + on + of;
 }
+
+bool IsScaleName(std::string_view name) { return name.starts_with(kScaleHead); }
 
 namespace {
 

@@ -137,6 +137,7 @@ enum class RigSize {
   kInertia,  // Scales::inertia_kg_m2
 };
 std::string ScaleName(const std::string& on, RigSize size);
+bool IsScaleName(std::string_view name);
 
 // `on` of an effect that all its places share with one size: every drive, or every measured signal. A place of the rig
 // that has this name goes first.

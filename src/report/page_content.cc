@@ -49,7 +49,7 @@ PageContent PageOf(const TuneRun& run) {
 
 PageContent PageOf(const DiagnoseRun& run) {
   const Diagnosis& d = run.diagnosis;
-  PageContent page{.headline = HeadlineOf(run), .mapped = "nominal model"};
+  PageContent page{.headline = HeadlineOf(run), .mapped = d.effects.empty() ? "retuned model" : "diagnosed model"};
   if (d.model) page.values = RunModelOf(*d.model, d.values).values;
   page.where = {{.title = {}, .shares = First(d.where)}};
   if (d.verdict == Verdict::kUnknown && !d.effects.empty()) {

@@ -56,6 +56,23 @@ TEST_F(CliTest, ApplyRefusesWhatIsNoResultOfThisModel) {
   EXPECT_EQ(ReadAll(kept), "as it was");
 }
 
+TEST_F(CliTest, ParametersAreTakenOverFromAResult) {
+  const std::string replay = "replay " + Joint() + " '" + JointLog() + "' ", out = scratch_.Path("out"),
+                    with = "--with coulomb_friction@joint ";
+  const auto error = [&](const std::string& more) {
+    const Answer answer = Run(replay + more + " --json");
+    EXPECT_EQ(answer.status, 0) << answer.err;
+    return nlohmann::json::parse(answer.out)["error"].get<double>();
+  };
+  const double set = error(with + "--set coulomb_friction@joint.friction_n_m=2 --set motor.kp=45 --out '" + out + "'");
+  EXPECT_EQ(error(with + "--params '" + out + "'"), set);
+  EXPECT_EQ(error(with + "--params '" + out + "/result.json'"), set);
+  EXPECT_NE(error(with), set);
+  ExpectRefused(replay + "--params '" + out + "'", {"lacks", "--with coulomb_friction@joint"});
+  std::filesystem::create_directories(scratch_.Path("empty"));
+  ExpectRefused(replay + "--params '" + scratch_.Path("empty") + "'", {"empty/result.json"});
+}
+
 TEST_F(CliTest, InspectNeedsNoExperiment) {
   const std::string log = JointLog();
   const auto json = nlohmann::json::parse(Run("inspect '" + log + "' --json").out);

@@ -104,6 +104,9 @@ TEST(DiagnoseTest, NamesNothingWhereNothingIsMissing) {
   const Diagnosis d = DiagnoseLogs(MakeLogs("flexjoint", twin::Kind::kNone, "", 33));
   EXPECT_TRUE(d.verdict == Verdict::kNone || d.verdict == Verdict::kParameters) << d.explanation;
   EXPECT_TRUE(d.effects.empty());
+  // Parameters that are the answer are named.
+  EXPECT_EQ(d.verdict == Verdict::kParameters, d.explanation.find("Retuning moves") != std::string::npos)
+      << d.explanation;
 }
 
 // A cable and dry friction: each alone bends to do what the other one does, and fails on the windows that were held

@@ -34,7 +34,8 @@ std::string KindOf(const ordered_json& value) {
   if (value.contains("enum")) return Joined(value["enum"]);
   for (const char* choice : {"oneOf", "anyOf"}) {
     std::string text;
-    for (const auto& one : value.value(choice, ordered_json::array())) text += (text.empty() ? "" : " or ") + KindOf(one);
+    for (const auto& one : value.value(choice, ordered_json::array()))
+      text += (text.empty() ? "" : " or ") + KindOf(one);
     if (!text.empty()) return text;
   }
   const ordered_json type = value.value("type", ordered_json("anything"));
@@ -69,7 +70,12 @@ void AddRows(const ordered_json& schema, const std::string& above, std::string& 
   for (const auto& [key, value] : schema["properties"].items()) {
     const bool always = std::ranges::find(required, ordered_json(key)) != required.end();
     const std::string name = above + key, what = value.value("description", "");
-    to += "| `" + name + "` | " + KindOf(value) + " | " + Cell((always ? "" : what.empty() ? "may be missing" : "may be missing; ") + what) + " |\n";
+    to += "| `" + name + "` | " + KindOf(value) + " | " +
+          Cell((always         ? ""
+                : what.empty() ? "may be missing"
+                               : "may be missing; ") +
+               what) +
+          " |\n";
     AddBelow(value, name, to);
   }
 }
@@ -114,9 +120,7 @@ std::string ResultsText() {
   return (text + common).substr(1);
 }
 
-TEST(ResultsDocTest, IsWhatTheSchemasSay) {
-  ExpectMadePart("results", "schemas", ResultsText(), "docs_results_test");
-}
+TEST(ResultsDocTest, IsWhatTheSchemasSay) { ExpectMadePart("results", "schemas", ResultsText(), "docs_results_test"); }
 
 }  // namespace
 }  // namespace gapscope

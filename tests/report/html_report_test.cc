@@ -72,7 +72,7 @@ TEST(HtmlReportTest, SaysWhatTheProgramSays) {
   EXPECT_EQ(data["statements"][2]["gains"], nullptr) << "it was not refitted";
   EXPECT_EQ(data["remainder"].size(), 3u) << "what cannot be said is left out";
   EXPECT_EQ(data["next"]["command"], "gapscope design triangle models/qube/experiment.yaml --duration 20");
-  EXPECT_EQ(data["map_of"], "nominal model");
+  EXPECT_EQ(data["map_of"], "diagnosed model");
   EXPECT_EQ(DataOf(ReportHtml(ReplayPage()->result, ReplayPage()->source))["map_of"], "model");
 }
 

@@ -294,6 +294,7 @@ void AddFindings(const PageContent& content, ordered_json* data) {
     json["findings"].push_back({{"what", s.what},
                                 {"size", s.size},
                                 {"caveat", s.caveat},
+                                {"told_apart", s.told_apart},
                                 {"share", JsonNumber(s.share_of_gap)},
                                 {"probability", s.probability}});
   }

@@ -32,6 +32,18 @@ std::string NamesOf(const std::vector<EffectUse>& uses) {
   return Listed(names, "or");
 }
 
+// What would tell the members of a group apart, by their effects' own files; empty: one member, or nothing is known.
+std::string WhatWouldTell(const std::vector<const Statement*>& members) {
+  std::vector<std::string> inputs;
+  for (const Statement* s : members) {
+    const auto effect = std::ranges::find(Catalogue(), s->use.effect, &Effect::name);
+    if (effect == Catalogue().end() || effect->told_apart.empty()) continue;
+    if (std::ranges::find(inputs, effect->told_apart) == inputs.end()) inputs.push_back(effect->told_apart);
+  }
+  if (members.size() == 1 || inputs.empty()) return "";
+  return fmt::format("what would tell: {}", fmt::join(inputs, "; "));
+}
+
 Sentence SentenceOf(const std::vector<const Statement*>& members) {
   const Statement& first = *members.front();
   Sentence sentence{.what = NamesOf(Collect(members, [](const Statement* s) { return s->use; }))};
@@ -48,6 +60,7 @@ Sentence SentenceOf(const std::vector<const Statement*>& members) {
     if (!s->caveat.empty()) caveats.insert(s->caveat);
   }
   sentence.caveat = fmt::format("{}", fmt::join(caveats, "; "));
+  sentence.told_apart = WhatWouldTell(members);
   return sentence;
 }
 
@@ -57,7 +70,8 @@ std::string Sentence::Text() const {
   std::string text = what;
   if (!size.empty()) text += ", " + size;
   text += fmt::format(", {:.0f} % of the gap, P {:.2f}", 100 * share_of_gap, probability);
-  return caveat.empty() ? text : text + ", " + caveat;
+  if (!caveat.empty()) text += ", " + caveat;
+  return told_apart.empty() ? text : text + "; " + told_apart;
 }
 
 std::vector<Sentence> SentencesOf(const Diagnosis& d) {

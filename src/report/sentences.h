@@ -14,6 +14,7 @@ struct Sentence {
   std::string what;         // "cable spring or gravity offset on arm"
   std::string size;         // of those that are in the final model, with their intervals; may be empty
   std::string caveat;       // "seen only beside command delay on motor"; may be empty
+  std::string told_apart;   // "what would tell: tilt the rig", of a group; may be empty
   double share_of_gap = 0;  // of the gap that closes
   double probability = 0;
   std::string Text() const;  // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of the gap, P 0.94"

@@ -51,11 +51,12 @@ function writeVerdict(headline) {
 function writeFindings(findings, gap) {
   const line = (f) => {
     const rest = [f.size, `${percent(f.share)} of the gap`, f.caveat].filter(Boolean).join(", ");
+    const apart = f.told_apart ? [element("br"), f.told_apart] : [];
     return element(
       "li",
       {},
       element("b", {class: "number sure", title: "probability that it is there"}, percent(f.probability)),
-      element("span", {}, element("strong", {}, f.what), element("br"), rest),
+      element("span", {}, element("strong", {}, f.what), element("br"), rest, ...apart),
     );
   };
   document.getElementById("findings").append(...findings.map(line));

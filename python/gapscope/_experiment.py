@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gapscope import _spec
 from gapscope._errors import InputError
 
 
@@ -15,7 +16,8 @@ class Experiment:
     """What binds a log to a model: the experiment file (docs/reference/experiment.md), or a mapping with the same keys.
 
     ``base`` is the folder that the mapping's ``model`` is relative to; without it the working folder. ``model`` may be
-    an MjSpec of the mujoco that is installed, as it is now.
+    an MjSpec of the mujoco that is installed, as it is now: its assets in memory go along, its files stay where they
+    are.
     """
 
     def __init__(
@@ -23,7 +25,7 @@ class Experiment:
     ) -> None:
         self.path: Path | None = None
         self._keys: dict[str, Any] = {}
-        self._mjcf = ""  # of an MjSpec
+        self._mjcf: _spec.Written | None = None  # of an MjSpec
         if isinstance(source, Mapping):
             self._keys = dict(source)
             model = self._keys.get("model")
@@ -32,8 +34,7 @@ class Experiment:
             if isinstance(model, (str, os.PathLike)):
                 self._keys["model"] = str((Path(base or ".") / model).resolve())
             elif hasattr(model, "to_xml"):
-                model.compile()
-                self._mjcf, self._keys["model"] = model.to_xml(), "experiment_model.xml"
+                self._mjcf, self._keys["model"] = _spec.written(model), "experiment_model.xml"
             return
         if base is not None:
             raise InputError("a file says itself where its model is", "base", str(base), "base for a mapping")
@@ -45,8 +46,8 @@ class Experiment:
         """Its file; of a mapping one that is written into ``folder``, as JSON, which YAML contains."""
         if self.path is not None:
             return self.path
-        if self._mjcf:
-            (folder / self._keys["model"]).write_text(self._mjcf, encoding="utf-8")
+        if self._mjcf is not None:
+            self._mjcf.write(folder / self._keys["model"])
         target = folder / "experiment.yaml"
         try:
             target.write_text(json.dumps(self._keys, indent=1, allow_nan=False) + "\n", encoding="utf-8")

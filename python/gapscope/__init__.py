@@ -8,7 +8,7 @@ Ctrl-C gives what a search has found so far. docs/reference/python.md tells more
 """
 
 from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune
-from gapscope._errors import Bug, InputError, Interrupted
+from gapscope._errors import Bug, InputError, Interrupted, MissingLibrary
 from gapscope._experiment import Experiment
 from gapscope._log import Log, read, read_all
 from gapscope._many import diagnose_many
@@ -53,6 +53,7 @@ __all__ = [
     "Log",
     "LogFit",
     "LogResult",
+    "MissingLibrary",
     "Model",
     "Parameter",
     "Progress",

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from gapscope._errors import InputError
+from gapscope._errors import InputError, import_needed
 from gapscope._experiment import Experiment
 from gapscope._program import run
 from gapscope.formats import Source, Table, format_of
@@ -108,10 +108,9 @@ class Log:
         return table[column]
 
     def to_pandas(self) -> "pd.DataFrame":
-        """The table, time as a column."""
-        import pandas as pd
-
-        return pd.DataFrame(self._load())
+        """The table, time as a column, in the log's own units. Raises MissingLibrary: there is no pandas."""
+        frame: pd.DataFrame = import_needed("pandas", "no pandas for a DataFrame", "pandas").DataFrame(self._load())
+        return frame
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the table as NPZ (``gapscope.log/1``), which the program reads to the last bit."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,11 +16,14 @@ from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import IO, TextIO
 
 from gapscope._errors import Bug, InputError
 
 _DONE, _BELOW_THRESHOLD, _BAD_INPUT = 0, 1, 2
+# Of the program's file: another platform's, no loader for it, a disk from which nothing is run.
+CANNOT_RUN = (errno.ENOEXEC, errno.ENOENT, errno.EACCES, errno.EPERM)
+_LOADER_FAILED = (1, 127)  # statuses of a program whose libraries the loader does not find
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,20 @@ def program() -> Path:
     return path
 
 
+# What the loader says before the program's first line: of a C library that is too old, of one that is not there.
+_LOADERS = re.compile(r"version `[\w.]+' not found|error while loading shared libraries|Error (loading|relocating) ")
+
+
+def not_executable(path: str | Path, reason: str) -> InputError:
+    return InputError(
+        "the program does not run on this machine",
+        str(path),
+        reason,
+        "Linux on x86-64 with glibc 2.35 or newer (Ubuntu 22.04, Debian 12)",
+        "install the wheel on such a machine or in a container of one, or build the checkout on this one: scripts/test",
+    )
+
+
 def _environment() -> dict[str, str]:
     """The program finds this package's converter even where the environment is not activated."""
     converter = Path(sys.executable).with_name("gapscope-convert")
@@ -104,18 +123,7 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
     command = [str(program()), *arguments, "--progress", "json"]
     # stdout goes to a file: a pipe would have to be read beside stderr.
     with tempfile.TemporaryFile("w+", encoding="utf-8") as stdout:
-        # A session of its own: the terminal's Ctrl-C reaches Python alone.
-        with subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=stdout,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-            start_new_session=True,
-            env=_environment(),
-        ) as child:
+        with _start(command, stdout) as child:
             listener = _Listener(child, progress)
             try:
                 with listener.watching(_wanted.get()):
@@ -126,6 +134,9 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
                 raise
         stdout.seek(0)
         text = stdout.read()
+    loader = next((line for line in listener.messages if _LOADERS.search(line)), None)
+    if status in _LOADER_FAILED and not text and loader is not None:
+        raise not_executable(command[0], loader)
     if status in (_DONE, _BELOW_THRESHOLD):
         return Finished(text, tuple(listener.messages), listener.interrupted)
     if listener.interrupted:
@@ -133,6 +144,26 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
     if status == _BAD_INPUT and listener.error is not None:
         raise listener.error
     raise Bug(f"gapscope ended with status {status}", command, "\n".join(listener.messages))
+
+
+def _start(command: list[str], stdout: IO[str]) -> subprocess.Popen[str]:
+    """A session of its own: the terminal's Ctrl-C reaches Python alone."""
+    try:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,
+            env=_environment(),
+        )
+    except OSError as error:
+        if error.errno not in CANNOT_RUN:  # too many arguments, no memory ...
+            raise
+        raise not_executable(command[0], str(error.strerror)) from None
 
 
 class _Listener:

@@ -16,7 +16,7 @@ from typing import Any
 
 from gapscope import _html
 from gapscope._json import Open, from_json
-from gapscope._plugins import load_plugins
+from gapscope._plugins import load_plugins, users_mujoco
 from gapscope._program import run
 from gapscope._traces import Traces
 
@@ -87,9 +87,11 @@ class Model:
         return self.path.read_text(encoding="utf-8")
 
     def mujoco(self) -> tuple[Any, Any]:
-        """(MjModel, MjData) of the mujoco that is installed, plugins loaded."""
-        import mujoco
+        """(MjModel, MjData) of the mujoco that is installed, plugins loaded.
 
+        Raises MissingLibrary: there is no mujoco. InputError: there are no plugins for its version.
+        """
+        mujoco = users_mujoco()
         load_plugins()
         model = mujoco.MjModel.from_xml_path(str(self.path))
         return model, mujoco.MjData(model)

@@ -7,16 +7,20 @@ import math
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gapscope as gs
 import numpy as np
 import pytest
+from gapscope import fleet
 from gapscope._json import from_json
 
-from conftest import interrupt_after, shell_program
+from conftest import ROOT, interrupt_after, shell_program
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {
@@ -117,6 +121,65 @@ def test_a_crash_of_the_program_is_a_bug_not_the_end(
     monkeypatch.setenv("GAPSCOPE_PROGRAM", str(tmp_path / "gone"))
     with pytest.raises(gs.InputError, match="the program is not there"):
         gs.replay(experiment, demo)
+
+
+LOADERS = {
+    "echo \"$0: /lib/libm.so.6: version \\`GLIBC_2.35' not found (required by $0)\" >&2\nexit 1": "GLIBC_2.35",
+    "echo \"$0: error while loading shared libraries: libz.so.1: no such file\" >&2\nexit 127": "libz.so.1",
+}
+
+
+@pytest.mark.parametrize("body", LOADERS)
+def test_a_program_that_cannot_be_loaded(
+    body: str, experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "old", body))
+    with pytest.raises(gs.InputError, match="does not run on this machine") as raised:
+        gs.replay(experiment, demo)
+    error = raised.value
+    assert LOADERS[body] in error.actual and error.where == str(tmp_path / "old") and error.cure
+
+
+def test_a_program_of_another_platform(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = Path(shell_program(tmp_path / "other", ""))
+    other.write_bytes(b"\x7fELF" + bytes(60))
+    no_loader = shell_program(tmp_path / "no_loader", "")
+    Path(no_loader).write_text("#!/no/such/loader\n")
+    for path in (str(other), no_loader):
+        monkeypatch.setenv("GAPSCOPE_PROGRAM", path)
+        with pytest.raises(gs.InputError, match="does not run on this machine") as raised:
+            gs.replay(experiment, demo)
+        assert raised.value.where == path and "glibc" in raised.value.allowed
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "python")}
+        command = [sys.executable, "-m", "gapscope", "--version"]
+        run = subprocess.run(command, capture_output=True, text=True, env=environment)
+        assert run.returncode == 2 and "does not run on this machine" in run.stderr, run.stderr
+        assert "Traceback" not in run.stderr
+
+
+def test_a_library_that_is_not_there_names_its_cure(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = gs.replay(experiment, demo, out=tmp_path)
+    for table in fleet.TABLES:
+        (tmp_path / f"{table}.csv").write_text("task\n1\n")
+    calls: dict[Callable[[], object], str] = {
+        gs.Log({"t": [0, 1]}).to_pandas: "pandas",
+        lambda: fleet.read_fleet(tmp_path): "pandas",
+        gs.load_plugins: "mujoco",
+        gs.plugin_library: "mujoco",
+        result.model.mujoco: "mujoco",
+    }
+    for call, library in calls.items():
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(gs.InputError) as raised:
+            call()
+        error = raised.value
+        assert isinstance(error, gs.MissingLibrary) and isinstance(error, ModuleNotFoundError)
+        assert error.cure == f"pip install {library}" and error.what and error.where == library
+        assert pickle.loads(pickle.dumps(error)).cure == error.cure and error.cure in str(error)
 
 
 def test_inspect(experiment: str, demo: str) -> None:

@@ -14,9 +14,9 @@ from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._json import from_json
 from gapscope._log import Log, read
-from gapscope._program import Finished, ProgressCallback, run
+from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope.formats import format_of
-from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video
+from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video, folders
 
 Source: TypeAlias = Experiment | str | os.PathLike[str] | Mapping[str, Any]
 OneLog: TypeAlias = Log | str | os.PathLike[str]
@@ -112,15 +112,6 @@ def _add(job: _Job, flag: str, values: Texts | Values | float | None) -> None:
         job.arguments += [flag, value]
 
 
-def _add_options(job: _Job, options: Options) -> None:
-    for name, value in (options or {}).items():
-        if value is True:
-            job.arguments.append(f"--{name}")
-        elif value is not False and value is not None:
-            many = value if isinstance(value, (list, tuple)) else [value]
-            _add(job, f"--{name}", [str(one) for one in many])
-
-
 def _finish(kind: type[R], job: _Job, progress: ProgressCallback | None) -> R:
     """Runs the job and reads its result; Interrupted where Ctrl-C cut it short."""
     job.arguments += ["--json", "--out", str(job.out)]
@@ -148,7 +139,7 @@ def inspect(exp: Source, logs: Logs, *, options: Options = None) -> tuple[Inspec
     """Is each log fit for use: timing, gaps, repairs, saturation, excitation."""
     job = _job("inspect", exp, None)
     job.arguments += [*_files(job, logs), "--json"]
-    _add_options(job, options)
+    job.arguments += option_words(options)
     finished = _run(job, None)
     if finished.interrupted:
         raise Interrupted
@@ -176,7 +167,7 @@ def replay(
     job.arguments += _files(job, logs)
     for flag, value in (("--with", with_), ("--set", set), ("--mode", mode), ("--window", window_s), ("--jobs", jobs)):
         _add(job, flag, value)
-    _add_options(job, options)
+    job.arguments += option_words(options)
     return _finish(Replay, job, None)
 
 
@@ -207,7 +198,7 @@ def tune(
         _add(job, flag, value)
     for name, number in (("--starts", starts), ("--budget", budget_s), ("--jobs", jobs), ("--seed", seed)):
         _add(job, name, number)
-    _add_options(job, {"resume": resume, **(options or {})})
+    job.arguments += option_words({"resume": resume, **(options or {})})
     return _finish(Tune, job, progress)
 
 
@@ -238,7 +229,7 @@ def diagnose(
         _add(job, flag, value)
     for name, number in (("--effort", effort), ("--budget", budget_s), ("--jobs", jobs), ("--seed", seed)):
         _add(job, name, number)
-    _add_options(job, {"resume": resume, **(options or {})})
+    job.arguments += option_words({"resume": resume, **(options or {})})
     return _finish(Diagnosis, job, progress)
 
 
@@ -259,15 +250,14 @@ def render(
     """
     job = _job("render", exp, None)
     job.arguments += [*_files(job, log, "log"), "--json", "--out", os.fspath(out)]
-    _add(job, "--compare", [str(one.out) if isinstance(one, Run) else os.fspath(one) for one in compare])
+    _add(job, "--compare", folders(compare))
     _add(job, "--with", with_)
     _add(job, "--set", set)
-    _add_options(job, options)
+    job.arguments += option_words(options)
     finished = _run(job, progress)
     if finished.interrupted:
         raise Interrupted
-    said = job.json(finished.stdout)
-    return Video(Path(said["out"]), said["frames"], said["width"], said["height"])
+    return Video.of(job.json(finished.stdout))
 
 
 def identify(method: str, exp: Source, logs: Logs, *, out: Folder = None, options: Options = None) -> dict[str, Any]:
@@ -293,7 +283,7 @@ def design(what: str, exp: Source, *, out: Folder = None, options: Options = Non
 
 def _plain(job: _Job, out: Folder, options: Options) -> dict[str, Any]:
     job.arguments += ["--json", *([] if out is None else ["--out", os.fspath(out)])]
-    _add_options(job, options)
+    job.arguments += option_words(options)
     finished = _run(job, None)
     if finished.interrupted:
         raise Interrupted

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,6 +113,18 @@ def _environment() -> dict[str, str]:
     """The program finds this package's converter even where the environment is not activated."""
     converter = Path(sys.executable).with_name("gapscope-convert")
     return {**({"GAPSCOPE_CONVERT": str(converter)} if converter.exists() else {}), **os.environ}
+
+
+def option_words(options: Mapping[str, object] | None) -> list[str]:
+    """Options by name as the program is given them: True is the flag alone, None and False are left out."""
+    words: list[str] = []
+    for name, value in (options or {}).items():
+        if value is True:
+            words.append(f"--{name}")
+        elif value is not False and value is not None:
+            for one in value if isinstance(value, (list, tuple)) else [value]:
+                words += [f"--{name}", str(one)]
+    return words
 
 
 def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> Finished:

@@ -9,15 +9,16 @@ import json
 import math
 import os
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gapscope import _html
+from gapscope._errors import Interrupted
 from gapscope._json import Open, from_json
 from gapscope._plugins import load_plugins, users_mujoco
-from gapscope._program import run
+from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope._traces import Traces
 
 
@@ -108,6 +109,41 @@ class Report:
         return _html.frame(self.path.read_text(encoding="utf-8"))
 
 
+# Of result.json: the logs that judged a result, then those that were fitted.
+_JUDGING = ("logs", "held_out", "train")
+
+
+def _answer(finished: Finished) -> dict[str, Any]:
+    """What a command printed with --json. Raises Interrupted: Ctrl-C came first."""
+    if not finished.stdout:
+        raise Interrupted
+    return typing.cast(dict[str, Any], json.loads(finished.stdout))
+
+
+@dataclass(frozen=True)
+class Video:
+    """What `render` drew: a video, a GIF or a still of ``width`` x ``height`` pixels. A notebook shows it."""
+
+    path: Path
+    frames: int
+    width: int
+    height: int
+    _keep: Any = field(default=None, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any], keep: Any = None) -> Video:
+        """From what `gapscope render --json` prints."""
+        return cls(Path(said["out"]), said["frames"], said["width"], said["height"], keep)
+
+    def _repr_html_(self) -> str:
+        return _html.video(self.path)
+
+
+def folders(models: Sequence[Run | str | os.PathLike[str]]) -> list[str]:
+    """Results, their folders, or "nominal", as ``render --compare`` takes them."""
+    return [str(one.out) if isinstance(one, Run) else os.fspath(one) for one in models]
+
+
 @dataclass(frozen=True)
 class Run(Open):
     """What results have in common: the folder that the program wrote, and what it said on the way."""
@@ -124,11 +160,40 @@ class Run(Open):
         """The page report.html; the last expression of a notebook's cell shows it."""
         return Report(self.out / "report.html", self._keep)
 
+    def video(
+        self,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        log: str | os.PathLike[str] | None = None,
+        compare: Sequence[Run | str | os.PathLike[str]] = (),
+        experiment: str | None = None,
+        progress: ProgressCallback | None = None,
+        options: Mapping[str, object] | None = None,
+    ) -> Video:
+        """The mechanism that was measured against this result's model, as `render` draws it.
+
+        ``out`` is VIDEO.mp4, MOVING.gif or STILL.png; without it a video in the result's folder. ``log`` is a log's
+        name in the result, or a file; without it the first log that judged the result. ``compare`` are models to show
+        beside, three at most. ``experiment``: where its file has moved since.
+        """
+        target = os.fspath(out) if out is not None else str(self.out / "video.mp4")
+        models = [f"{type(self).__name__.lower()}={self.out.absolute()}", *folders(compare)]
+        words = [experiment or str(self.json["experiment"]), self._log_file(log), "--out", target, "--json"]
+        words += option_words({"compare": models, **(options or {})})
+        return Video.of(_answer(run(["render", *words], progress)), self._keep if out is None else None)
+
+    def _log_file(self, log: str | os.PathLike[str] | None) -> str:
+        """The file of a log by its name in the result; of none the first that judged it."""
+        stated = self.json
+        lists = stated["logs"] if isinstance(stated.get("logs"), dict) else stated
+        files = [one if isinstance(one, str) else one["log"] for key in _JUDGING for one in lists.get(key, ())]
+        if log is None:
+            return str(files[0])
+        return next((file for file in files if Path(file) == self.out / "logs" / f"{log}.npz"), os.fspath(log))
+
     def _go_on(self, command: str, *words: str, **options: object) -> dict[str, Any]:
         """What a command on this result's folder prints with --json; options that are None are not given."""
-        given = [word for name, value in options.items() if value is not None for word in (f"--{name}", str(value))]
-        answer = run([command, str(self.out), *words, *given, "--json"])
-        return typing.cast(dict[str, Any], json.loads(answer.stdout))
+        return _answer(run([command, str(self.out), *words, *option_words(options), "--json"]))
 
     @property
     def json(self) -> dict[str, Any]:
@@ -444,19 +509,6 @@ class Inspection(Open):
 
     def _repr_html_(self) -> str:
         return _html.inspection(self)
-
-
-@dataclass(frozen=True)
-class Video:
-    """What ``render`` drew: a video, a GIF or a still. A notebook shows it."""
-
-    path: Path
-    frames: int
-    width: int
-    height: int
-
-    def _repr_html_(self) -> str:
-        return _html.video(self.path)
 
 
 def _by_name(items: tuple[Parameter, ...], name: str) -> Parameter:

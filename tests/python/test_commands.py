@@ -336,6 +336,22 @@ def test_identify_design_and_apply(experiment: str, demo: str, tmp_path: Path) -
     assert changed["changes"] and "frictionloss" in (tmp_path / "robot.xml").read_text()
 
 
+def test_a_result_is_drawn(experiment: str, demo: str, tmp_path: Path) -> None:
+    """Beside its logs, of files and of memory."""
+    small: dict[str, object] = {"size": "320x240", "at": 0.5}
+    result = gs.replay(experiment, [demo, short_log(demo, "monday")], out=tmp_path / "out")
+    still = result.video(tmp_path / "still.png", log="monday", options=small)
+    assert (still.path, still.frames, still.width, still.height) == (tmp_path / "still.png", 1, 320, 240)
+    assert "data:image/png" in still._repr_html_()
+    tuned = gs.tune(experiment, demo, freeze=FROZEN[1:], starts=1, budget_s=1)
+    moving = tuned.video(compare=["nominal", result], options={"size": "320x240", "from": 0.5, "to": 0.7, "fps": 10})
+    assert moving.path == tuned.out / "video.mp4" and moving.frames == 3
+    del tuned
+    assert moving.path.is_file()
+    with pytest.raises(gs.InputError, match="gone.csv"):
+        result.video(tmp_path / "none.png", log="gone.csv", options=small)
+
+
 def test_the_model_steps_in_the_users_mujoco(experiment: str, demo: str) -> None:
     mujoco = pytest.importorskip("mujoco")
     spring = {name: value for name, value in TRUTH.items() if name.startswith("cable_spring")}

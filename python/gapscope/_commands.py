@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar, overload
 
 from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
@@ -38,7 +39,7 @@ class _Job:
     keep: tempfile.TemporaryDirectory[str] | None
     arguments: list[str]
     names: dict[str, str]  # of logs from memory, by the files that the program is given
-    experiment: Experiment
+    experiment: Experiment | None
 
     def json(self, text: str) -> dict[str, Any]:
         for path, name in self.names.items():
@@ -55,10 +56,12 @@ class _Job:
         return tuple(named(line) for line in finished.messages)
 
 
-def _job(command: str, exp: Source, out: Folder) -> _Job:
+def _job(command: str, exp: Source | None, out: Folder) -> _Job:
     keep = None if out is not None else tempfile.TemporaryDirectory(prefix="gapscope_")
     folder = Path(out) if out is not None else Path(keep.name)  # type: ignore[union-attr]
     folder.mkdir(parents=True, exist_ok=True)
+    if exp is None:
+        return _Job(folder, keep, [command], {}, None)
     experiment = exp if isinstance(exp, Experiment) else Experiment(exp)
     return _Job(folder, keep, [command, str(experiment.file(folder))], {}, experiment)
 
@@ -79,17 +82,24 @@ def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
         if log.path is not None:
             files.append(str(log.path))
         else:
-            name = log.name or f"log_{len(job.names)}"
-            path = job.out / "logs" / f"{name}.npz"
-            if Path(name).name != name or str(path) in job.names:
-                raise InputError("not a log's name", "Log.name", repr(name), "names that differ, without /")
-            path.parent.mkdir(exist_ok=True)
-            log.save(path)
-            job.names[str(path)] = name
-            files.append(str(path))
+            files.append(_written(job, log))
     if not files:
         raise InputError("no log", what, "an empty list", "at least one")
     return files
+
+
+def _written(job: _Job, log: Log) -> str:
+    """The file of a log from memory, beside the result."""
+    if job.experiment is not None:
+        log.check_units(job.experiment)
+    name = log.name or f"log_{len(job.names)}"
+    path = job.out / "logs" / f"{name}.npz"
+    if Path(name).name != name or str(path) in job.names:
+        raise InputError("not a log's name", "Log.name", repr(name), "names that differ, without /")
+    path.parent.mkdir(exist_ok=True)
+    log.save(path)
+    job.names[str(path)] = name
+    return str(path)
 
 
 def _search(command: str, exp: Source, out: Folder, logs: Logs, hold_out: Logs) -> _Job:
@@ -135,10 +145,22 @@ def _run(job: _Job, progress: ProgressCallback | None) -> Finished:
         raise error from None
 
 
-def inspect(exp: Source, logs: Logs, *, options: Options = None) -> tuple[Inspection, ...]:
-    """Is each log fit for use: timing, gaps, repairs, saturation, excitation."""
-    job = _job("inspect", exp, None)
-    job.arguments += [*_files(job, logs), "--json"]
+@overload
+def inspect(exp: Source, logs: Logs, *, options: Options = None) -> tuple[Inspection, ...]: ...
+@overload
+def inspect(exp: Logs, logs: None = None, *, options: Options = None) -> tuple[Inspection, ...]: ...
+def inspect(exp: Source | Logs, logs: Logs | None = None, *, options: Options = None) -> tuple[Inspection, ...]:
+    """Is each log fit for use: timing, gaps, repairs, saturation, excitation. One Inspection a log, in their order.
+
+    ``inspect(logs)``, without an experiment, looks at every column in the log's own units.
+    """
+    if logs is None:
+        if isinstance(exp, (Experiment, Mapping)):
+            raise InputError("no log", "inspect", cure="inspect(experiment, logs), or inspect(logs)")
+        job, found = _job("inspect", None, None), exp
+    else:
+        job, found = _job("inspect", typing.cast(Source, exp), None), logs
+    job.arguments += [*_files(job, found), "--json"]
     job.arguments += option_words(options)
     finished = _run(job, None)
     if finished.interrupted:

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gapscope import _spec
-from gapscope._errors import InputError
+from gapscope._errors import InputError, import_needed
+
+
+_SI = {"1", "rad", "m", "s", "N", "V", "A", "kg", "W", "Hz", "degC"}
+
+
+def _same_unit(stated: str, taken: Any) -> bool:
+    """Whether a unit is the one that the experiment takes; of none any of SI's."""
+    if taken is None:
+        return set(re.findall("[A-Za-z]+", stated)) <= _SI
+    return "".join(stated.split()) == "".join(str(taken).split())
 
 
 class Experiment:
@@ -70,26 +81,45 @@ class Experiment:
 
         Of a file: needs a YAML library where the file has a ``source`` (ruamel.yaml, which rosbags brings).
         """
-        keys: Any = self._keys
-        if self.path is not None:
-            text = self.path.read_text(encoding="utf-8")
-            if "source:" not in text:
-                return {}
-            try:
-                from ruamel.yaml import YAML
-            except ImportError:
-                raise InputError(
-                    "no library that reads the experiment's 'source'", str(self.path), cure="pip install ruamel.yaml"
-                ) from None
-            try:
-                keys = YAML(typ="safe", pure=True).load(text)
-            except Exception as error:
-                raise InputError("not a readable experiment file", str(self.path), str(error)[:200]) from None
-        log = keys.get("log") if isinstance(keys, Mapping) else None
+        if self.path is not None and "source:" not in self.path.read_text(encoding="utf-8"):
+            return {}
+        log = self._read("'source'").get("log")
         source = log.get("source") if isinstance(log, Mapping) else None
         if source is not None and not isinstance(source, Mapping):
             raise InputError("'source' is no mapping", repr(self), repr(source)[:80], "log: {source: {topics: [...]}}")
         return dict(source or {})
+
+    def check_units(self, log: str, stated: Mapping[str, str]) -> None:
+        """Raises InputError where a log's columns are not in the units that the experiment takes them in.
+
+        A column with a ``scale`` is the experiment's own affair. Of a file: needs a YAML library (ruamel.yaml).
+        """
+        keys = self._read("units") if stated else {}
+        items = [item for part in ("commands", "measured") for item in keys.get(part) or ()]
+        for item in filter(lambda one: isinstance(one, Mapping), items):
+            named = item.get("column", item.get("columns_of_elements"))
+            for column in named if isinstance(named, (list, tuple)) else [named]:
+                unit = stated.get(str(column), "")
+                if unit and "scale" not in item and not _same_unit(unit, item.get("unit")):
+                    raise InputError(
+                        "a column in another unit than the experiment takes it in",
+                        f"{log}, column {column!r}",
+                        repr(unit),
+                        str(item.get("unit", "SI, as the experiment states no unit")),
+                        f"unit: {unit} for this column in the experiment, or convert the values",
+                    )
+
+    def _read(self, what: str) -> Mapping[str, Any]:
+        """All keys; of a file ``what`` they are read for is named where no library reads it."""
+        if self.path is None:
+            return self._keys
+        install = "ruamel.yaml"
+        yaml = import_needed("ruamel.yaml", f"no library that reads the {what} of the experiment {self.path}", install)
+        try:
+            keys = yaml.YAML(typ="safe", pure=True).load(self.path.read_text(encoding="utf-8"))
+        except Exception as error:
+            raise InputError("not a readable experiment file", str(self.path), str(error)[:200]) from None
+        return keys if isinstance(keys, Mapping) else {}
 
     def __repr__(self) -> str:
         return f"Experiment({str(self.path) if self.path else self._keys['model']!r})"

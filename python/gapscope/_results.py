@@ -8,15 +8,19 @@ from __future__ import annotations
 import json
 import math
 import os
+import tempfile
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gapscope import _html
 from gapscope._errors import Interrupted
 from gapscope._json import Open, from_json
+from gapscope._log import Floats
 from gapscope._plugins import load_plugins, users_mujoco
 from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope._traces import Traces
@@ -87,14 +91,20 @@ class Model:
         """The MJCF."""
         return self.path.read_text(encoding="utf-8")
 
-    def mujoco(self) -> tuple[Any, Any]:
+    def mujoco(self, *, native: bool = False) -> tuple[Any, Any]:
         """(MjModel, MjData) of the mujoco that is installed, plugins loaded.
 
-        Raises MissingLibrary: there is no mujoco. InputError: there are no plugins for its version.
+        ``native``: of MuJoCo 4's own elements instead, as `export` to "mujoco_native" writes them; that says also what
+        is lost. Raises MissingLibrary: there is no mujoco. InputError: there are no plugins for its version.
         """
         mujoco = users_mujoco()
-        load_plugins()
-        model = mujoco.MjModel.from_xml_path(str(self.path))
+        if not native:
+            load_plugins()
+            model = mujoco.MjModel.from_xml_path(str(self.path))
+            return model, mujoco.MjData(model)
+        with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
+            run(["export", str(self.path.parent), "--to", "mujoco_native", "--out", folder, "--json"])
+            model = mujoco.MjModel.from_xml_path(str(Path(folder) / "model.xml"))
         return model, mujoco.MjData(model)
 
 
@@ -389,6 +399,17 @@ class Tune(_WithTraces):
     def traces(self) -> tuple[Traces, ...]:
         """Of each held-out log, in the order of ``held_out``."""
         return self._read_traces("held_out")
+
+    def samples(self, draws: int, *, target: str = "mujoco_native", seed: int = 0) -> dict[str, Floats]:
+        """Joint draws of what the logs leave open: the arrays of randomization.npz (docs/how-to/randomize.md).
+
+        "parameters" is of shape (draws, parameters), each in its own unit, in the order in which ``parameters`` has
+        those that vary. The others are named and shaped as MuJoCo's, draws first: "dof_damping" of (draws, nv).
+        """
+        with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
+            self.export(target, folder, draws=draws, seed=seed)
+            with np.load(Path(folder) / "randomization.npz", allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
 
     def _repr_html_(self) -> str:
         return _html.tune(self)

@@ -188,6 +188,16 @@ def test_inspect(experiment: str, demo: str) -> None:
     assert "fit for use" in found._repr_html_()
 
 
+def test_inspect_without_an_experiment(experiment: str, demo: str, short: str) -> None:
+    first, second = gs.inspect([demo, gs.read(short)])
+    assert [c.name for c in first.channels] == ["voltage_v", "arm_rad", "pendulum_rad"] and second.time["rows"] == 300
+    (alone,) = gs.inspect(demo)
+    assert alone.time == first.time
+    for words in ((experiment,), (gs.Experiment(experiment),)):
+        with pytest.raises(gs.InputError, match="no log"):
+            gs.inspect(*words)
+
+
 def test_an_experiment_from_memory(experiment: str, demo: str) -> None:
     keys = {
         "model": "qube.xml",
@@ -300,6 +310,8 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
     assert mujoco.MjModel.from_xml_path(lost.model).opt.timestep == 0.001
     with pytest.raises(gs.InputError, match="--to"):
         result.export("mjy", tmp_path / "other")
+    plain, _ = result.model.mujoco(native=True)
+    assert plain.nplugin == 0 and plain.dof_frictionloss[0] == pytest.approx(0.0006, rel=1e-4)
 
 
 def test_a_tune_is_drawn_from(experiment: str, demo: str, tmp_path: Path) -> None:
@@ -308,6 +320,11 @@ def test_a_tune_is_drawn_from(experiment: str, demo: str, tmp_path: Path) -> Non
     out = Path(tuned.export("mujoco_native", tmp_path / "native", draws=20, seed=4).model).parent
     told = json.loads((out / "randomization.json").read_text())
     drawn = np.load(out / "randomization.npz")
+    varied = [parameter["name"] for parameter in told["parameters"]]
+    assert varied == [parameter.name for parameter in tuned.parameters if parameter.name in varied]
+    again = tuned.samples(20, seed=4)
+    assert set(again) == set(drawn.files)
+    np.testing.assert_array_equal(again["parameters"], drawn["parameters"])
     assert drawn["parameters"].shape == (20, len(told["parameters"]))
     assert {name: list(drawn[name].shape) for name in told["fields"]} == told["fields"]
     mujoco = pytest.importorskip("mujoco")

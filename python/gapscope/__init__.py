@@ -7,13 +7,14 @@ The program does the work, as a child process: no call of this package can take 
 Ctrl-C gives what a search has found so far. docs/reference/python.md tells more.
 """
 
+from gapscope._bar import bar
 from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune
 from gapscope._errors import Bug, InputError, Interrupted, MissingLibrary
 from gapscope._experiment import Experiment
 from gapscope._log import Log, read, read_all
 from gapscope._many import diagnose_many
 from gapscope._plugins import load_plugins, plugin_library
-from gapscope._program import Progress, bar
+from gapscope._program import Progress
 from gapscope._results import (
     Channel,
     Diagnosis,

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TextIO
+from typing import IO
 
 from gapscope._errors import Bug, InputError
 
@@ -38,19 +38,6 @@ class Progress:
 
 
 ProgressCallback = Callable[[Progress], object]
-
-
-def bar(progress: Progress, stream: TextIO | None = None) -> None:
-    """A line that is written over: ``gs.tune(..., progress=gs.bar)``."""
-    text = progress.stage
-    if progress.done is not None and progress.total:
-        share = min(progress.done / progress.total, 1.0)
-        text = f"[{'#' * round(20 * share):<20}] {text}"
-    elif progress.done is not None:
-        text += f" {progress.done:g}"
-    if progress.best is not None:
-        text += f", cost {progress.best:.6g}"
-    print(f"\r\033[K{text}, {progress.elapsed_s:.0f} s", end="", file=stream or sys.stderr, flush=True)
 
 
 @dataclass(frozen=True)

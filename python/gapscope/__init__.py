@@ -1,7 +1,9 @@
 """Finds why a MuJoCo model does not move like its hardware log.
 
->>> import gapscope as gs                                                           # doctest: +SKIP
->>> gs.replay("experiment.yaml", gs.Log(df, time="t"), with_="cable_spring@arm")    # doctest: +SKIP
+>>> import gapscope as gs
+>>> result = gs.replay("models/qube/experiment.yaml", gs.read("demo/qube.csv"), with_="cable_spring@arm")
+>>> result.model.effects
+('cable_spring@arm',)
 
 The program does the work, as a child process: no call of this package can take the interpreter down with it, and
 Ctrl-C gives what a search has found so far. docs/reference/python.md tells more.

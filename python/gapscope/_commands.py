@@ -183,7 +183,14 @@ def replay(
     """The logged commands through the model: predicted against measured.
 
     ``with_`` adds effects ("cable_spring@arm"), ``set`` sets parameters in their own units. ``mode`` is "free_run",
-    "windows" or "closed_loop". Without ``out`` the files live as long as the result.
+    "windows" or "closed_loop"; ``window_s``: the length of a window, s. ``jobs`` are workers. Without ``out`` the files
+    live as long as the result. Its traces are arrays of shape (rows,), SI.
+
+    >>> result = replay("models/qube/experiment.yaml", "demo/qube.csv")
+    >>> print(f"{result.error:.2f}, of the arm {result.logs[0].signals['arm_rad'].nrmse:.2f}")
+    1.77, of the arm 2.49
+    >>> result.traces[0]["arm_rad"].predicted.shape
+    (5001,)
     """
     job = _job("replay", exp, out)
     job.arguments += _files(job, logs)
@@ -212,6 +219,10 @@ def tune(
     options: Options = None,
 ) -> Tune:
     """Parameters fitted until replayed trajectories match the logs, scored on logs not seen.
+
+    ``hold_out``: logs that are not fitted; ``with_`` adds effects; ``free`` and ``freeze`` name parameters, "arm.*";
+    ``set`` sets them, in their own units. ``starts``: fits from other values; ``budget_s``, s: the longest it may take;
+    ``jobs``: workers. ``resume``: goes on from what an earlier call left in ``out``.
 
     Ctrl-C raises Interrupted, whose ``partial`` is the best so far. ``progress`` is called in this thread.
     """
@@ -243,6 +254,8 @@ def diagnose(
     options: Options = None,
 ) -> Diagnosis:
     """Where the gap lies, which unmodelled effects cause it, how far it shrinks. ``effort``: "quick" ... "thorough".
+
+    ``prior``: probabilities by effect, 0 .. 1. The other arguments are those of `tune`.
 
     Ctrl-C raises Interrupted, whose ``partial`` is the best verdict so far. ``progress`` is called in this thread.
     """

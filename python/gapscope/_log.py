@@ -115,14 +115,17 @@ class Log:
         experiment.check_units(self.name or "Log", self._stated)
 
     def __getitem__(self, column: str) -> Floats:
-        """A column, shape (rows,)."""
+        """A column, shape (rows,), in the log's own unit."""
         table = self._load()
         if column not in table:
             raise InputError("no such column", repr(self), repr(column), ", ".join(table))
         return table[column]
 
     def to_pandas(self) -> "pd.DataFrame":
-        """The table, time as a column, in the log's own units. Raises MissingLibrary: there is no pandas."""
+        """The table of shape (rows, columns), time as a column, in the log's own units.
+
+        Raises MissingLibrary: there is no pandas.
+        """
         frame: pd.DataFrame = import_needed("pandas", "no pandas for a DataFrame", "pandas").DataFrame(self._load())
         return frame
 
@@ -378,6 +381,14 @@ def read(
     **source: str | Sequence[str],
 ) -> Log:
     """A log in a file of any format that is known (docs/reference/formats.md). Of a dataset's episodes: "dataset#3".
+
+    Its columns are of shape (rows,), in the file's own units.
+
+    >>> log = read("demo/qube.csv")
+    >>> log.columns
+    ('time_s', 'voltage_v', 'arm_rad', 'pendulum_rad')
+    >>> log["arm_rad"].shape
+    (5001,)
 
     ``exp`` is an experiment whose ``log: {source: {...}}`` says what to take of the file. ``source`` are the same keys,
     before those of the experiment: ``topics`` of a bag, else all; ``msgs``, a folder of .msg files; ``variable`` of a

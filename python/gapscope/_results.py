@@ -36,14 +36,16 @@ class Interval(Open):
 
     @property
     def interval(self) -> tuple[float, float]:
+        """(low, high), in the parameter's own unit."""
         return self.low, self.high
 
 
 @dataclass(frozen=True)
 class SignalScore(Open):
-    """Measured against predicted, SI.
+    """Measured against predicted, of one signal of one log.
 
-    ``nrmse``: over the signal's standard deviation; ``lag_s`` > 0: measured is later than predicted.
+    ``rmse``, ``mae`` and ``max`` in the signal's SI unit; ``nrmse``: rmse over the signal's standard deviation;
+    ``lag_s`` > 0, s: measured is later than predicted; ``correlation``: -1 .. 1.
     """
 
     rmse: float = math.nan
@@ -56,7 +58,10 @@ class SignalScore(Open):
 
 @dataclass(frozen=True)
 class Where(Open):
-    """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share."""
+    """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share.
+
+    Shares are 0 .. 1.
+    """
 
     signal: str = ""
     condition: str = ""
@@ -68,7 +73,11 @@ class Where(Open):
 
 @dataclass(frozen=True)
 class LogResult(Open):
-    """One log of a replay or a tune."""
+    """One log of a replay or a tune.
+
+    ``error``: root mean square over its signals of the nrmse; ``samples``: rows that were compared; ``signals`` and
+    ``where`` by signal.
+    """
 
     log: str
     outcome: str = ""
@@ -80,7 +89,10 @@ class LogResult(Open):
 
 @dataclass(frozen=True)
 class Model:
-    """A model with what was found in it: an MJCF with the program's plugins, and its parameters."""
+    """A model with what was found in it: an MJCF with the program's plugins, and its parameters.
+
+    ``effects`` are those that were added, "cable_spring@arm"; ``values`` of all parameters by name, in their own units.
+    """
 
     path: Path
     effects: tuple[str, ...]
@@ -235,8 +247,8 @@ class ExportError(Open):
 class Exported(Open):
     """A model for another engine: ``model`` is the MJCF's path, ``files`` those that the engine has beside it.
 
-    ``delay_steps``: by drive, delays of the engine's configuration, in its own steps. ``unmeasured``: why there are no
-    errors.
+    ``time_step_s``, s: of the MJCF. ``delay_steps``: by drive, delays of the engine's configuration, in its own steps.
+    ``unmeasured``: why there are no errors.
     """
 
     target: str
@@ -284,6 +296,7 @@ class _WithModel(Run):
 
     @property
     def model(self) -> Model:
+        """The model of the result; its files live as long as it does."""
         stated = self.json["model"]
         effects = tuple(f"{e['name']}@{e['on']}" if e.get("on") else str(e["name"]) for e in stated["effects"])
         return Model(self.out / "model.xml", effects, stated["values"], self._keep)
@@ -293,7 +306,7 @@ class _WithModel(Run):
 class _WithTraces(_WithModel):
     @property
     def traces(self) -> tuple[Traces, ...]:
-        """Of each log, in the order of ``logs``."""
+        """Of each log, in the order of ``logs``: by signal arrays of shape (rows,), SI."""
         return self._read_traces("logs")
 
     def _read_traces(self, logs: str) -> tuple[Traces, ...]:
@@ -310,7 +323,11 @@ class _WithTraces(_WithModel):
 
 @dataclass(frozen=True)
 class Replay(_WithTraces):
-    """Predicted against measured. ``error``: root mean square over signals and logs of the nrmse."""
+    """Predicted against measured. ``error``: root mean square over signals and logs of the nrmse.
+
+    ``error_windows``: the same, each window started from the log. ``time_step_s``, s: of the simulation;
+    ``time_step_error``: by how much halving it changes the error. ``parameters`` by name, in their own units.
+    """
 
     schema: str
     mode: str
@@ -340,12 +357,13 @@ class Parameter(Open):
 
     @property
     def interval(self) -> tuple[float, float]:
+        """(low, high), in the parameter's own unit."""
         return self.low, self.high
 
 
 @dataclass(frozen=True)
 class LogFit(Open):
-    """The parameters that all logs together know, fitted to one log alone."""
+    """The parameters that all logs together know, fitted to one log alone; each in its own unit."""
 
     log: str
     termination: str
@@ -376,7 +394,8 @@ class Flat(Open):
 class Tune(_WithTraces):
     """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ...
 
-    ``per_log``: after ``options={"each-log": True}`` the fits to each log alone, from which `export` draws.
+    ``parameters`` are in their own units, errors normalised as `Replay.error`, ``wall_s`` in s. ``per_log``: after
+    ``options={"each-log": True}`` the fits to each log alone, from which `export` draws.
     """
 
     schema: str
@@ -397,7 +416,7 @@ class Tune(_WithTraces):
 
     @property
     def traces(self) -> tuple[Traces, ...]:
-        """Of each held-out log, in the order of ``held_out``."""
+        """Of each held-out log, in the order of ``held_out``: by signal arrays of shape (rows,), SI."""
         return self._read_traces("held_out")
 
     def samples(self, draws: int, *, target: str = "mujoco_native", seed: int = 0) -> dict[str, Floats]:
@@ -417,7 +436,11 @@ class Tune(_WithTraces):
 
 @dataclass(frozen=True)
 class FoundEffect(Open):
-    """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes."""
+    """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes.
+
+    ``parameters`` by name, in their own units; ``error_before`` and ``error_after`` normalised; ``share_of_gap`` and
+    ``probability``: 0 .. 1.
+    """
 
     name: str
     on: str
@@ -432,6 +455,7 @@ class FoundEffect(Open):
 class Statement(Open):
     """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen".
 
+    ``parameters`` and ``bound`` by name, in their own units; ``probability`` and ``share_of_gap``: 0 .. 1.
     ``caveat``: what the logs' clocks leave open of a delay or a lag.
     """
 
@@ -466,7 +490,11 @@ class NextExperiment(Open):
 
 @dataclass(frozen=True)
 class Diagnosis(_WithModel):
-    """Which unmodelled effects close the gap. ``verdict``: none, parameters, effects, ambiguous or unknown."""
+    """Which unmodelled effects close the gap. ``verdict``: none, parameters, effects, ambiguous or unknown.
+
+    ``probability``: of the verdict, 0 .. 1; ``gap``: held-out errors, normalised as `Replay.error`; ``where``: of the
+    retuned model. ``effects`` were accepted, ``statements`` are of every effect at every place. ``wall_s``, s.
+    """
 
     schema: str
     verdict: str
@@ -491,7 +519,7 @@ class Diagnosis(_WithModel):
 
 @dataclass(frozen=True)
 class Channel(Open):
-    """A command or measured signal as it stands in the log, in its own unit."""
+    """A command or measured signal as it stands in the log, in its own unit; shares are 0 .. 1."""
 
     name: str
     unit: str
@@ -518,7 +546,10 @@ class Finding(Open):
 
 @dataclass(frozen=True)
 class Inspection(Open):
-    """Whether a log is ``fit`` for use, and what it cannot show (``verdict``)."""
+    """Whether a log is ``fit`` for use, and what it cannot show (``verdict``).
+
+    ``time``: rows, steps and jitter in s, the rate in Hz, each key with its unit.
+    """
 
     log: str
     fit: bool

@@ -26,7 +26,7 @@ class Trace:
 
 
 class Traces(Mapping[str, Trace]):
-    """The traces of one log by signal; read from disk when the first is asked for. ``commands``: those by actuator."""
+    """The traces of one log by signal, arrays of shape (rows,) in SI; read from disk when the first is asked for."""
 
     def __init__(self, path: Path, keep: Any = None) -> None:
         self.path = path
@@ -58,6 +58,7 @@ class Traces(Mapping[str, Trace]):
 
     @property
     def commands(self) -> Mapping[str, Floats]:
+        """What drove the model, by actuator: of shape (rows,), in the SI unit of its command."""
         return {
             name.removeprefix("command/"): values
             for name, values in self._load().items()

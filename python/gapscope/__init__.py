@@ -1,19 +1,22 @@
 """Finds why a MuJoCo model does not move like its hardware log.
 
->>> import gapscope as gs                                                           # doctest: +SKIP
->>> gs.replay("experiment.yaml", gs.Log(df, time="t"), with_="cable_spring@arm")    # doctest: +SKIP
+>>> import gapscope as gs
+>>> result = gs.replay("models/qube/experiment.yaml", gs.read("demo/qube.csv"), with_="cable_spring@arm")
+>>> result.model.effects
+('cable_spring@arm',)
 
 The program does the work, as a child process: no call of this package can take the interpreter down with it, and
 Ctrl-C gives what a search has found so far. docs/reference/python.md tells more.
 """
 
+from gapscope._bar import bar
 from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune
-from gapscope._errors import Bug, InputError, Interrupted
+from gapscope._errors import Bug, InputError, Interrupted, MissingLibrary
 from gapscope._experiment import Experiment
 from gapscope._log import Log, read, read_all
 from gapscope._many import diagnose_many
 from gapscope._plugins import load_plugins, plugin_library
-from gapscope._program import Progress, bar
+from gapscope._program import Progress
 from gapscope._results import (
     Channel,
     Diagnosis,
@@ -53,6 +56,7 @@ __all__ = [
     "Log",
     "LogFit",
     "LogResult",
+    "MissingLibrary",
     "Model",
     "Parameter",
     "Progress",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -28,6 +29,18 @@ class InputError(ValueError):
         if self.allowed:
             text += (", " if self.actual else ": ") + f"allowed: {self.allowed}"
         return f"{text}; {self.cure}" if self.cure else text
+
+
+class MissingLibrary(InputError, ModuleNotFoundError):
+    """A library that this call needs cannot be imported; ``cure`` is what pip installs. Also a ModuleNotFoundError."""
+
+
+def import_needed(module: str, what: str, install: str) -> Any:
+    """A library when it is needed first. Raises MissingLibrary: it cannot be imported; ``what`` says whose need."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingLibrary(what, module, str(error), cure=f"pip install {install}") from None
 
 
 class Bug(RuntimeError):

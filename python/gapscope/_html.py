@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gapscope._traces import judging
+
 if TYPE_CHECKING:
     from gapscope._log import Floats
-    from gapscope._results import Diagnosis, Inspection, Replay, Tune
+    from gapscope._results import Diagnosis, Inspection, Replay, Statement, Tune
     from gapscope._traces import Traces
 
 _WIDTH, _HEIGHT = 240, 36
@@ -100,6 +102,33 @@ def tune(result: "Tune") -> str:
     )
 
 
+def _others(statements: "tuple[Statement, ...]") -> str:
+    """A line that counts the statements that no table shows."""
+    absent = [s for s in statements if s.answer == "absent"]
+    bounded = sum(1 for s in absent if s.bound)
+    counts = {
+        "absent beyond a bound": bounded,
+        "absent without one": len(absent) - bounded,
+        "unseen in these logs": sum(1 for s in statements if s.answer == "unseen"),
+    }
+    said = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    return f"<p>{said}: <code>.statements</code></p>" if said else ""
+
+
+def _drawn(result: "Diagnosis") -> str:
+    memory = result.out / "logs"
+    rows = [
+        [
+            _text(Path(one.log).stem if Path(one.log).parent == memory else one.log),
+            _text(one.signal),
+            _number(one.error),
+            sparkline(one.measured, one.predicted),
+        ]
+        for one in judging(result.out / "report.html")
+    ]
+    return _table(["log", "signal", "nRMSE", "measured (grey), predicted (orange)"], rows)
+
+
 def diagnosis(result: "Diagnosis") -> str:
     rows = [
         [
@@ -122,6 +151,8 @@ def diagnosis(result: "Diagnosis") -> str:
         f"{_number(gap.nominal, 3)} &rarr; retuned {_number(gap.refit, 3)} &rarr; {_number(gap.final, 3)}{closed}"
         + (f" ({_text(result.termination)})" if result.termination == "interrupted" else "")
         + _table(["effect", "answer", "probability", "size (95 %)", "of the gap that closes"], rows)
+        + _others(result.statements)
+        + _drawn(result)
         + f"<p>{_text(result.explanation)}</p>"
     )
 

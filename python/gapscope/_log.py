@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from gapscope._errors import InputError
+from gapscope._errors import InputError, import_needed
 from gapscope._experiment import Experiment
 from gapscope._program import run
 from gapscope.formats import Source, Table, format_of
@@ -38,8 +39,10 @@ class Log:
 
     ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
     time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so.
-    Dates become seconds from the first. ``header`` holds numbers and texts of the whole log (``values: {header: kp}``
-    of an experiment). ``name`` is what results call the log.
+    Dates become seconds from the first. ``units`` says of columns in memory what they are in, {"q": "deg"}: `inspect`
+    shows it, and an experiment that takes a column in another unit is refused. Nothing is converted. ``header`` holds
+    numbers and texts of the whole log (``values: {header: kp}`` of an experiment). ``name`` is what results call the
+    log.
 
     Stamps that are missing, repeat or go back are refused here: in memory they are a mistake. In files they are
     repaired as the experiment says.
@@ -58,6 +61,7 @@ class Log:
         *,
         time: str | None = None,
         time_unit: str | None = None,
+        units: Mapping[str, str] | None = None,
         header: Mapping[str, float | str] | None = None,
         name: str = "",
     ) -> None:
@@ -67,32 +71,32 @@ class Log:
         self._table: dict[str, Floats] = {}
         self._header = dict(header or {})
         self._units: dict[str, str] = {}
+        self._stated: dict[str, str] = {}
         self._joined = False
         self.findings: tuple[str, ...] = ()
         self.clock: dict[str, str] = {}
         if isinstance(data, (str, os.PathLike)) and format_of(data) is not None:
-            if time_unit is not None or header:
-                raise InputError("a file says itself what its header is", os.fspath(data), cure="leave them out")
+            if time_unit is not None or header or units:
+                raise InputError(
+                    "a file says itself what its header and units are", os.fspath(data), cure="leave them out"
+                )
             (table,) = convert(data, Source(time=time or ""), every=False)
             self._take_table(table)
             return
         if isinstance(data, (str, os.PathLike)):
-            if time is not None or time_unit is not None or header:
+            if time is not None or time_unit is not None or header or units:
                 raise InputError(
-                    "a file says itself what its time and header are",
+                    "a file says itself what its time, units and header are",
                     where=os.fspath(data),
-                    allowed="time, time_unit and header for data in memory",
+                    allowed="time, time_unit, units and header for data in memory",
                     cure="state them in the experiment file: log: {time: {column: NAME, unit: s}}",
                 )
             self.path = Path(data)
             if not self.path.exists():
                 raise InputError("no such file", where=str(self.path), cure="name the right log")
             return
-        if time_unit not in (None, "s", "ms", "us", "ns"):
-            raise InputError("not a unit of time", "time_unit", repr(time_unit), "s, ms, us, ns")
         self._take(data)
-        if time_unit and self.time is not None:
-            self._units[self.time] = time_unit
+        self._take_units(time_unit, units or {})
         self._check()
 
     @property
@@ -100,18 +104,30 @@ class Log:
         """Names of the columns, as the program reads them."""
         return tuple(self._load())
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Of the columns whose unit is known by the file, or was stated."""
+        self._load()
+        return dict(self._units)
+
+    def check_units(self, experiment: Experiment) -> None:
+        """Raises InputError: the experiment takes a column in another unit than was stated."""
+        experiment.check_units(self.name or "Log", self._stated)
+
     def __getitem__(self, column: str) -> Floats:
-        """A column, shape (rows,)."""
+        """A column, shape (rows,), in the log's own unit."""
         table = self._load()
         if column not in table:
             raise InputError("no such column", repr(self), repr(column), ", ".join(table))
         return table[column]
 
     def to_pandas(self) -> "pd.DataFrame":
-        """The table, time as a column."""
-        import pandas as pd
+        """The table of shape (rows, columns), time as a column, in the log's own units.
 
-        return pd.DataFrame(self._load())
+        Raises MissingLibrary: there is no pandas.
+        """
+        frame: pd.DataFrame = import_needed("pandas", "no pandas for a DataFrame", "pandas").DataFrame(self._load())
+        return frame
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Writes the table as NPZ (``gapscope.log/1``), which the program reads to the last bit."""
@@ -145,7 +161,8 @@ class Log:
     def _load(self) -> dict[str, Floats]:
         if self.path is not None and not self._table:
             with _converted(self.path) as table:
-                self._table = dict(load_table(table).columns)
+                read = load_table(table)
+                self._table, self._units = dict(read.columns), dict(read.units)
         return self._table
 
     @classmethod
@@ -159,7 +176,7 @@ class Log:
     def _take_table(self, table: Table) -> None:
         self._table, self.time, self._joined = dict(table.columns), table.time, table.joined
         self.name = self.name or table.name
-        self._header, self._units = dict(table.header), dict(table.units)
+        self._header, self._units, self._stated = dict(table.header), dict(table.units), {}
         self.findings, self.clock = table.findings, dict(table.clock)
 
     # How data in memory becomes the table.
@@ -183,6 +200,22 @@ class Log:
                 "a path, a pandas DataFrame, a mapping of names to arrays, a structured array",
                 "an array without names: {'time_s': a[:, 0], 'q': a[:, 1]}",
             )
+
+    def _take_units(self, time_unit: str | None, units: Mapping[str, str]) -> None:
+        for name, unit in units.items():
+            columns = [one for one in self._table if one == name or re.fullmatch(re.escape(name) + r"\[\d+\]", one)]
+            if not columns or not isinstance(unit, str):
+                raise InputError("no unit of a column", "units", f"{name!r}: {unit!r}", ", ".join(self._table))
+            self._stated.update(dict.fromkeys(columns, unit))
+        of_time = self._stated.pop(self.time or "", None)
+        if time_unit is not None and of_time not in (None, time_unit):
+            raise InputError("two units of time", "time_unit, units", f"{time_unit!r}, {of_time!r}", "one")
+        unit_of_time = time_unit or of_time
+        if unit_of_time not in (None, "s", "ms", "us", "ns"):
+            raise InputError("not a unit of time", "time_unit", repr(unit_of_time), "s, ms, us, ns")
+        self._units.update(self._stated)
+        if unit_of_time is not None and self.time is not None:
+            self._units[self.time] = unit_of_time
 
     def _guess_time(self, names: Iterable[Any]) -> None:
         if self.time is None:
@@ -348,6 +381,14 @@ def read(
     **source: str | Sequence[str],
 ) -> Log:
     """A log in a file of any format that is known (docs/reference/formats.md). Of a dataset's episodes: "dataset#3".
+
+    Its columns are of shape (rows,), in the file's own units.
+
+    >>> log = read("demo/qube.csv")
+    >>> log.columns
+    ('time_s', 'voltage_v', 'arm_rad', 'pendulum_rad')
+    >>> log["arm_rad"].shape
+    (5001,)
 
     ``exp`` is an experiment whose ``log: {source: {...}}`` says what to take of the file. ``source`` are the same keys,
     before those of the experiment: ``topics`` of a bag, else all; ``msgs``, a folder of .msg files; ``variable`` of a

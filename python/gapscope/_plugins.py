@@ -6,16 +6,22 @@ from pathlib import Path
 from typing import Any
 
 from _gapscope_mujoco import libraries
-from gapscope._errors import InputError
+from gapscope._errors import InputError, import_needed
 
 _PLUGIN = "gapscope.motor"  # one of the library's
 
 
-def plugin_library() -> Path:
-    """The plugin library for the mujoco that is installed. InputError: there is none for its version."""
-    import mujoco
+def users_mujoco() -> Any:
+    """The module. MissingLibrary: there is none."""
+    return import_needed("mujoco", "no MuJoCo in this environment", "mujoco")
 
-    version, found = str(mujoco.mj_versionString()), libraries()
+
+def plugin_library() -> Path:
+    """The plugin library for the mujoco that is installed.
+
+    Raises InputError: there is none for its version. MissingLibrary: there is no mujoco.
+    """
+    version, found = str(users_mujoco().mj_versionString()), libraries()
     path = found.get(version)
     if path is None or not path.is_file():
         raise InputError(
@@ -31,11 +37,9 @@ def plugin_library() -> Path:
 def load_plugins() -> None:
     """Makes the plugins known to the mujoco that is installed; harmless where they are known.
 
-    MuJoCo from 4.0 on does this by itself when it is imported. InputError: none for its version.
+    MuJoCo from 4.0 on does this by itself when it is imported. Raises as `plugin_library`.
     """
-    import mujoco
-
-    path = plugin_library()
+    mujoco, path = users_mujoco(), plugin_library()
     if not _registered(mujoco):
         mujoco.mj_loadPluginLibrary(str(path))
 

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import IO
 
 from gapscope._errors import Bug, InputError
 
 _DONE, _BELOW_THRESHOLD, _BAD_INPUT = 0, 1, 2
+# Of the program's file: another platform's, no loader for it, a disk from which nothing is run.
+CANNOT_RUN = (errno.ENOEXEC, errno.ENOENT, errno.EACCES, errno.EPERM)
+_LOADER_FAILED = (1, 127)  # statuses of a program whose libraries the loader does not find
 
 
 @dataclass(frozen=True)
@@ -33,19 +38,6 @@ class Progress:
 
 
 ProgressCallback = Callable[[Progress], object]
-
-
-def bar(progress: Progress, stream: TextIO | None = None) -> None:
-    """A line that is written over: ``gs.tune(..., progress=gs.bar)``."""
-    text = progress.stage
-    if progress.done is not None and progress.total:
-        share = min(progress.done / progress.total, 1.0)
-        text = f"[{'#' * round(20 * share):<20}] {text}"
-    elif progress.done is not None:
-        text += f" {progress.done:g}"
-    if progress.best is not None:
-        text += f", cost {progress.best:.6g}"
-    print(f"\r\033[K{text}, {progress.elapsed_s:.0f} s", end="", file=stream or sys.stderr, flush=True)
 
 
 @dataclass(frozen=True)
@@ -90,10 +82,36 @@ def program() -> Path:
     return path
 
 
+# What the loader says before the program's first line: of a C library that is too old, of one that is not there.
+_LOADERS = re.compile(r"version `[\w.]+' not found|error while loading shared libraries|Error (loading|relocating) ")
+
+
+def not_executable(path: str | Path, reason: str) -> InputError:
+    return InputError(
+        "the program does not run on this machine",
+        str(path),
+        reason,
+        "Linux on x86-64 with glibc 2.35 or newer (Ubuntu 22.04, Debian 12)",
+        "install the wheel on such a machine or in a container of one, or build the checkout on this one: scripts/test",
+    )
+
+
 def _environment() -> dict[str, str]:
     """The program finds this package's converter even where the environment is not activated."""
     converter = Path(sys.executable).with_name("gapscope-convert")
     return {**({"GAPSCOPE_CONVERT": str(converter)} if converter.exists() else {}), **os.environ}
+
+
+def option_words(options: Mapping[str, object] | None) -> list[str]:
+    """Options by name as the program is given them: True is the flag alone, None and False are left out."""
+    words: list[str] = []
+    for name, value in (options or {}).items():
+        if value is True:
+            words.append(f"--{name}")
+        elif value is not False and value is not None:
+            for one in value if isinstance(value, (list, tuple)) else [value]:
+                words += [f"--{name}", str(one)]
+    return words
 
 
 def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> Finished:
@@ -104,18 +122,7 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
     command = [str(program()), *arguments, "--progress", "json"]
     # stdout goes to a file: a pipe would have to be read beside stderr.
     with tempfile.TemporaryFile("w+", encoding="utf-8") as stdout:
-        # A session of its own: the terminal's Ctrl-C reaches Python alone.
-        with subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=stdout,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            errors="replace",
-            start_new_session=True,
-            env=_environment(),
-        ) as child:
+        with _start(command, stdout) as child:
             listener = _Listener(child, progress)
             try:
                 with listener.watching(_wanted.get()):
@@ -126,6 +133,9 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
                 raise
         stdout.seek(0)
         text = stdout.read()
+    loader = next((line for line in listener.messages if _LOADERS.search(line)), None)
+    if status in _LOADER_FAILED and not text and loader is not None:
+        raise not_executable(command[0], loader)
     if status in (_DONE, _BELOW_THRESHOLD):
         return Finished(text, tuple(listener.messages), listener.interrupted)
     if listener.interrupted:
@@ -133,6 +143,26 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
     if status == _BAD_INPUT and listener.error is not None:
         raise listener.error
     raise Bug(f"gapscope ended with status {status}", command, "\n".join(listener.messages))
+
+
+def _start(command: list[str], stdout: IO[str]) -> subprocess.Popen[str]:
+    """A session of its own: the terminal's Ctrl-C reaches Python alone."""
+    try:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,
+            env=_environment(),
+        )
+    except OSError as error:
+        if error.errno not in CANNOT_RUN:  # too many arguments, no memory ...
+            raise
+        raise not_executable(command[0], str(error.strerror)) from None
 
 
 class _Listener:

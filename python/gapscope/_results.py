@@ -8,16 +8,21 @@ from __future__ import annotations
 import json
 import math
 import os
+import tempfile
 import typing
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gapscope import _html
+from gapscope._errors import Interrupted
 from gapscope._json import Open, from_json
-from gapscope._plugins import load_plugins
-from gapscope._program import run
+from gapscope._log import Floats
+from gapscope._plugins import load_plugins, users_mujoco
+from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope._traces import Traces
 
 
@@ -31,14 +36,16 @@ class Interval(Open):
 
     @property
     def interval(self) -> tuple[float, float]:
+        """(low, high), in the parameter's own unit."""
         return self.low, self.high
 
 
 @dataclass(frozen=True)
 class SignalScore(Open):
-    """Measured against predicted, SI.
+    """Measured against predicted, of one signal of one log.
 
-    ``nrmse``: over the signal's standard deviation; ``lag_s`` > 0: measured is later than predicted.
+    ``rmse``, ``mae`` and ``max`` in the signal's SI unit; ``nrmse``: rmse over the signal's standard deviation;
+    ``lag_s`` > 0, s: measured is later than predicted; ``correlation``: -1 .. 1.
     """
 
     rmse: float = math.nan
@@ -51,7 +58,10 @@ class SignalScore(Open):
 
 @dataclass(frozen=True)
 class Where(Open):
-    """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share."""
+    """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share.
+
+    Shares are 0 .. 1.
+    """
 
     signal: str = ""
     condition: str = ""
@@ -63,7 +73,11 @@ class Where(Open):
 
 @dataclass(frozen=True)
 class LogResult(Open):
-    """One log of a replay or a tune."""
+    """One log of a replay or a tune.
+
+    ``error``: root mean square over its signals of the nrmse; ``samples``: rows that were compared; ``signals`` and
+    ``where`` by signal.
+    """
 
     log: str
     outcome: str = ""
@@ -75,7 +89,10 @@ class LogResult(Open):
 
 @dataclass(frozen=True)
 class Model:
-    """A model with what was found in it: an MJCF with the program's plugins, and its parameters."""
+    """A model with what was found in it: an MJCF with the program's plugins, and its parameters.
+
+    ``effects`` are those that were added, "cable_spring@arm"; ``values`` of all parameters by name, in their own units.
+    """
 
     path: Path
     effects: tuple[str, ...]
@@ -86,12 +103,20 @@ class Model:
         """The MJCF."""
         return self.path.read_text(encoding="utf-8")
 
-    def mujoco(self) -> tuple[Any, Any]:
-        """(MjModel, MjData) of the mujoco that is installed, plugins loaded."""
-        import mujoco
+    def mujoco(self, *, native: bool = False) -> tuple[Any, Any]:
+        """(MjModel, MjData) of the mujoco that is installed, plugins loaded.
 
-        load_plugins()
-        model = mujoco.MjModel.from_xml_path(str(self.path))
+        ``native``: of MuJoCo 4's own elements instead, as `export` to "mujoco_native" writes them; that says also what
+        is lost. Raises MissingLibrary: there is no mujoco. InputError: there are no plugins for its version.
+        """
+        mujoco = users_mujoco()
+        if not native:
+            load_plugins()
+            model = mujoco.MjModel.from_xml_path(str(self.path))
+            return model, mujoco.MjData(model)
+        with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
+            run(["export", str(self.path.parent), "--to", "mujoco_native", "--out", folder, "--json"])
+            model = mujoco.MjModel.from_xml_path(str(Path(folder) / "model.xml"))
         return model, mujoco.MjData(model)
 
 
@@ -104,6 +129,41 @@ class Report:
 
     def _repr_html_(self) -> str:
         return _html.frame(self.path.read_text(encoding="utf-8"))
+
+
+# Of result.json: the logs that judged a result, then those that were fitted.
+_JUDGING = ("logs", "held_out", "train")
+
+
+def _answer(finished: Finished) -> dict[str, Any]:
+    """What a command printed with --json. Raises Interrupted: Ctrl-C came first."""
+    if not finished.stdout:
+        raise Interrupted
+    return typing.cast(dict[str, Any], json.loads(finished.stdout))
+
+
+@dataclass(frozen=True)
+class Video:
+    """What `render` drew: a video, a GIF or a still of ``width`` x ``height`` pixels. A notebook shows it."""
+
+    path: Path
+    frames: int
+    width: int
+    height: int
+    _keep: Any = field(default=None, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any], keep: Any = None) -> Video:
+        """From what `gapscope render --json` prints."""
+        return cls(Path(said["out"]), said["frames"], said["width"], said["height"], keep)
+
+    def _repr_html_(self) -> str:
+        return _html.video(self.path)
+
+
+def folders(models: Sequence[Run | str | os.PathLike[str]]) -> list[str]:
+    """Results, their folders, or "nominal", as ``render --compare`` takes them."""
+    return [str(one.out) if isinstance(one, Run) else os.fspath(one) for one in models]
 
 
 @dataclass(frozen=True)
@@ -122,11 +182,40 @@ class Run(Open):
         """The page report.html; the last expression of a notebook's cell shows it."""
         return Report(self.out / "report.html", self._keep)
 
+    def video(
+        self,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        log: str | os.PathLike[str] | None = None,
+        compare: Sequence[Run | str | os.PathLike[str]] = (),
+        experiment: str | None = None,
+        progress: ProgressCallback | None = None,
+        options: Mapping[str, object] | None = None,
+    ) -> Video:
+        """The mechanism that was measured against this result's model, as `render` draws it.
+
+        ``out`` is VIDEO.mp4, MOVING.gif or STILL.png; without it a video in the result's folder. ``log`` is a log's
+        name in the result, or a file; without it the first log that judged the result. ``compare`` are models to show
+        beside, three at most. ``experiment``: where its file has moved since.
+        """
+        target = os.fspath(out) if out is not None else str(self.out / "video.mp4")
+        models = [f"{type(self).__name__.lower()}={self.out.absolute()}", *folders(compare)]
+        words = [experiment or str(self.json["experiment"]), self._log_file(log), "--out", target, "--json"]
+        words += option_words({"compare": models, **(options or {})})
+        return Video.of(_answer(run(["render", *words], progress)), self._keep if out is None else None)
+
+    def _log_file(self, log: str | os.PathLike[str] | None) -> str:
+        """The file of a log by its name in the result; of none the first that judged it."""
+        stated = self.json
+        lists = stated["logs"] if isinstance(stated.get("logs"), dict) else stated
+        files = [one if isinstance(one, str) else one["log"] for key in _JUDGING for one in lists.get(key, ())]
+        if log is None:
+            return str(files[0])
+        return next((file for file in files if Path(file) == self.out / "logs" / f"{log}.npz"), os.fspath(log))
+
     def _go_on(self, command: str, *words: str, **options: object) -> dict[str, Any]:
         """What a command on this result's folder prints with --json; options that are None are not given."""
-        given = [word for name, value in options.items() if value is not None for word in (f"--{name}", str(value))]
-        answer = run([command, str(self.out), *words, *given, "--json"])
-        return typing.cast(dict[str, Any], json.loads(answer.stdout))
+        return _answer(run([command, str(self.out), *words, *option_words(options), "--json"]))
 
     @property
     def json(self) -> dict[str, Any]:
@@ -158,8 +247,8 @@ class ExportError(Open):
 class Exported(Open):
     """A model for another engine: ``model`` is the MJCF's path, ``files`` those that the engine has beside it.
 
-    ``delay_steps``: by drive, delays of the engine's configuration, in its own steps. ``unmeasured``: why there are no
-    errors.
+    ``time_step_s``, s: of the MJCF. ``delay_steps``: by drive, delays of the engine's configuration, in its own steps.
+    ``unmeasured``: why there are no errors.
     """
 
     target: str
@@ -207,6 +296,7 @@ class _WithModel(Run):
 
     @property
     def model(self) -> Model:
+        """The model of the result; its files live as long as it does."""
         stated = self.json["model"]
         effects = tuple(f"{e['name']}@{e['on']}" if e.get("on") else str(e["name"]) for e in stated["effects"])
         return Model(self.out / "model.xml", effects, stated["values"], self._keep)
@@ -216,7 +306,7 @@ class _WithModel(Run):
 class _WithTraces(_WithModel):
     @property
     def traces(self) -> tuple[Traces, ...]:
-        """Of each log, in the order of ``logs``."""
+        """Of each log, in the order of ``logs``: by signal arrays of shape (rows,), SI."""
         return self._read_traces("logs")
 
     def _read_traces(self, logs: str) -> tuple[Traces, ...]:
@@ -233,7 +323,11 @@ class _WithTraces(_WithModel):
 
 @dataclass(frozen=True)
 class Replay(_WithTraces):
-    """Predicted against measured. ``error``: root mean square over signals and logs of the nrmse."""
+    """Predicted against measured. ``error``: root mean square over signals and logs of the nrmse.
+
+    ``error_windows``: the same, each window started from the log. ``time_step_s``, s: of the simulation;
+    ``time_step_error``: by how much halving it changes the error. ``parameters`` by name, in their own units.
+    """
 
     schema: str
     mode: str
@@ -263,12 +357,13 @@ class Parameter(Open):
 
     @property
     def interval(self) -> tuple[float, float]:
+        """(low, high), in the parameter's own unit."""
         return self.low, self.high
 
 
 @dataclass(frozen=True)
 class LogFit(Open):
-    """The parameters that all logs together know, fitted to one log alone."""
+    """The parameters that all logs together know, fitted to one log alone; each in its own unit."""
 
     log: str
     termination: str
@@ -299,7 +394,8 @@ class Flat(Open):
 class Tune(_WithTraces):
     """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ...
 
-    ``per_log``: after ``options={"each-log": True}`` the fits to each log alone, from which `export` draws.
+    ``parameters`` are in their own units, errors normalised as `Replay.error`, ``wall_s`` in s. ``per_log``: after
+    ``options={"each-log": True}`` the fits to each log alone, from which `export` draws.
     """
 
     schema: str
@@ -320,8 +416,19 @@ class Tune(_WithTraces):
 
     @property
     def traces(self) -> tuple[Traces, ...]:
-        """Of each held-out log, in the order of ``held_out``."""
+        """Of each held-out log, in the order of ``held_out``: by signal arrays of shape (rows,), SI."""
         return self._read_traces("held_out")
+
+    def samples(self, draws: int, *, target: str = "mujoco_native", seed: int = 0) -> dict[str, Floats]:
+        """Joint draws of what the logs leave open: the arrays of randomization.npz (docs/how-to/randomize.md).
+
+        "parameters" is of shape (draws, parameters), each in its own unit, in the order in which ``parameters`` has
+        those that vary. The others are named and shaped as MuJoCo's, draws first: "dof_damping" of (draws, nv).
+        """
+        with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
+            self.export(target, folder, draws=draws, seed=seed)
+            with np.load(Path(folder) / "randomization.npz", allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in arrays.files}
 
     def _repr_html_(self) -> str:
         return _html.tune(self)
@@ -329,7 +436,11 @@ class Tune(_WithTraces):
 
 @dataclass(frozen=True)
 class FoundEffect(Open):
-    """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes."""
+    """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes.
+
+    ``parameters`` by name, in their own units; ``error_before`` and ``error_after`` normalised; ``share_of_gap`` and
+    ``probability``: 0 .. 1.
+    """
 
     name: str
     on: str
@@ -344,6 +455,7 @@ class FoundEffect(Open):
 class Statement(Open):
     """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen".
 
+    ``parameters`` and ``bound`` by name, in their own units; ``probability`` and ``share_of_gap``: 0 .. 1.
     ``caveat``: what the logs' clocks leave open of a delay or a lag.
     """
 
@@ -378,7 +490,11 @@ class NextExperiment(Open):
 
 @dataclass(frozen=True)
 class Diagnosis(_WithModel):
-    """Which unmodelled effects close the gap. ``verdict``: none, parameters, effects, ambiguous or unknown."""
+    """Which unmodelled effects close the gap. ``verdict``: none, parameters, effects, ambiguous or unknown.
+
+    ``probability``: of the verdict, 0 .. 1; ``gap``: held-out errors, normalised as `Replay.error`; ``where``: of the
+    retuned model. ``effects`` were accepted, ``statements`` are of every effect at every place. ``wall_s``, s.
+    """
 
     schema: str
     verdict: str
@@ -403,7 +519,7 @@ class Diagnosis(_WithModel):
 
 @dataclass(frozen=True)
 class Channel(Open):
-    """A command or measured signal as it stands in the log, in its own unit."""
+    """A command or measured signal as it stands in the log, in its own unit; shares are 0 .. 1."""
 
     name: str
     unit: str
@@ -430,7 +546,10 @@ class Finding(Open):
 
 @dataclass(frozen=True)
 class Inspection(Open):
-    """Whether a log is ``fit`` for use, and what it cannot show (``verdict``)."""
+    """Whether a log is ``fit`` for use, and what it cannot show (``verdict``).
+
+    ``time``: rows, steps and jitter in s, the rate in Hz, each key with its unit.
+    """
 
     log: str
     fit: bool
@@ -442,19 +561,6 @@ class Inspection(Open):
 
     def _repr_html_(self) -> str:
         return _html.inspection(self)
-
-
-@dataclass(frozen=True)
-class Video:
-    """What ``render`` drew: a video, a GIF or a still. A notebook shows it."""
-
-    path: Path
-    frames: int
-    width: int
-    height: int
-
-    def _repr_html_(self) -> str:
-        return _html.video(self.path)
 
 
 def _by_name(items: tuple[Parameter, ...], name: str) -> Parameter:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import typing
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +26,7 @@ class Trace:
 
 
 class Traces(Mapping[str, Trace]):
-    """The traces of one log by signal; read from disk when the first is asked for. ``commands``: those by actuator."""
+    """The traces of one log by signal, arrays of shape (rows,) in SI; read from disk when the first is asked for."""
 
     def __init__(self, path: Path, keep: Any = None) -> None:
         self.path = path
@@ -56,11 +58,53 @@ class Traces(Mapping[str, Trace]):
 
     @property
     def commands(self) -> Mapping[str, Floats]:
+        """What drove the model, by actuator: of shape (rows,), in the SI unit of its command."""
         return {
             name.removeprefix("command/"): values
             for name, values in self._load().items()
             if name.startswith("command/")
         }
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What report.html draws of one signal of one log: ``measured`` and ``predicted`` of shape (points,), SI."""
+
+    log: str
+    signal: str
+    error: float  #: normalised, of the model that was found
+    measured: Floats
+    predicted: Floats
+
+
+_DATA = re.compile(r'<script type="application/json" id="report-data">(.*?)</script>', re.DOTALL)
+
+
+def judging(report: Path) -> tuple[Drawn, ...]:
+    """The signals of the logs that judged a result, as its report draws them; of none where there is no report."""
+    found = _DATA.search(report.read_text(encoding="utf-8")) if report.is_file() else None
+    logs = [log for log in json.loads(found[1])["logs"] if "traces" in log] if found else []
+    held_out = [log for log in logs if log["held_out"]]
+    return tuple(
+        Drawn(
+            log["path"],
+            signal["name"],
+            _float(signal["error"]),
+            _floats(signal["measured"]),
+            _floats(signal["predicted"][-1]["values"]),
+        )
+        for log in held_out or logs
+        for signal in log["traces"]["signals"]
+        if signal["predicted"]
+    )
+
+
+def _floats(values: list[float | None]) -> Floats:
+    return np.array(values, dtype=np.float64)  # null: NaN
+
+
+def _float(value: float | None) -> float:
+    return math.nan if value is None else float(value)
 
 
 def _number(text: str) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gapscope._errors import InputError
+from gapscope._errors import InputError, import_needed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,15 +30,21 @@ class Fleet:
 
 
 def read_fleet(work: str | os.PathLike[str]) -> Fleet:
-    """The tables of a merged fleet as DataFrames (needs pandas). Raises InputError: it has not been merged."""
-    import pandas as pd
+    """The tables of a merged fleet as DataFrames.
+
+    Raises InputError: it has not been merged. MissingLibrary: there is no pandas.
+    """
+    pandas = import_needed("pandas", "no pandas for DataFrames", "pandas")
 
     def table(name: str) -> pd.DataFrame:
         path = _table(work, name)
         with path.open(newline="") as file:
             texts = [column for column in next(csv.reader(file)) if column not in _NUMBERS]
         empty = dict.fromkeys(_NUMBERS, [""])
-        return pd.read_csv(path, dtype=dict.fromkeys(texts, str), keep_default_na=False, na_values=empty)
+        frame: pd.DataFrame = pandas.read_csv(
+            path, dtype=dict.fromkeys(texts, str), keep_default_na=False, na_values=empty
+        )
+        return frame
 
     return Fleet(*(table(name) for name in TABLES))
 

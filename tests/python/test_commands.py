@@ -7,16 +7,20 @@ import math
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import gapscope as gs
 import numpy as np
 import pytest
+from gapscope import fleet
 from gapscope._json import from_json
 
-from conftest import interrupt_after, shell_program
+from conftest import ROOT, interrupt_after, shell_program
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {
@@ -119,10 +123,79 @@ def test_a_crash_of_the_program_is_a_bug_not_the_end(
         gs.replay(experiment, demo)
 
 
+LOADERS = {
+    "echo \"$0: /lib/libm.so.6: version \\`GLIBC_2.35' not found (required by $0)\" >&2\nexit 1": "GLIBC_2.35",
+    "echo \"$0: error while loading shared libraries: libz.so.1: no such file\" >&2\nexit 127": "libz.so.1",
+}
+
+
+@pytest.mark.parametrize("body", LOADERS)
+def test_a_program_that_cannot_be_loaded(
+    body: str, experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "old", body))
+    with pytest.raises(gs.InputError, match="does not run on this machine") as raised:
+        gs.replay(experiment, demo)
+    error = raised.value
+    assert LOADERS[body] in error.actual and error.where == str(tmp_path / "old") and error.cure
+
+
+def test_a_program_of_another_platform(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = Path(shell_program(tmp_path / "other", ""))
+    other.write_bytes(b"\x7fELF" + bytes(60))
+    no_loader = shell_program(tmp_path / "no_loader", "")
+    Path(no_loader).write_text("#!/no/such/loader\n")
+    for path in (str(other), no_loader):
+        monkeypatch.setenv("GAPSCOPE_PROGRAM", path)
+        with pytest.raises(gs.InputError, match="does not run on this machine") as raised:
+            gs.replay(experiment, demo)
+        assert raised.value.where == path and "glibc" in raised.value.allowed
+        environment = {**os.environ, "PYTHONPATH": str(ROOT / "python")}
+        command = [sys.executable, "-m", "gapscope", "--version"]
+        run = subprocess.run(command, capture_output=True, text=True, env=environment)
+        assert run.returncode == 2 and "does not run on this machine" in run.stderr, run.stderr
+        assert "Traceback" not in run.stderr
+
+
+def test_a_library_that_is_not_there_names_its_cure(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = gs.replay(experiment, demo, out=tmp_path)
+    for table in fleet.TABLES:
+        (tmp_path / f"{table}.csv").write_text("task\n1\n")
+    calls: dict[Callable[[], object], str] = {
+        gs.Log({"t": [0, 1]}).to_pandas: "pandas",
+        lambda: fleet.read_fleet(tmp_path): "pandas",
+        gs.load_plugins: "mujoco",
+        gs.plugin_library: "mujoco",
+        result.model.mujoco: "mujoco",
+    }
+    for call, library in calls.items():
+        monkeypatch.setitem(sys.modules, library, None)
+        with pytest.raises(gs.InputError) as raised:
+            call()
+        error = raised.value
+        assert isinstance(error, gs.MissingLibrary) and isinstance(error, ModuleNotFoundError)
+        assert error.cure == f"pip install {library}" and error.what and error.where == library
+        assert pickle.loads(pickle.dumps(error)).cure == error.cure and error.cure in str(error)
+
+
 def test_inspect(experiment: str, demo: str) -> None:
     (found,) = gs.inspect(experiment, [demo])
     assert found.fit and found.channels[0].name == "motor" and found.time["rows"] == 5001
     assert "fit for use" in found._repr_html_()
+
+
+def test_inspect_without_an_experiment(experiment: str, demo: str, short: str) -> None:
+    first, second = gs.inspect([demo, gs.read(short)])
+    assert [c.name for c in first.channels] == ["voltage_v", "arm_rad", "pendulum_rad"] and second.time["rows"] == 300
+    (alone,) = gs.inspect(demo)
+    assert alone.time == first.time
+    for words in ((experiment,), (gs.Experiment(experiment),)):
+        with pytest.raises(gs.InputError, match="no log"):
+            gs.inspect(*words)
 
 
 def test_an_experiment_from_memory(experiment: str, demo: str) -> None:
@@ -203,6 +276,21 @@ def test_an_interrupted_diagnosis_goes_on(experiment: str, demo: str, tmp_path: 
     assert whole.termination != "interrupted" and not (tmp_path / "diagnosis.journal").exists()
 
 
+def test_a_diagnosis_shows_its_logs_and_what_is_absent(experiment: str, short: str, tmp_path: Path) -> None:
+    only: dict[str, Any] = {"effort": "quick", "out": tmp_path, "options": {"no-next-experiment": True}}
+    found = gs.diagnose(experiment, gs.Log(np.genfromtxt(short, delimiter=",", names=True), name="monday"), **only)
+    shown = found._repr_html_()
+    assert shown.count("<svg") == 2 == shown.count("<td style=\"text-align:left\">monday</td>") and "arm_rad" in shown
+    bounded = sum(1 for s in found.statements if s.answer == "absent" and s.bound)
+    unseen = sum(1 for s in found.statements if s.answer == "unseen")
+    assert bounded and f"{bounded} absent beyond a bound" in shown
+    assert unseen and f"{unseen} unseen in these logs" in shown
+    still = found.video(tmp_path / "still.png", log="monday", options={"size": "320x240", "at": 0.1})
+    assert still.frames == 1
+    (tmp_path / "report.html").unlink()
+    assert "<svg" not in found._repr_html_() and found.verdict in found._repr_html_()
+
+
 def test_an_exception_in_the_callback_ends_the_program(experiment: str, demo: str) -> None:
     class Enough(Exception):
         pass
@@ -237,6 +325,8 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
     assert mujoco.MjModel.from_xml_path(lost.model).opt.timestep == 0.001
     with pytest.raises(gs.InputError, match="--to"):
         result.export("mjy", tmp_path / "other")
+    plain, _ = result.model.mujoco(native=True)
+    assert plain.nplugin == 0 and plain.dof_frictionloss[0] == pytest.approx(0.0006, rel=1e-4)
 
 
 def test_a_tune_is_drawn_from(experiment: str, demo: str, tmp_path: Path) -> None:
@@ -245,6 +335,11 @@ def test_a_tune_is_drawn_from(experiment: str, demo: str, tmp_path: Path) -> Non
     out = Path(tuned.export("mujoco_native", tmp_path / "native", draws=20, seed=4).model).parent
     told = json.loads((out / "randomization.json").read_text())
     drawn = np.load(out / "randomization.npz")
+    varied = [parameter["name"] for parameter in told["parameters"]]
+    assert varied == [parameter.name for parameter in tuned.parameters if parameter.name in varied]
+    again = tuned.samples(20, seed=4)
+    assert set(again) == set(drawn.files)
+    np.testing.assert_array_equal(again["parameters"], drawn["parameters"])
     assert drawn["parameters"].shape == (20, len(told["parameters"]))
     assert {name: list(drawn[name].shape) for name in told["fields"]} == told["fields"]
     mujoco = pytest.importorskip("mujoco")
@@ -271,6 +366,22 @@ def test_identify_design_and_apply(experiment: str, demo: str, tmp_path: Path) -
     result = gs.replay(experiment, demo, with_="coulomb_friction@arm", set={"coulomb_friction@arm.friction_n_m": 6e-4})
     changed = result.apply(tmp_path / "robot.xml")
     assert changed["changes"] and "frictionloss" in (tmp_path / "robot.xml").read_text()
+
+
+def test_a_result_is_drawn(experiment: str, demo: str, tmp_path: Path) -> None:
+    """Beside its logs, of files and of memory."""
+    small: dict[str, object] = {"size": "320x240", "at": 0.5}
+    result = gs.replay(experiment, [demo, short_log(demo, "monday")], out=tmp_path / "out")
+    still = result.video(tmp_path / "still.png", log="monday", options=small)
+    assert (still.path, still.frames, still.width, still.height) == (tmp_path / "still.png", 1, 320, 240)
+    assert "data:image/png" in still._repr_html_()
+    tuned = gs.tune(experiment, demo, freeze=FROZEN[1:], starts=1, budget_s=1)
+    moving = tuned.video(compare=["nominal", result], options={"size": "320x240", "from": 0.5, "to": 0.7, "fps": 10})
+    assert moving.path == tuned.out / "video.mp4" and moving.frames == 3
+    del tuned
+    assert moving.path.is_file()
+    with pytest.raises(gs.InputError, match="gone.csv"):
+        result.video(tmp_path / "none.png", log="gone.csv", options=small)
 
 
 def test_the_model_steps_in_the_users_mujoco(experiment: str, demo: str) -> None:

@@ -139,3 +139,37 @@ def test_two_rates_in_one_table(experiment: str, demo: str, tmp_path: Path) -> N
     whole = gs.replay(experiment, demo)
     assert kept.error == pytest.approx(whole.error, rel=2e-3)
     assert np.isnan(kept.traces[0]["arm_rad"].measured).sum() > len(data) / 2
+
+
+def test_units_are_kept_and_held_against_the_experiment(experiment: str, demo: str, tmp_path: Path) -> None:
+    data = pd.read_csv(demo)
+    degrees = data.assign(arm_rad=np.degrees(data.arm_rad))
+    log = gs.Log(degrees, units={"arm_rad": "deg", "time_s": "s"}, name="run")
+    assert log.units == {"arm_rad": "deg", "time_s": "s"} == gs.Log(log.save(tmp_path / "run.npz")).units
+    (found,) = gs.inspect(log)
+    assert found.log == "run" and {c.name: c.unit for c in found.channels}["arm_rad"] == "deg"
+    keys = {
+        "model": str(Path(experiment).with_name("qube.xml")),
+        "commands": [{"actuator": "motor", "column": "voltage_v", "unit": "V"}],
+        "measured": [{"signal": "arm", "column": "arm_rad", "joint": "arm", "unit": "deg"}],
+    }
+    assert gs.replay(keys, log).error > 1
+    for taken in (experiment, {**keys, "measured": [{"signal": "arm", "column": "arm_rad", "joint": "arm"}]}):
+        with pytest.raises(gs.InputError, match="another unit") as raised:
+            gs.replay(taken, log)
+        assert raised.value.actual == "'deg'" and "unit: deg" in raised.value.cure
+    scaled = [{"signal": "arm", "column": "arm_rad", "joint": "arm", "scale": 0.01745}]
+    assert gs.replay({**keys, "measured": scaled}, log).error > 1
+    array = gs.Log({"t": [0, 1], "q": np.zeros((2, 2))}, units={"q": "rad/s", "t": "ms"})
+    assert array.units == {"q[0]": "rad/s", "q[1]": "rad/s", "t": "ms"}
+
+
+def test_units_of_nothing_are_refused(demo: str) -> None:
+    with pytest.raises(gs.InputError, match="'speed'"):
+        gs.Log(frame(), units={"speed": "rpm"})
+    with pytest.raises(gs.InputError, match="unit of time"):
+        gs.Log(frame(), units={"t": "min"})
+    with pytest.raises(gs.InputError, match="two units of time"):
+        gs.Log(frame(), units={"t": "ms"}, time_unit="s")
+    with pytest.raises(gs.InputError, match="a file says itself"):
+        gs.Log(demo, units={"arm_rad": "deg"})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from gapscope._errors import InputError
+from gapscope._errors import InputError, import_needed
 
 Floats = npt.NDArray[np.float64]
 
@@ -95,14 +94,8 @@ class Format:
 
 def library(module: str, what: str, extra: str) -> Any:
     """A reader's library, when it is needed first."""
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise InputError(
-            f"the library that reads {what} is not installed",
-            where=module,
-            cure=f"pip install 'gapscope[{extra}]'" if extra else f"pip install {module}",
-        ) from None
+    install = f"'gapscope[{extra}]'" if extra else module
+    return import_needed(module, f"the library that reads {what} is not installed", install)
 
 
 def claims(path: Path, what: str, shape: Sequence[int]) -> None:

@@ -154,6 +154,7 @@ Command ReplayCommand() {
           .what = "Replay logged commands in simulation: predicted against measured, scores",
           .options = Join({LogOptions(flags->model),
                            own,
+                           {FromOption(flags->model.from)},
                            EffectOptions(flags->model),
                            {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
                            ProfileOptions(flags->common),

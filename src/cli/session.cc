@@ -7,11 +7,13 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
+#include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/model/run_model.h"
 #include "src/report/read_run.h"
@@ -102,6 +104,15 @@ std::vector<Option> EffectOptions(ModelFlags& flags) {
                  "Without a place it goes where it can act, if there is one such place; its parameters are then known "
                  "to --set as EFFECT@PLACE.NAME"}},
        ValueOptions(flags.set, flags.params)});
+}
+
+Option FromOption(std::string& from) {
+  return {.flag = "--from",
+          .value = &from,
+          .help = "Start from the model of an earlier result: --out of diagnose, tune or replay",
+          .more =
+              "Its effects are added and its values taken over; --with adds to them, --params and --set are written "
+              "over them"};
 }
 
 Option WindowOption(double& window_s) {
@@ -217,7 +228,25 @@ Status OverrideValues(const Model& model, const std::vector<std::string>& params
 
 int WorkersOf(const CommonFlags& flags) { return flags.jobs > 0 ? flags.jobs : DefaultWorkers(); }
 
-Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) {
+namespace {
+
+// With the effects and values of the earlier result that --from names before those that are given.
+Result<ModelFlags> TakeOver(ModelFlags flags) {
+  if (flags.from.empty()) return flags;
+  GS_ASSIGN(const auto json, ReadJson(flags.from));
+  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.from));
+  std::vector<std::string> with = Collect(held.effects, &EffectUse::Text);
+  std::ranges::copy_if(flags.with, std::back_inserter(with),
+                       [&](const std::string& given) { return std::ranges::find(with, given) == with.end(); });
+  flags.with = std::move(with);
+  flags.params.insert(flags.params.begin(), flags.from);
+  return flags;
+}
+
+}  // namespace
+
+Result<Session> LoadSession(const ModelFlags& given, const CommonFlags& common) {
+  GS_ASSIGN(const ModelFlags flags, TakeOver(given));
   Session session;
   session.pool = std::make_unique<ThreadPool>(WorkersOf(common));
   GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));

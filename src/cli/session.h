@@ -41,9 +41,10 @@ Option FolderOption(CommonFlags& flags, const std::string& holds);
 struct ModelFlags {
   std::string experiment;
   std::vector<std::string> logs;
+  std::string from;                 // an earlier result, whose effects and values --with and --params go over
   std::vector<std::string> with;    // EFFECT[@ON]
   std::vector<std::string> set;     // NAME=VALUE
-  std::vector<std::string> params;  // YAML files of values
+  std::vector<std::string> params;  // files of values, results
   std::string while_column;         // over the experiment's own
 };
 // EXPERIMENT alone; EXPERIMENT LOG... and --while; --with, --set and --params.
@@ -51,6 +52,7 @@ Option ExperimentOption(std::string& path);
 std::vector<Option> LogOptions(ModelFlags& flags);
 std::vector<Option> EffectOptions(ModelFlags& flags);
 Option WhileOption(std::string& column);
+Option FromOption(std::string& from);
 // --set and --params alone, for commands on a model without logs.
 std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std::string>& params);
 // --window over the experiment's own; 0: not given.

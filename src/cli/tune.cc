@@ -264,6 +264,7 @@ Command TuneCommand() {
           .options = Join({LogOptions(flags->model),
                            FreedomOptions(*flags),
                            SolveOptionsOf(*flags),
+                           {FromOption(flags->model.from)},
                            EffectOptions(flags->model),
                            {FolderOption(flags->common, "result.json, report.html, traces and model.xml")},
                            ProfileOptions(flags->common),

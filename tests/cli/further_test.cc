@@ -68,6 +68,11 @@ TEST_F(CliTest, ParametersAreTakenOverFromAResult) {
   EXPECT_EQ(error(with + "--params '" + out + "'"), set);
   EXPECT_EQ(error(with + "--params '" + out + "/result.json'"), set);
   EXPECT_NE(error(with), set);
+  // With its effects too.
+  EXPECT_EQ(error("--from '" + out + "'"), set);
+  EXPECT_EQ(error("--from '" + out + "/result.json' " + with), set);
+  EXPECT_NE(error("--from '" + out + "' --set motor.kp=50"), set);
+  ExpectRefused(replay + "--from '" + scratch_.Path("nowhere") + "'", {"nowhere"});
   ExpectRefused(replay + "--params '" + out + "'", {"lacks", "--with coulomb_friction@joint"});
   std::filesystem::create_directories(scratch_.Path("empty"));
   ExpectRefused(replay + "--params '" + scratch_.Path("empty") + "'", {"empty/result.json"});

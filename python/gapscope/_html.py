@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,13 @@ _WIDTH, _HEIGHT = 240, 36
 _MEASURED, _PREDICTED = "#444", "#d62"
 
 
+# Control characters, and those that turn the direction of writing (Unicode Standard Annex 9).
+_HIDDEN = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+
 def _text(value: object) -> str:
-    return html.escape(str(value))
+    """As HTML, with what could hide something made visible."""
+    return html.escape(_HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", str(value)))
 
 
 def _number(value: float, digits: int = 4) -> str:

@@ -3,10 +3,12 @@
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
 #include "src/report/apply_report.h"
+#include "src/report/json.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -34,7 +36,7 @@ Result<int> RunApply(const ApplyFlags& flags) {
   for (const auto& use : result.model->effects()) {
     if (EffectOf(use, *result.model->rig()).place == EffectPlace::kSignal) run.of_signals.push_back(use);
   }
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return kDone;
 }
 

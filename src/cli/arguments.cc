@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <list>
 
+#include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/core/names.h"
@@ -70,15 +71,14 @@ int Say(const CLI::App& program, const CLI::ParseError& error, int argc, char** 
   if (error.get_exit_code() == 0) return program.exit(error), kDone;  // --help, --version
   if (AsksForJsonProgress(argc, argv)) {
     const Error refused{.what = error.what(), .where = "the command line", .cure = "run it with --help"};
-    fmt::print(stderr, "{}", ErrorLine(refused));
+    Print(stderr, "{}", ErrorLine(refused));
     return kBadInput;
   }
   std::vector<std::string> names;
   for (const CLI::App* command : program.get_subcommands({})) names.push_back(command->get_name());
   if (argc > 1 && argv[1][0] != '-' && std::find(names.begin(), names.end(), argv[1]) == names.end()) {
     const std::string nearest = Nearest(argv[1], names);
-    fmt::print(stderr, "gapscope: no command '{}'{}\n", argv[1],
-               nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
+    Print(stderr, "gapscope: no command '{}'{}\n", argv[1], nearest.empty() ? "" : "; did you mean '" + nearest + "'?");
   }
   program.exit(error);
   return kBadInput;

@@ -12,6 +12,7 @@
 #include "src/log/log_files.h"
 #include "src/log/zip_writer.h"
 #include "src/model/mjcf_files.h"
+#include "src/report/json.h"
 #include "src/report/version.h"
 
 namespace gapscope::cli {
@@ -182,7 +183,7 @@ Status Bundle::Write(const std::string& zip, const std::vector<std::string>& wor
   add("README.txt", kReadMe);
   add("SHA256SUMS", sums);
   add("bundle.json", Facts(command).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
-  add("result.json", result.dump(2) + "\n");
+  add("result.json", JsonText(result));
   return WriteFile(zip, archive.Finish());
 }
 

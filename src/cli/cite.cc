@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/report/version.h"
 
@@ -19,10 +20,10 @@ struct CiteFlags {
 
 int RunCite(const CiteFlags& flags) {
   if (flags.bibtex) {
-    fmt::print("@software{{gapscope,\n  author = {{{{{}}}}},\n  title = {{{{{}}}}},\n  version = {{{}}}\n}}\n", kAuthor,
-               kTitle, GapscopeVersion());
+    Print(stdout, "@software{{gapscope,\n  author = {{{{{}}}}},\n  title = {{{{{}}}}},\n  version = {{{}}}\n}}\n",
+          kAuthor, kTitle, GapscopeVersion());
   } else {
-    fmt::print("{}. {} (version {}) [Computer software].\n", kAuthor, kTitle, GapscopeVersion());
+    Print(stdout, "{}. {} (version {}) [Computer software].\n", kAuthor, kTitle, GapscopeVersion());
   }
   return kDone;
 }

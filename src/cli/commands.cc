@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "src/cli/print.h"
 #include "src/model/plugin_library.h"
 
 namespace gapscope::cli {
@@ -23,7 +24,7 @@ Command WithPlugins(Command command) {
                                      "One that does not load is left out, and stderr says so"});
   command.run = [files, plugins = command.plugins, run = command.run]() -> Result<int> {
     GS_ASSIGN(const std::vector<std::string> left_out, LoadPluginLibraries(plugins ? *plugins : *files));
-    for (const std::string& text : left_out) fmt::print(stderr, "warning: {}\n", text);
+    for (const std::string& text : left_out) Print(stderr, "warning: {}\n", text);
     return run();
   };
   return command;

@@ -7,10 +7,12 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/joint_states.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/log/foreign.h"
 #include "src/log/log.h"
 #include "src/log/npz_writer.h"
+#include "src/report/json.h"
 
 namespace gapscope::cli {
 namespace {
@@ -69,9 +71,9 @@ using ConvertedJson = nlohmann::ordered_json;
 void TellWritten(const ConvertFlags& flags, const std::string& target, const Log& log, ConvertedJson* json) {
   json->at("logs").push_back(
       {{"log", log.path}, {"table", target}, {"rows", log.rows()}, {"columns", log.ColumnNames()}});
-  if (!flags.common.json) fmt::print("{}: {} rows of {} columns\n", target, log.rows(), log.columns.size());
+  if (!flags.common.json) Print(stdout, "{}: {} rows of {} columns\n", target, log.rows(), log.columns.size());
   if (flags.common.quiet) return;
-  for (const Finding& finding : log.findings) fmt::print(stderr, "{}: {}\n", log.path, finding.text);
+  for (const Finding& finding : log.findings) Print(stderr, "{}: {}\n", log.path, finding.text);
 }
 
 Status WriteTables(const ConvertFlags& flags, ConvertedJson* json) {
@@ -112,7 +114,7 @@ Result<int> RunConvert(const ConvertFlags& flags) {
   if (flags.common.out.empty()) return Error{.what = "no folder", .where = "--out", .cure = "--out FOLDER"};
   ConvertedJson json = {{"schema", "gapscope.convert/1"}, {"logs", ConvertedJson::array()}};
   GS_RETURN_IF_ERROR(flags.form == TableForm::kMcap ? WriteViews(flags, &json) : WriteTables(flags, &json));
-  if (flags.common.json) fmt::print("{}\n", json.dump(2));
+  if (flags.common.json) Print(stdout, "{}", JsonText(json));
   return kDone;
 }
 

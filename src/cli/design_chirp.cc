@@ -5,7 +5,9 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/design_rig.h"
+#include "src/cli/print.h"
 #include "src/report/design_report.h"
+#include "src/report/json.h"
 
 namespace gapscope::cli {
 namespace {
@@ -30,7 +32,7 @@ Result<int> RunChirp(ChirpFlags flags) {
     GS_RETURN_IF_ERROR(WriteInput(flags.out, csv, flags.common.quiet));
   }
   const ChirpRun run{.info = {}, .rows = rows};
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return kDone;
 }
 

@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/design/linear.h"
 #include "src/report/feedback_report.h"
+#include "src/report/json.h"
 
 namespace gapscope::cli {
 namespace {
@@ -82,7 +84,7 @@ Result<int> RunFeedback(const FeedbackFlags& flags) {
                         .gain = {feedback.gain.data(), feedback.gain.data() + n},  // one row
                         .open_poles = SortedPoles(system.a),
                         .closed_poles = feedback.poles};
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return kDone;
 }
 

@@ -4,7 +4,9 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/design_rig.h"
+#include "src/cli/print.h"
 #include "src/report/design_report.h"
+#include "src/report/json.h"
 
 namespace gapscope::cli {
 namespace {
@@ -66,7 +68,7 @@ Result<int> RunInput(const InputFlags& flags) {
                      .amplitude = amplitude,
                      .unit = rig.unit,
                      .rehearsal = std::move(rehearsal)};
-  fmt::print("{}", flags.rig.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.rig.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return kDone;
 }
 

@@ -4,7 +4,9 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/design_rig.h"
+#include "src/cli/print.h"
 #include "src/report/design_report.h"
+#include "src/report/json.h"
 
 namespace gapscope::cli {
 namespace {
@@ -113,7 +115,7 @@ Result<int> RunOptimal(const OptimalFlags& flags) {
       .design = design,
       .unit = rig.unit,
       .command = CommandFor(flags.rig.experiment, rig.rehearsal, design.inputs.front()) + " --out input.csv"};
-  fmt::print("{}", flags.rig.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.rig.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return kDone;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "src/cli/print.h"
 #include "src/core/file.h"
 
 namespace gapscope::cli {
@@ -77,7 +78,7 @@ Result<DesignRig> LoadRig(const RigFlags& flags) {
 Status WriteInput(const std::string& out, const std::string& csv, bool quiet) {
   if (out.empty()) return Ok();
   GS_RETURN_IF_ERROR(WriteFile(out, csv));
-  if (!quiet) fmt::print(stderr, "wrote {}\n", out);
+  if (!quiet) Print(stderr, "wrote {}\n", out);
   return Ok();
 }
 

@@ -6,9 +6,11 @@
 #include "src/cli/bundle.h"
 #include "src/cli/commands.h"
 #include "src/cli/diagnose_job.h"
+#include "src/cli/print.h"
 #include "src/cli/profile.h"
 #include "src/core/option_words.h"
 #include "src/diagnose/policy.h"
+#include "src/report/json.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -60,7 +62,7 @@ std::vector<std::string> ReplayWords(const CommandFlags& given, const Bundle& bu
 
 Status WriteBundle(const CommandFlags& flags, const Bundle& bundle, const DiagnoseRun& run) {
   if (!run.diagnosis.interrupted) return bundle.Write(flags.bundle, ReplayWords(flags, bundle), ToJson(run));
-  fmt::print(stderr, "warning: {} is not written: an interrupted run cannot be repeated\n", flags.bundle);
+  Print(stderr, "warning: {} is not written: an interrupted run cannot be repeated\n", flags.bundle);
   return Ok();
 }
 
@@ -70,13 +72,13 @@ int StatusOf(const CommandFlags& flags, const nlohmann::ordered_json& expected, 
   const nlohmann::ordered_json got = ToJson(run);
   const std::string differences = Differences(expected, got);
   if (differences.empty()) {
-    if (!flags.common.quiet) fmt::print(stderr, "gapscope: the same digits as {}\n", flags.expect);
+    if (!flags.common.quiet) Print(stderr, "gapscope: the same digits as {}\n", flags.expect);
     return kDone;
   }
-  fmt::print(stderr, "gapscope: other digits than {}\n{}", flags.expect, differences);
+  Print(stderr, "gapscope: other digits than {}\n{}", flags.expect, differences);
   const auto versions = expected.value("versions", nlohmann::ordered_json::object());
   if (versions != got["versions"])
-    fmt::print(stderr, "it was made by {}, this is {}\n", versions.dump(), got["versions"].dump());
+    Print(stderr, "it was made by {}, this is {}\n", versions.dump(), got["versions"].dump());
   return kBelowThreshold;
 }
 
@@ -89,7 +91,7 @@ Result<int> RunDiagnose(const CommandFlags& flags) {
   GS_ASSIGN(const std::optional<Bundle> bundle, BundleOf(flags));
   GS_ASSIGN(const DiagnoseRun run, DiagnoseLogs(flags, &clock));
   if (bundle) GS_RETURN_IF_ERROR(WriteBundle(flags, *bundle, run));
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return StatusOf(flags, expected, run);
 }
 

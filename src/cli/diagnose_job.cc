@@ -9,6 +9,7 @@
 #include <set>
 
 #include "src/cli/html.h"
+#include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -166,7 +167,7 @@ Result<DiagnoseOptions> OptionsOf(const DiagnoseFlags& flags, const Experiment& 
     options.priors.insert_or_assign(assignment.first, assignment.second);
   }
   if (!flags.common.out.empty()) options.journal = DiagnosisJournal::FolderIn(flags.common.out);
-  options.warn = [](const std::string& text) { fmt::print(stderr, "warning: {}\n", text); };
+  options.warn = [](const std::string& text) { Print(stderr, "warning: {}\n", text); };
   return options;
 }
 

@@ -18,6 +18,7 @@
 
 #include "replay/gl_context.h"
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/core/apart.h"
 #include "src/core/child.h"
@@ -260,8 +261,8 @@ struct DoctorFlags {
 
 void PrintHealth(const DoctorCheck& check, const Health& health) {
   const char* state = health.good ? "good" : check.needed ? "MISSING" : "missing";
-  fmt::print("{:<11}{:<9}{}\n", check.name, state, health.found);
-  if (!health.good) fmt::print("{:20}needed by: {}\n{:20}cure: {}\n", "", check.serves, "", health.cure);
+  Print(stdout, "{:<11}{:<9}{}\n", check.name, state, health.found);
+  if (!health.good) Print(stdout, "{:20}needed by: {}\n{:20}cure: {}\n", "", check.serves, "", health.cure);
 }
 
 Result<int> RunDoctor(const DoctorFlags& flags) {
@@ -283,11 +284,11 @@ Result<int> RunDoctor(const DoctorFlags& flags) {
     const nlohmann::ordered_json json = {
         {"schema", "gapscope.doctor/1"}, {"good", lacking.empty()}, {"checks", checks}, {"versions", JsonVersions()}};
     // Paths may hold any bytes.
-    fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    Print(stdout, "{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else if (lacking.empty()) {
-    fmt::print("\nAll that replay, tune and diagnose need is there.\n");
+    Print(stdout, "\nAll that replay, tune and diagnose need is there.\n");
   } else {
-    fmt::print("\nReplay, tune and diagnose lack: {}.\n", gapscope::Join(lacking));
+    Print(stdout, "\nReplay, tune and diagnose lack: {}.\n", gapscope::Join(lacking));
   }
   return lacking.empty() ? kDone : kBelowThreshold;
 }

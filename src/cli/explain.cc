@@ -4,9 +4,11 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
+#include "src/cli/print.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/report/explain_report.h"
+#include "src/report/json.h"
 #include "src/report/read_diagnosis.h"
 #include "src/report/read_run.h"
 #include "src/report/write_run.h"
@@ -58,7 +60,7 @@ Result<int> RunExplain(const ExplainFlags& flags) {
     }
     GS_RETURN_IF_ERROR(WriteExplanation(flags, earlier, run));
   }
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToText(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToText(run));
   return kDone;
 }
 

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/cli/uncertain.h"
@@ -13,6 +14,7 @@
 #include "src/export/target.h"
 #include "src/log/npz_archive.h"
 #include "src/report/export_report.h"
+#include "src/report/json.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -58,7 +60,7 @@ Status WriteRandomization(const ExportFlags& flags, const ExportRun& run) {
   archive.Add("parameters", {run.draws, run.randomization.ranges.size()}, run.randomization.drawn);
   for (const DrawnField& field : run.randomization.fields) archive.Add(field.name, field.shape, field.values);
   GS_RETURN_IF_ERROR(WriteFile(flags.Path("randomization.npz"), archive.Finish()));
-  return WriteFile(flags.Path("randomization.json"), RandomizationJson(run).dump(2) + "\n");
+  return WriteFile(flags.Path("randomization.json"), JsonText(RandomizationJson(run)));
 }
 
 // What is written beside fidelity.json: all of it is made before any of it is written.
@@ -134,9 +136,9 @@ Result<int> RunExport(const ExportFlags& flags) {
                                 &run));
   ThreadPool pool(WorkersOf(flags.common));
   GS_RETURN_IF_ERROR(Measure(model, loaded.values, &run, pool));
-  const std::string text = ToJson(run).dump(2) + "\n";
+  const std::string text = JsonText(ToJson(run));
   GS_RETURN_IF_ERROR(WriteFile(flags.Path("fidelity.json"), text));
-  fmt::print("{}", flags.common.json ? text : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? text : ToTable(run));
   return kDone;
 }
 

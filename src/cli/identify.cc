@@ -4,9 +4,11 @@
 #include <numbers>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/core/collect.h"
 #include "src/report/identify_report.h"
+#include "src/report/json.h"
 #include "src/report/write_run.h"
 
 namespace gapscope::cli {
@@ -55,7 +57,7 @@ Result<int> RunIdentify(IdentifyFlags flags) {
   for (const auto& recording : session.recordings) run.logs.push_back(recording.log_path);
   const nlohmann::ordered_json json = ToJson(run);
   if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteIdentification(flags.common.out, run.result, json));
-  fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(json) : ToTable(run));
   return kDone;
 }
 

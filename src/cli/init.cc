@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/core/file.h"
 #include "src/draft/draft.h"
@@ -133,12 +134,11 @@ Result<int> RunInit(const InitFlags& flags) {
     GS_RETURN_IF_ERROR(WriteFile(flags.out, yaml));
   }
   if (flags.quiet) return kDone;
-  for (const auto& doubt : draft.unsure) fmt::print(stderr, "unsure: {}\n", doubt);
-  fmt::print(stderr, "{} of {} joints measured, {} actuators commanded\n", draft.measured, draft.joints,
-             draft.commanded);
+  for (const auto& doubt : draft.unsure) Print(stderr, "unsure: {}\n", doubt);
+  Print(stderr, "{} of {} joints measured, {} actuators commanded\n", draft.measured, draft.joints, draft.commanded);
   if (!flags.out.empty())
-    fmt::print(stderr, "wrote {}; {} thing{} to check. Next: gapscope replay {} {}\n", flags.out, draft.unsure.size(),
-               draft.unsure.size() == 1 ? "" : "s", flags.out, flags.logs.front());
+    Print(stderr, "wrote {}; {} thing{} to check. Next: gapscope replay {} {}\n", flags.out, draft.unsure.size(),
+          draft.unsure.size() == 1 ? "" : "s", flags.out, flags.logs.front());
   return kDone;
 }
 

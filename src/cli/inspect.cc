@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/report/inspect_report.h"
+#include "src/report/json.h"
 #include "src/report/write_run.h"
 
 namespace gapscope::cli {
@@ -110,7 +112,7 @@ Result<int> RunInspect(const InspectFlags& flags) {
   GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags) : InspectUnbound(all));
   const nlohmann::ordered_json json = ToJson(run);
   if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteRun(flags.common.out, json));
-  fmt::print("{}", flags.common.json ? json.dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(json) : ToTable(run));
   return kDone;
 }
 

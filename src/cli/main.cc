@@ -7,6 +7,7 @@
 
 #include "src/cli/arguments.h"
 #include "src/cli/html.h"
+#include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
 
@@ -14,7 +15,7 @@ namespace gapscope::cli {
 namespace {
 
 int Refuse(const Error& error, bool json) {
-  fmt::print(stderr, "{}", json ? ErrorLine(error) : "gapscope: " + error.Text() + "\n");
+  Print(stderr, "{}", json ? ErrorLine(error) : "gapscope: " + error.Text() + "\n");
   return kBadInput;
 }
 
@@ -40,7 +41,8 @@ int main(int argc, char** argv) {
   try {
     return gapscope::cli::Main(argc, argv);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "gapscope: internal error: {}\nPlease report this with the command and the files.\n", e.what());
+    gapscope::cli::Print(stderr, "gapscope: internal error: {}\nPlease report this with the command and the files.\n",
+                         e.what());
     return gapscope::cli::kBug;
   }
 }

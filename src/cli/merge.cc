@@ -9,6 +9,7 @@
 #include "src/cli/commands.h"
 #include "src/cli/fleet_file.h"
 #include "src/cli/plan_file.h"
+#include "src/cli/print.h"
 #include "src/core/file.h"
 #include "src/report/fleet_report.h"
 #include "src/report/json.h"
@@ -278,9 +279,9 @@ Result<int> RunMerge(const PlanFolderFlags& flags) {
   const Totals& totals = merger.totals();
   if (flags.common.json) {
     GS_ASSIGN(const std::string json, ReadFile((folder / "merged.json").string()));
-    fmt::print("{}", json);
+    Print(stdout, "{}", json);
   } else {
-    fmt::print("{}", ToTable(merger.plan(), totals));
+    Print(stdout, "{}", ToTable(merger.plan(), totals));
   }
   return totals.failed.empty() && totals.missing.empty() ? kDone : kBelowThreshold;
 }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/core/change_point.h"
@@ -187,11 +188,10 @@ std::string ToTable(const MonitorRun& run) {
 
 Result<int> RunMonitor(const MonitorFlags& flags) {
   GS_ASSIGN(const MonitorRun run, Monitor(flags));
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run));
   if (flags.fail_above > 0 && !(run.Ratio() <= flags.fail_above)) {
     if (!flags.common.quiet)
-      fmt::print(stderr, "gapscope: {:.3g} times the error is above --fail-above {:.4g}\n", run.Ratio(),
-                 flags.fail_above);
+      Print(stderr, "gapscope: {:.3g} times the error is above --fail-above {:.4g}\n", run.Ratio(), flags.fail_above);
     return kBelowThreshold;
   }
   return flags.fail_on_change && run.Changed() ? kBelowThreshold : kDone;

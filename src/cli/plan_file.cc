@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 
+#include "src/cli/print.h"
 #include "src/core/file.h"
+#include "src/report/json.h"
 #include "src/report/read_json.h"
 #include "src/report/read_run.h"
 #include "src/report/version.h"
@@ -118,7 +120,7 @@ Status WritePlan(Plan plan, const CommonFlags& flags, bool keep_going) {
     unit.id = session.ok() ? UnitId(plan, session.value()) : FailedId(plan, unit);
     if (session.ok()) continue;
     ++unreadable;
-    fmt::print(stderr, "warning: {}\n", session.error().Text());
+    Print(stderr, "warning: {}\n", session.error().Text());
   }
   if (unreadable == plan.units.size())
     return Error{.what = "no unit of the plan can be read", .where = flags.out, .cure = "the warnings say why"};
@@ -127,16 +129,16 @@ Status WritePlan(Plan plan, const CommonFlags& flags, bool keep_going) {
   std::filesystem::create_directories(out / "results", failure);
   if (failure)
     return Error{.what = "cannot make the folder", .where = (out / "results").string(), .actual = failure.message()};
-  const std::string json = ToJson(plan).dump(2) + "\n";
+  const std::string json = JsonText(ToJson(plan));
   GS_RETURN_IF_ERROR(WriteFile(out / "plan.json", json));
   if (flags.json) {
-    fmt::print("{}", json);
+    Print(stdout, "{}", json);
     return Ok();
   }
   const std::string fleet = plan.columns.empty() ? "" : "fleet ";
-  fmt::print("{} {} in {} shards: gapscope {}run --shard i/{} {} for i = 1..{}, then gapscope {}merge {}\n",
-             plan.units.size(), fleet.empty() ? "logs" : "units", plan.shards, fleet, plan.shards, out.string(),
-             plan.shards, fleet, out.string());
+  Print(stdout, "{} {} in {} shards: gapscope {}run --shard i/{} {} for i = 1..{}, then gapscope {}merge {}\n",
+        plan.units.size(), fleet.empty() ? "logs" : "units", plan.shards, fleet, plan.shards, out.string(), plan.shards,
+        fleet, out.string());
   return Ok();
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "src/cli/print.h"
+
 namespace gapscope::cli {
 namespace {
 
@@ -64,7 +66,7 @@ void StageClock::EndPart() {
   const double wall_s = SecondsSince(part_begin_);
   row.wall_s += wall_s;
   if (steps_now_ > steps_before_) row.steps += steps_now_ - steps_before_;
-  if (verbose_) fmt::print(stderr, "{}, {}: {:.3f} s\n", stage_, part_, wall_s);
+  if (verbose_) Print(stderr, "{}, {}: {:.3f} s\n", stage_, part_, wall_s);
   part_.clear();
 }
 
@@ -72,7 +74,7 @@ void StageClock::EndStage() {
   EndPart();
   const double wall_s = SecondsSince(stage_begin_);
   rows_[RowOf(stage_, "")].wall_s += wall_s;
-  if (verbose_) fmt::print(stderr, "{}: {:.3f} s\n", stage_, wall_s);
+  if (verbose_) Print(stderr, "{}: {:.3f} s\n", stage_, wall_s);
 }
 
 void StageClock::Enter(const std::string& stage) {
@@ -115,7 +117,7 @@ void StageClock::PrintTable() const {
   if (replays_ > 0) text += fmt::format("; {} replays", replays_);
   if (steps_ > 0)
     text += fmt::format("; {} steps, {:.2f} million a second", steps_, 1e-6 * static_cast<double>(steps_) / all_s);
-  fmt::print(stderr, "{}\n", text);
+  Print(stderr, "{}\n", text);
 }
 
 }  // namespace gapscope::cli

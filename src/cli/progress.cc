@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "src/core/visible.h"
 #include "src/report/json.h"
 
 namespace gapscope {
@@ -57,7 +58,7 @@ double ProgressLine::elapsed_s() const {
 
 void ProgressLine::Show(const ProgressPoint& point, const std::string& text) {
   if (clock_) clock_->EnterPart(point.stage, point.steps);
-  if (people_) fmt::print(stderr, "\r\033[K{}", text);
+  if (people_) fmt::print(stderr, "\r\033[K{}", MadeVisible(text));
   const auto now = std::chrono::steady_clock::now();
   const bool soon = point.stage == stage_ && point.done != point.total && now - last_ < std::chrono::milliseconds(50);
   if (!json_ || soon) return;

@@ -7,10 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include "src/cli/commands.h"
+#include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/report/html_report.h"
+#include "src/report/json.h"
 #include "src/report/render_report.h"
 #include "src/video/video.h"
 
@@ -140,8 +142,8 @@ Result<int> RunRender(RenderFlags flags) {
     GS_ASSIGN(const bool shown, AttachVideo(report, out.filename().string()));
     if (shown) run.shown_in = report;
   }
-  if (!flags.common.quiet && !summary.note.empty()) fmt::print(stderr, "gapscope: {}\n", summary.note);
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run));
+  if (!flags.common.quiet && !summary.note.empty()) Print(stderr, "gapscope: {}\n", summary.note);
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run));
   return kDone;
 }
 

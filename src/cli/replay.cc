@@ -5,8 +5,10 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
+#include "src/cli/print.h"
 #include "src/cli/profile.h"
 #include "src/cli/session.h"
+#include "src/report/json.h"
 #include "src/report/replay_report.h"
 #include "src/report/write_run.h"
 #include "src/tune/tune.h"
@@ -113,11 +115,11 @@ Result<int> RunReplay(const ReplayFlags& flags) {
     if (controller) sent = SentTables(run.result.logs, replayed.sent, session.recordings, *controller);
     GS_RETURN_IF_ERROR(WriteReplay(flags.common.out, session, run, std::move(sent), std::move(nominal)));
   }
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run, ConsoleOf(1)));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run, ConsoleOf(1)));
   const double error = run.comparison.error;
   if (flags.fail_above > 0 && !(error <= flags.fail_above)) {
     if (!flags.common.quiet)
-      fmt::print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", error, flags.fail_above);
+      Print(stderr, "gapscope: error {:.4g} is above --fail-above {:.4g}\n", error, flags.fail_above);
     return kBelowThreshold;
   }
   return kDone;

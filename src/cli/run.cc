@@ -6,7 +6,9 @@
 #include "src/cli/commands.h"
 #include "src/cli/diagnose_job.h"
 #include "src/cli/plan_file.h"
+#include "src/cli/print.h"
 #include "src/core/file.h"
+#include "src/report/json.h"
 #include "src/report/read_run.h"
 #include "src/report/tune_report.h"
 
@@ -114,13 +116,13 @@ Result<int> RunUnits(const PlanFolderFlags& flags) {
     } else {
       file["error"] = result.error().Text();
     }
-    GS_RETURN_IF_ERROR(WriteFile(path, file.dump(2) + "\n"));
+    GS_RETURN_IF_ERROR(WriteFile(path, JsonText(file)));
     failures += !result.ok();
     ++done;
-    if (!flags.common.quiet) fmt::print(stderr, "{}: {}\n", unit->logs.front(), result.ok() ? "done" : "failed");
+    if (!flags.common.quiet) Print(stderr, "{}: {}\n", unit->logs.front(), result.ok() ? "done" : "failed");
   }
-  fmt::print(stderr, "{} {}: {} done ({} failed), {} were there\n", flags.unit.empty() ? "shard" : "unit",
-             flags.unit.empty() ? flags.shard : flags.unit, done, failures, there);
+  Print(stderr, "{} {}: {} done ({} failed), {} were there\n", flags.unit.empty() ? "shard" : "unit",
+        flags.unit.empty() ? flags.shard : flags.unit, done, failures, there);
   return failures > 0 ? kBelowThreshold : kDone;
 }
 

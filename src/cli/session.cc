@@ -13,6 +13,7 @@
 #include <optional>
 #include <set>
 
+#include "src/cli/print.h"
 #include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/model/run_model.h"
@@ -291,13 +292,13 @@ Result<HeldOutLogs> CombineHeldOut(const std::vector<std::string>& logs, const s
 }
 
 void PrintLeftOut(const Rig& rig) {
-  for (const LeftOutCandidate& candidate : rig.left_out()) fmt::print(stderr, "warning: {}\n", candidate.Text());
+  for (const LeftOutCandidate& candidate : rig.left_out()) Print(stderr, "warning: {}\n", candidate.Text());
 }
 
 void PrintFindings(const std::vector<Recording>& recordings, bool quiet) {
   if (quiet) return;
   for (const auto& recording : recordings) {
-    for (const auto& finding : recording.findings) fmt::print(stderr, "{}: {}\n", recording.log_path, finding.text);
+    for (const auto& finding : recording.findings) Print(stderr, "{}: {}\n", recording.log_path, finding.text);
   }
 }
 

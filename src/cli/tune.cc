@@ -7,8 +7,10 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/html.h"
+#include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
+#include "src/report/json.h"
 #include "src/report/tune_report.h"
 #include "src/report/write_run.h"
 
@@ -142,7 +144,7 @@ std::vector<TuneRun::LogFit> FitAlone(const Session& session, const DataSplit& d
   TuneOptions silent = options;
   silent.solve.progress = {};
   const LogFits fits = FitEachLog(*session.model, data.train, joint, silent, *session.pool);
-  for (const auto& warning : fits.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const auto& warning : fits.warnings) Print(stderr, "warning: {}\n", warning);
   return PerLogOf(fits, *session.model);
 }
 
@@ -173,12 +175,12 @@ Result<int> RunTune(const TuneFlags& flags) {
   if (!tuned.ok()) return tuned.error();
   clock.Enter("write");
   clock.Count(tuned.value().replays, 0);
-  for (const auto& warning : tuned.value().warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const auto& warning : tuned.value().warnings) Print(stderr, "warning: {}\n", warning);
   TuneRun run = TuneRunOf(tuned.value(), *session.model, flags.common.seed);
   if (flags.each_log) run.per_log = FitAlone(session, data, tuned.value(), options);
   if (!flags.common.out.empty())
     GS_RETURN_IF_ERROR(WriteTune(flags.common.out, session, data, options, tuned.value(), run));
-  fmt::print("{}", flags.common.json ? ToJson(run).dump(2) + "\n" : ToTable(run, ConsoleOf(1)));
+  Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run, ConsoleOf(1)));
   return kDone;
 }
 

@@ -8,6 +8,7 @@
 
 #include "src/core/collect.h"
 #include "src/report/html_assets.h"
+#include "src/report/json.h"
 #include "src/report/version.h"
 
 namespace gapscope {
@@ -15,10 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// As JSON; a name of a file may be no UTF-8.
-std::string Quoted(const std::string& text) {
-  return ordered_json(text).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
+std::string Quoted(const std::string& text) { return ScriptText(ordered_json(text)); }
 
 std::string Number(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "null"; }
 
@@ -127,12 +125,10 @@ std::string FleetPage::Html(const std::vector<std::string>& times) const {
   for (const Robot* robot : order) data += robot->json + (robot == order.back() ? "\n" : ",\n");
   data += "]}";
   // In a script element nothing of a name may look like its end.
-  std::string safe;
-  for (const char c : data) c == '<' ? safe += "\\u003c" : safe += c;
   std::string page = assets::kFleetPage;
   Put("/*style*/", std::string(assets::kStyle) + assets::kFleetStyle, &page);
   Put("/*script*/", assets::kFleetScript, &page);
-  Put("/*data*/", safe, &page);
+  Put("/*data*/", data, &page);
   return page;
 }
 

@@ -373,14 +373,6 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   return data;
 }
 
-// "</script>" must not end the data early, whatever a file is called.
-std::string ForScript(const ordered_json& json) {
-  std::string text = json.dump(-1, ' ', false, ordered_json::error_handler_t::replace), safe;
-  safe.reserve(text.size());
-  for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
-  return safe;
-}
-
 std::string Filled(std::string page, const std::string& slot, const std::string& content) {
   const std::size_t at = page.find(slot);
   GS_CHECK(at != std::string::npos);
@@ -401,7 +393,7 @@ std::string ReportHtml(const ordered_json& result, const ReportSource& source, s
   page = Filled(page, "/*style*/", std::string(assets::kDygraphsStyle) + assets::kStyle);
   page = Filled(page, "/*dygraphs*/", assets::kDygraphs);
   page = Filled(page, "/*script*/", assets::kScript);
-  return Filled(page, "/*data*/", ForScript(Data(result, source, most_numbers)));
+  return Filled(page, "/*data*/", ScriptText(Data(result, source, most_numbers)));
 }
 
 Status WriteReportHtml(const std::string& folder, const ordered_json& result, const ReportSource& source) {

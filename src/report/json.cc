@@ -3,9 +3,26 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "src/core/visible.h"
+
 namespace gapscope {
 
 using nlohmann::ordered_json;
+
+std::string JsonText(const ordered_json& json) {
+  return MadeVisible(json.dump(2, ' ', false, ordered_json::error_handler_t::replace)) + "\n";
+}
+
+std::string ScriptText(const ordered_json& json) {
+  const std::string text = MadeVisible(json.dump(-1, ' ', false, ordered_json::error_handler_t::replace), "\\\\u");
+  std::string safe;
+  safe.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool control = text.compare(i, 4, "\\u00") == 0 && (i == 0 || text[i - 1] != '\\');
+    safe += control ? "\\\\" : text[i] == '<' ? "\\u003c" : std::string(1, text[i]);
+  }
+  return safe;
+}
 
 ordered_json JsonNumber(double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); }
 

@@ -27,7 +27,7 @@ std::vector<RunTable> TraceTables(const std::vector<LogReplay>& logs, const std:
 
 Status WriteRun(const std::string& folder, const nlohmann::ordered_json& result, const RunFiles& files) {
   const std::filesystem::path out = folder;
-  GS_RETURN_IF_ERROR(WriteFile(out / "result.json", result.dump(2) + "\n"));
+  GS_RETURN_IF_ERROR(WriteFile(out / "result.json", JsonText(result)));
   if (!files.model_xml.empty()) GS_RETURN_IF_ERROR(WriteFile(out / "model.xml", files.model_xml));
   for (const auto& table : files.tables)
     GS_RETURN_IF_ERROR(WriteFile(out / table.path, CsvText(table.columns, table.digits)));

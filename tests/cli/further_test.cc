@@ -78,6 +78,31 @@ TEST_F(CliTest, ParametersAreTakenOverFromAResult) {
   ExpectRefused(replay + "--params '" + scratch_.Path("empty") + "'", {"empty/result.json"});
 }
 
+// Whatever a file is called, nothing of its name acts on a terminal or a page, and no name ends the program.
+TEST_F(CliTest, NamesThatHideSomethingAreShown) {
+  const std::string log = JointLog(), out = scratch_.Path("out");
+  for (const std::string name : {"a\033[2J.csv", "a\u202Evsc.csv", "a\xff.csv"}) {
+    std::filesystem::copy_file(log, scratch_.Path(name));
+    const std::string replay = "replay " + Joint() + " '" + scratch_.Path(name) + "'";
+    const Answer table = Run(replay + " --out '" + out + "'"), json = Run(replay + " --json");
+    EXPECT_EQ(table.status, 0) << table.err;
+    EXPECT_EQ(json.status, 0) << json.err;
+    const std::string page = ReadAll(out + "/report.html");
+    for (const std::string& text : {table.out, json.out, page.substr(page.find("const data"))}) {
+      EXPECT_EQ(text.find('\033'), std::string::npos);
+      EXPECT_EQ(text.find("\u202E"), std::string::npos);
+    }
+    const std::string shown = name.find('\033') != std::string::npos ? "\\u001b" : "\\u202e";
+    if (name.find('\xff') == std::string::npos) {
+      EXPECT_NE(page.find("\\" + shown), std::string::npos) << "not as its escape";
+    }
+    EXPECT_TRUE(nlohmann::json::accept(json.out));
+    const Answer refused = Run("replay " + Joint() + " '" + scratch_.Path("no" + name) + "'");
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_EQ(refused.err.find('\033'), std::string::npos);
+  }
+}
+
 TEST_F(CliTest, InspectNeedsNoExperiment) {
   const std::string log = JointLog();
   const auto json = nlohmann::json::parse(Run("inspect '" + log + "' --json").out);

@@ -6,7 +6,8 @@ namespace gapscope {
 namespace {
 
 TEST(VisibleTest, PlainTextStays) {
-  for (const std::string text : {"", "arm_rad 0.5 N m", "größe 5 μm\n\tx", "▂▅█ – “quoted” 日本語 🤖"}) EXPECT_EQ(MadeVisible(text), text);
+  for (const std::string text : {"", "arm_rad 0.5 N m", "größe 5 μm\n\tx", "▂▅█ – “quoted” 日本語 🤖"})
+    EXPECT_EQ(MadeVisible(text), text);
 }
 
 TEST(VisibleTest, WhatHidesIsMadeVisible) {

@@ -15,29 +15,23 @@ from gapscope._errors import Bug, InputError, Interrupted, MissingLibrary
 from gapscope._experiment import Experiment
 from gapscope._log import Log, read, read_all
 from gapscope._many import diagnose_many
-from gapscope._plugins import load_plugins, plugin_library
-from gapscope._program import Progress
-from gapscope._results import (
+from gapscope._parts import (
     Channel,
-    Diagnosis,
     Exported,
     ExportedEffect,
     ExportError,
     FoundEffect,
-    Inspection,
     Interval,
     LogFit,
     LogResult,
-    Model,
     Parameter,
-    Replay,
-    Report,
     SignalScore,
     Statement,
-    Tune,
-    Video,
     Where,
 )
+from gapscope._plugins import load_plugins, plugin_library
+from gapscope._program import Progress
+from gapscope._results import Diagnosis, Inspection, Model, Replay, Report, Tune, Video
 from gapscope._traces import Trace, Traces
 
 __all__ = [

@@ -15,7 +15,8 @@ from gapscope._traces import judging
 
 if TYPE_CHECKING:
     from gapscope._log import Floats
-    from gapscope._results import Diagnosis, Inspection, Replay, Statement, Tune
+    from gapscope._parts import Statement
+    from gapscope._results import Diagnosis, Inspection, Replay, Tune
     from gapscope._traces import Traces
 
 _WIDTH, _HEIGHT = 240, 36

@@ -1,7 +1,4 @@
-"""Results as the program writes them (``--json``), as frozen dataclasses with the same names.
-
-Numbers that the program does not know (null) are NaN. What a newer program adds is in ``extra``.
-"""
+"""Results as the program writes them (``--json``), and what can be done with them; their parts are in `_parts`."""
 
 from __future__ import annotations
 
@@ -21,70 +18,25 @@ from gapscope import _html
 from gapscope._errors import Interrupted
 from gapscope._json import Open, from_json
 from gapscope._log import Floats
+from gapscope._parts import (
+    Channel,
+    Exported,
+    Finding,
+    Flat,
+    FoundEffect,
+    Gap,
+    LogFit,
+    LogResult,
+    NextExperiment,
+    Parameter,
+    Statement,
+    TuneError,
+    Where,
+    by_name,
+)
 from gapscope._plugins import load_plugins, users_mujoco
 from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope._traces import Traces
-
-
-@dataclass(frozen=True)
-class Interval(Open):
-    """A value and its 95 % interval, in the parameter's own unit."""
-
-    value: float = math.nan
-    low: float = math.nan
-    high: float = math.nan
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """(low, high), in the parameter's own unit."""
-        return self.low, self.high
-
-
-@dataclass(frozen=True)
-class SignalScore(Open):
-    """Measured against predicted, of one signal of one log.
-
-    ``rmse``, ``mae`` and ``max`` in the signal's SI unit; ``nrmse``: rmse over the signal's standard deviation;
-    ``lag_s`` > 0, s: measured is later than predicted; ``correlation``: -1 .. 1.
-    """
-
-    rmse: float = math.nan
-    mae: float = math.nan
-    nrmse: float = math.nan
-    max: float = math.nan
-    lag_s: float = math.nan
-    correlation: float = math.nan
-
-
-@dataclass(frozen=True)
-class Where(Open):
-    """A condition and its share of a signal's squared error; ``low`` and ``high``: 90 % interval of the share.
-
-    Shares are 0 .. 1.
-    """
-
-    signal: str = ""
-    condition: str = ""
-    share_of_error: float = math.nan
-    share_of_time: float = math.nan
-    low: float = math.nan
-    high: float = math.nan
-
-
-@dataclass(frozen=True)
-class LogResult(Open):
-    """One log of a replay or a tune.
-
-    ``error``: root mean square over its signals of the nrmse; ``samples``: rows that were compared; ``signals`` and
-    ``where`` by signal.
-    """
-
-    log: str
-    outcome: str = ""
-    error: float = math.nan
-    samples: int = 0
-    signals: Mapping[str, SignalScore] = field(default_factory=dict)
-    where: tuple[Where, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -224,44 +176,6 @@ class Run(Open):
 
 
 @dataclass(frozen=True)
-class ExportedEffect(Open):
-    """What became of an effect: ``form`` is "exact", "approximated", "host" or "dropped"."""
-
-    name: str
-    on: str
-    form: str
-    how: str = ""
-
-
-@dataclass(frozen=True)
-class ExportError(Open):
-    """Normalised errors on the logs that the result was judged by; ``lost``: share of what closed that opened again."""
-
-    nominal: float = math.nan
-    model: float = math.nan
-    exported: float = math.nan
-    lost: float = math.nan
-
-
-@dataclass(frozen=True)
-class Exported(Open):
-    """A model for another engine: ``model`` is the MJCF's path, ``files`` those that the engine has beside it.
-
-    ``time_step_s``, s: of the MJCF. ``delay_steps``: by drive, delays of the engine's configuration, in its own steps.
-    ``unmeasured``: why there are no errors.
-    """
-
-    target: str
-    model: str
-    time_step_s: float
-    effects: tuple[ExportedEffect, ...]
-    held_out_error: ExportError
-    files: tuple[str, ...] = ()
-    delay_steps: Mapping[str, float] = field(default_factory=dict)
-    unmeasured: str = ""
-
-
-@dataclass(frozen=True)
 class _WithModel(Run):
     def export(
         self,
@@ -343,54 +257,6 @@ class Replay(_WithTraces):
 
 
 @dataclass(frozen=True)
-class Parameter(Open):
-    """A fitted parameter in its own unit, with its 95 % interval. Not ``identifiable``: the logs do not say."""
-
-    name: str
-    unit: str
-    nominal: float
-    value: float
-    low: float
-    high: float
-    at_bound: bool
-    identifiable: bool
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """(low, high), in the parameter's own unit."""
-        return self.low, self.high
-
-
-@dataclass(frozen=True)
-class LogFit(Open):
-    """The parameters that all logs together know, fitted to one log alone; each in its own unit."""
-
-    log: str
-    termination: str
-    parameters: tuple[Parameter, ...]
-
-    def __getitem__(self, parameter: str) -> Parameter:
-        return _by_name(self.parameters, parameter)
-
-
-@dataclass(frozen=True)
-class TuneError(Open):
-    """Normalised errors: before, on what was fitted, on what was not."""
-
-    nominal: float
-    train: float
-    held_out: float
-
-
-@dataclass(frozen=True)
-class Flat(Open):
-    """A direction of parameters that the logs leave open."""
-
-    direction: Mapping[str, float]
-    text: str
-
-
-@dataclass(frozen=True)
 class Tune(_WithTraces):
     """Fitted parameters, scored on what was not fitted. ``termination``: "converged", "interrupted" ...
 
@@ -412,7 +278,7 @@ class Tune(_WithTraces):
     per_log: tuple[LogFit, ...] = ()
 
     def __getitem__(self, parameter: str) -> Parameter:
-        return _by_name(self.parameters, parameter)
+        return by_name(self.parameters, parameter)
 
     @property
     def traces(self) -> tuple[Traces, ...]:
@@ -432,60 +298,6 @@ class Tune(_WithTraces):
 
     def _repr_html_(self) -> str:
         return _html.tune(self)
-
-
-@dataclass(frozen=True)
-class FoundEffect(Open):
-    """An effect that the diagnosis accepted, with the sizes of its parameters and its share of the gap that closes.
-
-    ``parameters`` by name, in their own units; ``error_before`` and ``error_after`` normalised; ``share_of_gap`` and
-    ``probability``: 0 .. 1.
-    """
-
-    name: str
-    on: str
-    probability: float
-    parameters: Mapping[str, Interval]
-    error_before: float = math.nan
-    error_after: float = math.nan
-    share_of_gap: float = math.nan
-
-
-@dataclass(frozen=True)
-class Statement(Open):
-    """Of one effect at one place: ``answer`` is "present", "absent" (smaller than ``bound``) or "unseen".
-
-    ``parameters`` and ``bound`` by name, in their own units; ``probability`` and ``share_of_gap``: 0 .. 1.
-    ``caveat``: what the logs' clocks leave open of a delay or a lag.
-    """
-
-    name: str
-    on: str
-    answer: str
-    probability: float
-    parameters: Mapping[str, Interval] = field(default_factory=dict)
-    bound: Mapping[str, float] = field(default_factory=dict)
-    share_of_gap: Interval = Interval()
-    rule: str = ""
-    caveat: str = ""
-
-
-@dataclass(frozen=True)
-class Gap(Open):
-    """Held-out normalised errors, and which share of what can close did."""
-
-    nominal: float
-    refit: float
-    final: float
-    floor: float
-    closed: float
-
-
-@dataclass(frozen=True)
-class NextExperiment(Open):
-    """The command that writes the input which would settle most."""
-
-    command: str = ""
 
 
 @dataclass(frozen=True)
@@ -518,33 +330,6 @@ class Diagnosis(_WithModel):
 
 
 @dataclass(frozen=True)
-class Channel(Open):
-    """A command or measured signal as it stands in the log, in its own unit; shares are 0 .. 1."""
-
-    name: str
-    unit: str
-    role: str
-    minimum: float = math.nan
-    maximum: float = math.nan
-    mean: float = math.nan
-    deviation: float = math.nan
-    quantisation_step: float = math.nan
-    noise: float = math.nan
-    saturation_share: float = math.nan
-    missing_share: float = math.nan
-
-
-@dataclass(frozen=True)
-class Finding(Open):
-    """Something noticed or repaired while reading."""
-
-    kind: str = ""
-    column: str = ""
-    count: int = 0
-    text: str = ""
-
-
-@dataclass(frozen=True)
 class Inspection(Open):
     """Whether a log is ``fit`` for use, and what it cannot show (``verdict``).
 
@@ -561,10 +346,3 @@ class Inspection(Open):
 
     def _repr_html_(self) -> str:
         return _html.inspection(self)
-
-
-def _by_name(items: tuple[Parameter, ...], name: str) -> Parameter:
-    for item in items:
-        if item.name == name:
-            return item
-    raise KeyError(f"{name}; there are {', '.join(item.name for item in items)}")

@@ -182,7 +182,7 @@ Status Bundle::Write(const std::string& zip, const std::vector<std::string>& wor
   add("run.sh", Replaced(Replaced(kScript, "{FROM}", ShellQuoted(from)), "{COMMAND}", command));
   add("README.txt", kReadMe);
   add("SHA256SUMS", sums);
-  add("bundle.json", Facts(command).dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+  add("bundle.json", JsonText(Facts(command)));
   add("result.json", JsonText(result));
   return WriteFile(zip, archive.Finish());
 }

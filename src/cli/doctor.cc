@@ -283,8 +283,7 @@ Result<int> RunDoctor(const DoctorFlags& flags) {
   if (flags.common.json) {
     const nlohmann::ordered_json json = {
         {"schema", "gapscope.doctor/1"}, {"good", lacking.empty()}, {"checks", checks}, {"versions", JsonVersions()}};
-    // Paths may hold any bytes.
-    Print(stdout, "{}\n", json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    Print(stdout, "{}", JsonText(json));
   } else if (lacking.empty()) {
     Print(stdout, "\nAll that replay, tune and diagnose need is there.\n");
   } else {

@@ -43,8 +43,7 @@ Result<Experiment> ExperimentOf(const ResultSource& source, const RunModel& held
 }
 
 Result<ResultModel> LoadResultModel(std::shared_ptr<const Rig> rig, const std::string& path, const ScaleTable& scales) {
-  GS_ASSIGN(const auto json, ReadJson(path));
-  GS_ASSIGN(const RunModel named, ReadRunModel(json, path));
+  GS_ASSIGN(const RunModel named, LoadRunModel(path));
   return BuildRunModel(std::move(rig), named, path, scales);
 }
 

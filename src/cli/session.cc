@@ -8,8 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
@@ -187,42 +185,48 @@ Result<std::pair<std::string, double>> ParseAssignment(const std::string& text, 
 
 namespace {
 
-// Of a YAML file, or of a result: the values of its model. Its effects must be in this one.
-Result<std::map<std::string, double>> ValuesOf(const Model& model, const std::string& path) {
-  std::error_code failure;
-  const bool result = path.ends_with(".json") || std::filesystem::is_directory(path, failure);
-  if (!result) return LoadParameterValues(path);
-  GS_ASSIGN(const auto json, ReadJson(path));
-  GS_ASSIGN(const RunModel held, ReadRunModel(json, path));
+Status SetValue(const Model& model, const std::string& name, double value, const std::string& where,
+                std::vector<double>* values) {
+  GS_ASSIGN(const int index, model.Find(name, where));
+  (*values)[index] = value;
+  return Ok();
+}
+
+// The values of a result's model, whose effects must be in this one. Rig's sizes are this one's own.
+Status TakeValues(const Model& model, const RunModel& held, const std::string& where, std::vector<double>* values) {
   for (const EffectUse& use : held.effects) {
     if (std::ranges::find(model.effects(), use) == model.effects().end())
       return Error{.what = "the result has an effect that this model lacks",
-                   .where = "--params " + path,
+                   .where = "--params " + where,
                    .actual = use.Text(),
                    .cure = "add it: --with " + use.Text()};
   }
-  std::map<std::string, double> values;
   for (const auto& [name, value] : held.values) {
-    if (!IsScaleName(name)) values[name] = value;
+    if (!IsScaleName(name)) GS_RETURN_IF_ERROR(SetValue(model, name, value, where, values));
   }
-  return values;
+  return Ok();
+}
+
+// Of a YAML file, or of a result.
+Status TakeFile(const Model& model, const std::string& path, std::vector<double>* values) {
+  std::error_code failure;
+  if (path.ends_with(".json") || std::filesystem::is_directory(path, failure)) {
+    GS_ASSIGN(const RunModel held, LoadRunModel(path));
+    return TakeValues(model, held, path, values);
+  }
+  GS_ASSIGN(const auto numbers, LoadParameterValues(path));
+  for (const auto& [name, value] : numbers) GS_RETURN_IF_ERROR(SetValue(model, name, value, path, values));
+  return Ok();
 }
 
 }  // namespace
 
 Status OverrideValues(const Model& model, const std::vector<std::string>& params, const std::vector<std::string>& set,
                       std::vector<double>* values) {
-  for (const auto& file : params) {
-    GS_ASSIGN(const auto numbers, ValuesOf(model, file));
-    for (const auto& [name, value] : numbers) {
-      GS_ASSIGN(const int index, model.Find(name, file));
-      (*values)[index] = value;
-    }
-  }
+  for (const auto& file : params) GS_RETURN_IF_ERROR(TakeFile(model, file, values));
   for (const auto& text : set) {
     GS_ASSIGN(const auto assignment, ParseAssignment(text, "--set"));
-    GS_ASSIGN(const int index, model.Find(assignment.first, "--set " + text));
-    (*values)[index] = assignment.second;
+    GS_RETURN_IF_ERROR(SetValue(model, assignment.first, assignment.second, "--set " + text, values));
   }
   return Ok();
 }
@@ -231,23 +235,22 @@ int WorkersOf(const CommonFlags& flags) { return flags.jobs > 0 ? flags.jobs : D
 
 namespace {
 
-// With the effects and values of the earlier result that --from names before those that are given.
-Result<ModelFlags> TakeOver(ModelFlags flags) {
-  if (flags.from.empty()) return flags;
-  GS_ASSIGN(const auto json, ReadJson(flags.from));
-  GS_ASSIGN(const RunModel held, ReadRunModel(json, flags.from));
-  std::vector<std::string> with = Collect(held.effects, &EffectUse::Text);
-  std::ranges::copy_if(flags.with, std::back_inserter(with),
-                       [&](const std::string& given) { return std::ranges::find(with, given) == with.end(); });
-  flags.with = std::move(with);
-  flags.params.insert(flags.params.begin(), flags.from);
-  return flags;
+// The effects of an earlier result, then those that are given besides.
+std::vector<std::string> EffectsOf(const RunModel& earlier, const std::vector<std::string>& given) {
+  const std::vector<std::string> taken = Collect(earlier.effects, &EffectUse::Text);
+  std::vector<std::string> all = taken;
+  std::ranges::copy_if(given, std::back_inserter(all),
+                       [&](const std::string& one) { return std::ranges::find(taken, one) == taken.end(); });
+  return all;
 }
 
 }  // namespace
 
-Result<Session> LoadSession(const ModelFlags& given, const CommonFlags& common) {
-  GS_ASSIGN(const ModelFlags flags, TakeOver(given));
+Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) {
+  RunModel earlier;
+  if (!flags.from.empty()) {
+    GS_ASSIGN(earlier, LoadRunModel(flags.from));
+  }
   Session session;
   session.pool = std::make_unique<ThreadPool>(WorkersOf(common));
   GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));
@@ -255,12 +258,13 @@ Result<Session> LoadSession(const ModelFlags& given, const CommonFlags& common) 
   GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
   GS_ASSIGN(session.model, Model::Load(session.experiment));
   PrintLeftOut(*session.model->rig());
-  if (!flags.with.empty()) {
+  if (const auto with = EffectsOf(earlier, flags.with); !with.empty()) {
     session.scales = EstimateScales(*session.model, session.recordings);
-    GS_ASSIGN(const std::vector<EffectUse> uses, ParseEffects(flags.with, *session.model->rig()));
+    GS_ASSIGN(const std::vector<EffectUse> uses, ParseEffects(with, *session.model->rig()));
     GS_ASSIGN(session.model, Model::Build(session.model->rig(), uses, session.scales));
   }
   session.values = session.model->Nominal();
+  GS_RETURN_IF_ERROR(TakeValues(*session.model, earlier, flags.from, &session.values));
   GS_RETURN_IF_ERROR(OverrideValues(*session.model, flags.params, flags.set, &session.values));
   return session;
 }

@@ -38,46 +38,47 @@ Eigen::Index PlaceIn(const TuneRun::LogFit& fit, const std::string& name, bool l
   return p - fit.parameters.begin();
 }
 
-// Of the same parameters by log: the fits' values in the coordinates that they are fitted in, and how far the fits
-// themselves may be off.
+// What the fits to each log say of the same parameters, in the coordinates that they are fitted in.
 struct LogValues {
   Eigen::MatrixXd values;  // parameters x logs
-  Eigen::MatrixXd within;  // the mean of the fits' covariances
-
-  explicit LogValues(const TuneRun& run, const std::vector<std::size_t>& parameters) {
-    const auto n = static_cast<Eigen::Index>(parameters.size()), logs = static_cast<Eigen::Index>(run.per_log.size());
-    values.resize(n, logs);
-    within = Eigen::MatrixXd::Zero(n, n);
-    for (Eigen::Index l = 0; l < logs; ++l) {
-      const TuneRun::LogFit& fit = run.per_log[static_cast<std::size_t>(l)];
-      std::vector<Eigen::Index> places;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const std::size_t p = parameters[static_cast<std::size_t>(i)];
-        const bool logarithmic = run.spread.logarithmic[p];
-        places.push_back(PlaceIn(fit, run.parameters[p].name, logarithmic));
-        const double value = fit.parameters[static_cast<std::size_t>(places.back())].value;
-        values(i, l) = logarithmic ? std::log(std::abs(value)) : value;
-      }
-      // A result of an earlier version does not say how far its fits may be off.
-      if (fit.spread.covariance.rows() == static_cast<Eigen::Index>(fit.parameters.size()))
-        within += fit.spread.covariance(places, places) / static_cast<double>(logs);
-    }
-  }
-
-  // How the logs themselves differ: of how their fits do, less what the fits leave open (Hedges' estimator of random
-  // effects). A part of each covariance is taken for chance. It may have negative eigenvalues.
-  Eigen::MatrixXd Between() const {
-    const Eigen::MatrixXd deviations = values.colwise() - values.rowwise().mean();
-    const Eigen::MatrixXd all = deviations * deviations.transpose() / (static_cast<double>(values.cols()) - 1) - within;
-    Eigen::MatrixXd between = (1 - kChance) * all;
-    between.diagonal() = all.diagonal();
-    return between;
-  }
+  Eigen::MatrixXd within;  // how far the fits themselves may be off: the mean of their covariances
 };
+
+// `parameters`: places in the run's list, of those that each log knows.
+LogValues ValuesOfLogs(const TuneRun& run, const std::vector<std::size_t>& parameters) {
+  const auto n = static_cast<Eigen::Index>(parameters.size()), logs = static_cast<Eigen::Index>(run.per_log.size());
+  LogValues found{.values = Eigen::MatrixXd(n, logs), .within = Eigen::MatrixXd::Zero(n, n)};
+  for (Eigen::Index l = 0; l < logs; ++l) {
+    const TuneRun::LogFit& fit = run.per_log[static_cast<std::size_t>(l)];
+    std::vector<Eigen::Index> places;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const std::size_t p = parameters[static_cast<std::size_t>(i)];
+      const bool logarithmic = run.spread.logarithmic[p];
+      places.push_back(PlaceIn(fit, run.parameters[p].name, logarithmic));
+      const double value = fit.parameters[static_cast<std::size_t>(places.back())].value;
+      found.values(i, l) = logarithmic ? std::log(std::abs(value)) : value;
+    }
+    // A result of an earlier version does not say how far its fits may be off.
+    if (fit.spread.covariance.rows() == static_cast<Eigen::Index>(fit.parameters.size()))
+      found.within += fit.spread.covariance(places, places) / static_cast<double>(logs);
+  }
+  return found;
+}
+
+// How the logs themselves differ: of how their fits do, less what the fits leave open (Hedges' estimator of random
+// effects). A part of each covariance is taken for chance. It may have negative eigenvalues.
+Eigen::MatrixXd Between(const LogValues& logs) {
+  const Eigen::MatrixXd deviations = logs.values.colwise() - logs.values.rowwise().mean();
+  const Eigen::MatrixXd all =
+      deviations * deviations.transpose() / (static_cast<double>(logs.values.cols()) - 1) - logs.within;
+  Eigen::MatrixXd between = (1 - kChance) * all;
+  between.diagonal() = all.diagonal();
+  return between;
+}
 
 // By the fits to each log alone: how the logs differ.
 void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
-  std::vector<std::size_t> of_each, differing;
+  std::vector<std::size_t> of_each;
   for (std::size_t i = 0; i < run.parameters.size(); ++i) {
     if (!run.parameters[i].identifiable) continue;
     const bool each = std::ranges::all_of(run.per_log, [&](const TuneRun::LogFit& fit) {
@@ -89,15 +90,17 @@ void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
       uncertain->not_of_each.push_back(run.parameters[i].name);
     }
   }
-  const LogValues all(run, of_each);
-  const Eigen::VectorXd mean = all.values.rowwise().mean(), variance = all.Between().diagonal();
+  const LogValues logs = ValuesOfLogs(run, of_each);
+  const Eigen::VectorXd mean = logs.values.rowwise().mean();
+  const Eigen::MatrixXd between = Between(logs);
+  std::vector<Eigen::Index> differing;
   for (Eigen::Index k = 0; k < mean.size(); ++k) {
     const std::size_t i = of_each[static_cast<std::size_t>(k)];
     const UncertainParameter p = ParameterAt(model, run, i);
     double& centre = uncertain->values[static_cast<std::size_t>(p.index)];
     centre = p.logarithmic ? std::copysign(std::exp(mean[k]), centre) : mean[k];
-    if (variance[k] > 0) {
-      differing.push_back(i);
+    if (between(k, k) > 0) {
+      differing.push_back(k);
       uncertain->parameters.parameters.push_back(p);
     } else {
       uncertain->alike.push_back(run.parameters[i].name);
@@ -105,7 +108,7 @@ void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
   }
   uncertain->logs = run.per_log.size();
   if (differing.empty()) return;
-  const SymmetricEigen eigen(LogValues(run, differing).Between());
+  const SymmetricEigen eigen(between(differing, differing));
   uncertain->parameters.covariance =
       eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }

@@ -24,6 +24,12 @@ Character First(std::string_view text) {
   return {a < 0x80 ? a : 0xfffdU, 1};
 }
 
+// The colour that a text begins with; empty: none.
+std::string_view ColourAt(std::string_view text) {
+  const auto* const colour = std::ranges::find_if(kColours, [&](std::string_view c) { return text.starts_with(c); });
+  return colour != kColours.end() ? *colour : std::string_view();
+}
+
 bool IsHidden(unsigned code) {
   if (code == '\n' || code == '\t') return false;
   const bool control = code < 0x20 || (code >= 0x7f && code < 0xa0);
@@ -39,21 +45,15 @@ std::string MadeVisible(std::string_view text, std::string_view escape) {
   shown.reserve(text.size());
   for (std::size_t at = 0; at < text.size();) {
     const std::string_view rest = text.substr(at);
-    const auto* const colour = std::ranges::find_if(kColours, [&](std::string_view c) { return rest.starts_with(c); });
-    if (colour != kColours.end()) {
-      shown += *colour;
-      at += colour->size();
-      continue;
-    }
     const Character first = First(rest);
-    if (IsHidden(first.code)) {
-      char digits[8];
-      std::snprintf(digits, sizeof digits, "%04x", first.code);
-      shown.append(escape).append(digits);
-    } else {
-      shown += rest.substr(0, first.bytes);
-    }
-    at += first.bytes;
+    std::size_t stays = first.bytes;
+    if (IsHidden(first.code)) stays = ColourAt(rest).size();
+    shown += rest.substr(0, stays);
+    at += std::max(stays, first.bytes);
+    if (stays > 0) continue;
+    char digits[8];
+    std::snprintf(digits, sizeof digits, "%04x", first.code);
+    shown.append(escape).append(digits);
   }
   return shown;
 }

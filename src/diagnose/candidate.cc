@@ -254,10 +254,13 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   return problem ? ReplayError(problem->Predict(point)) : kInfinity;
 }
 
+double PlaceInRange(double value, double low, double high) {
+  return low > 0 ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+}
+
 OnBound BoundOf(double value, double low, double high) {
   constexpr double kEdge = 1e-3;  // of the range
-  const double at =
-      low > 0 ? std::log(std::max(value, low) / low) / std::log(high / low) : (value - low) / (high - low);
+  const double at = PlaceInRange(std::max(value, low), low, high);
   return at <= kEdge ? OnBound::kLow : at >= 1 - kEdge ? OnBound::kHigh : OnBound::kNo;
 }
 

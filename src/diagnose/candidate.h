@@ -120,7 +120,9 @@ std::vector<LogReplay> PredictHeldOut(const Workbench& bench, const Candidate& c
 // fitted; infinity where that diverges.
 double FreeRunError(const Workbench& bench, const Candidate& candidate);
 
-// Which bound a value lies on, 0.1 % of the range near, on a positive range in its logarithm, as it is searched.
+// Where a value lies in its range, 0 .. 1 within it: on a positive range by its logarithm, as it is searched.
+double PlaceInRange(double value, double low, double high);
+// Which bound a value lies on, 0.1 % of the range near.
 enum class OnBound { kNo, kLow, kHigh };
 OnBound BoundOf(double value, double low, double high);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/diagnose/candidate.h"
 #include "src/diagnose/policy.h"
 
 namespace gapscope {
@@ -28,22 +29,16 @@ std::string ExplainEffects(const Diagnosis& d) {
                             d.effects.size() > 1 ? "them" : "it", d.final, d.evidence.floors_left);
 }
 
-// How far a parameter was moved, as a share of its range.
-double ShareOfRange(const Parameter& p, double from, double to) {
-  if (p.low > 0 && from > 0 && to > 0) return std::abs(std::log(to / from)) / std::log(p.high / p.low);
-  return std::abs(to - from) / (p.high - p.low);
-}
-
 // The base model's parameters that retuning moved, the furthest first: "pan.kp from 500 to 575 N m/rad". None: empty.
 std::string RetunedText(const Diagnosis& d) {
   constexpr std::size_t kMost = 5;
-  constexpr double kLeast = 0.02;
+  constexpr double kLeast = 0.02;  // of its range
   if (!d.refit_model) return "";
   std::vector<std::pair<double, std::string>> moved;
   for (std::size_t i = 0; i < d.refit_model->parameters().size(); ++i) {
     const Parameter& p = d.refit_model->parameters()[i];
     const double from = d.nominal_values[i], to = d.refit_values[i];
-    const double share = ShareOfRange(p, from, to);
+    const double share = std::abs(PlaceInRange(to, p.low, p.high) - PlaceInRange(from, p.low, p.high));
     if (from == to || !(share > kLeast)) continue;
     const std::string unit = p.unit == "1" ? "" : " " + p.unit;
     moved.emplace_back(share, fmt::format("{} from {:.3g} to {:.3g}{}", p.name, from, to, unit));

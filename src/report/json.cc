@@ -9,17 +9,30 @@ namespace gapscope {
 
 using nlohmann::ordered_json;
 
-std::string JsonText(const ordered_json& json) {
-  return MadeVisible(json.dump(2, ' ', false, ordered_json::error_handler_t::replace)) + "\n";
+namespace {
+
+// What is no UTF-8 becomes U+FFFD. `indent` -1: on one line.
+std::string Dumped(const ordered_json& json, int indent) {
+  return json.dump(indent, ' ', false, ordered_json::error_handler_t::replace);
 }
 
+}  // namespace
+
+std::string JsonText(const ordered_json& json) { return MadeVisible(Dumped(json, 2)) + "\n"; }
+
 std::string ScriptText(const ordered_json& json) {
-  const std::string text = MadeVisible(json.dump(-1, ' ', false, ordered_json::error_handler_t::replace), "\\\\u");
+  const std::string text = MadeVisible(Dumped(json, -1), "\\\\u");
   std::string safe;
   safe.reserve(text.size());
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool control = text.compare(i, 4, "\\u00") == 0 && (i == 0 || text[i - 1] != '\\');
-    safe += control ? "\\\\" : text[i] == '<' ? "\\u003c" : std::string(1, text[i]);
+    if (text[i] == '<') {
+      safe += "\\u003c";
+    } else if (text.compare(i, 2, "\\u") == 0) {
+      safe += "\\\\";  // a control character: nothing else is written so
+    } else {
+      safe += text[i];
+      if (text[i] == '\\') safe += text[++i];
+    }
   }
   return safe;
 }

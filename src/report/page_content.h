@@ -42,7 +42,7 @@ struct PageContent {
 
   Headline headline;
   std::vector<Table> tables;
-  std::string mapped;  // whose missing torque is mapped: "model", "nominal model", "diagnosed model"
+  std::string mapped;  // whose missing torque is mapped: "model", "nominal model", "retuned model", "diagnosed model"
   std::vector<Conditions> where;
   std::vector<Sentence> findings;   // what is present, the largest share of the gap first
   std::string gap;                  // how it went beyond what the headline says; may be empty

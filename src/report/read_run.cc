@@ -142,6 +142,11 @@ Result<RunModel> ReadRunModel(const ordered_json& json, const std::string& where
   return ReadGuarded([&] { return ResultModelFrom(json); }, where, kAllowed);
 }
 
+Result<RunModel> LoadRunModel(const std::string& path) {
+  GS_ASSIGN(const auto json, ReadJson(path));
+  return ReadRunModel(json, path);
+}
+
 Result<TuneRun> ReadTuneRun(const ordered_json& json, const std::string& where) {
   const auto read = [&] { return TuneRunFrom(json); };
   return ReadGuarded(read, where, kTuneSchema);

@@ -17,6 +17,9 @@ Result<nlohmann::ordered_json> ReadJson(const std::string& path);
 // `json`: a result of replay, tune or diagnose; `where` it comes from, for errors. Error: it has no such model.
 Result<RunModel> ReadRunModel(const nlohmann::ordered_json& json, const std::string& where);
 
+// The same of a file or folder. Errors: as ReadJson.
+Result<RunModel> LoadRunModel(const std::string& path);
+
 // `json`: gapscope.tune/1, with or without times (then NaN). Error: it is something else, or lacks a part.
 Result<TuneRun> ReadTuneRun(const nlohmann::ordered_json& json, const std::string& where);
 

@@ -34,14 +34,14 @@ std::string NamesOf(const std::vector<EffectUse>& uses) {
 
 // What would tell the members of a group apart, by their effects' own files; empty: one member, or nothing is known.
 std::string WhatWouldTell(const std::vector<const Statement*>& members) {
+  if (members.size() == 1) return "";
   std::vector<std::string> inputs;
   for (const Statement* s : members) {
     const auto effect = std::ranges::find(Catalogue(), s->use.effect, &Effect::name);
     if (effect == Catalogue().end() || effect->told_apart.empty()) continue;
     if (std::ranges::find(inputs, effect->told_apart) == inputs.end()) inputs.push_back(effect->told_apart);
   }
-  if (members.size() == 1 || inputs.empty()) return "";
-  return fmt::format("what would tell: {}", fmt::join(inputs, "; "));
+  return inputs.empty() ? "" : fmt::format("what would tell: {}", fmt::join(inputs, "; "));
 }
 
 Sentence SentenceOf(const std::vector<const Statement*>& members) {

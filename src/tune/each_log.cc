@@ -49,8 +49,7 @@ LogFits FitEachLog(const Model& model, const std::vector<Recording>& logs, const
 
 void ForgetLogFits(const TuneOptions& options, std::size_t logs) {
   std::error_code ignored;  // what cannot be removed cannot be opened either, which is told
-  for (std::size_t l = 0; l < logs && !options.journal.empty(); ++l)
-    std::filesystem::remove(JournalOf(options.journal, l), ignored);
+  for (std::size_t l = 0; l < logs; ++l) std::filesystem::remove(JournalOf(options.journal, l), ignored);
 }
 
 }  // namespace gapscope

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -15,12 +14,13 @@
 #include "src/core/file.h"
 #include "src/model/effect.h"
 #include "src/report/version.h"
+#include "tests/docs/schemas.h"
 
 namespace gapscope {
 namespace {
 
 using Names = std::set<std::string>;
-const std::string kSource = GAPSCOPE_SOURCE_DIR, kList = kSource + "/tests/docs/promised_names.txt";
+const std::string kList = std::string(GAPSCOPE_SOURCE_DIR) + "/tests/docs/promised_names.txt";
 const std::string kVersion = "version ";  // of the program that the list was made of
 
 void AddEffects(Names& to) {
@@ -45,7 +45,7 @@ void AddCommands(const std::vector<cli::Command>& commands, const std::string& a
 }
 
 // "schema diagnosis.effects[].name", and once more with "required" where it is.
-void AddKeys(const nlohmann::json& schema, const std::string& at, Names& to) {
+void AddKeys(const nlohmann::ordered_json& schema, const std::string& at, Names& to) {
   if (!schema.is_object()) return;
   for (const auto& [part, below] : schema.items()) {
     if (part == "properties" || part == "$defs") {
@@ -68,13 +68,9 @@ Names NamesNow() {
   Names names;
   AddEffects(names);
   AddCommands(cli::AllCommands(), "command", names);
-  for (const auto& file : std::filesystem::directory_iterator(kSource + "/schemas")) {
-    const auto text = ReadFile(file.path().string());
-    EXPECT_TRUE(text.ok()) << file.path();
-    std::string name = file.path().filename().string();
-    name.resize(name.find(".schema.json"));
+  for (const auto& [name, schema] : AllSchemas()) {
     names.insert("schema " + name);
-    AddKeys(nlohmann::json::parse(text.value()), "schema " + name, names);
+    AddKeys(schema, "schema " + name, names);
   }
   return names;
 }

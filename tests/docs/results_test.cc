@@ -3,13 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
-#include "src/core/file.h"
 #include "tests/docs/made_part.h"
+#include "tests/docs/schemas.h"
 
 namespace gapscope {
 namespace {
@@ -32,12 +30,6 @@ std::string KindOf(const ordered_json& value) {
   if (value.contains("$ref")) return "*" + Referred(value["$ref"]) + "*";
   if (value.contains("const")) return "`" + value["const"].dump() + "`";
   if (value.contains("enum")) return Joined(value["enum"]);
-  for (const char* choice : {"oneOf", "anyOf"}) {
-    std::string text;
-    for (const auto& one : value.value(choice, ordered_json::array()))
-      text += (text.empty() ? "" : " or ") + KindOf(one);
-    if (!text.empty()) return text;
-  }
   const ordered_json type = value.value("type", ordered_json("anything"));
   if (type.is_array()) {
     std::string text;
@@ -70,12 +62,8 @@ void AddRows(const ordered_json& schema, const std::string& above, std::string& 
   for (const auto& [key, value] : schema["properties"].items()) {
     const bool always = std::ranges::find(required, ordered_json(key)) != required.end();
     const std::string name = above + key, what = value.value("description", "");
-    to += "| `" + name + "` | " + KindOf(value) + " | " +
-          Cell((always         ? ""
-                : what.empty() ? "may be missing"
-                               : "may be missing; ") +
-               what) +
-          " |\n";
+    const std::string missing = always ? "" : what.empty() ? "may be missing" : "may be missing; ";
+    to += "| `" + name + "` | " + KindOf(value) + " | " + Cell(missing + what) + " |\n";
     AddBelow(value, name, to);
   }
 }
@@ -99,17 +87,8 @@ std::string Definitions(const ordered_json& schema) {
 }
 
 std::string ResultsText() {
-  std::vector<std::filesystem::path> files;
-  for (const auto& file : std::filesystem::directory_iterator(std::string(GAPSCOPE_SOURCE_DIR) + "/schemas"))
-    files.push_back(file.path());
-  std::ranges::sort(files);
   std::string text, common;
-  for (const auto& file : files) {
-    const auto read = ReadFile(file.string());
-    EXPECT_TRUE(read.ok()) << file;
-    const ordered_json schema = ordered_json::parse(read.value());
-    std::string name = file.filename().string();
-    name.resize(name.find(".schema.json"));
+  for (const auto& [name, schema] : AllSchemas()) {
     std::string title = schema.at("title");
     if (!title.ends_with('.')) title += '.';
     std::string section = "\n## " + name + "\n\n" + Wrapped(title);

@@ -7,6 +7,7 @@
 
 #include "src/core/digest.h"
 #include "src/core/file.h"
+#include "src/report/json.h"
 #include "tests/experiment/scratch.h"
 #include "tests/report/pages.h"
 
@@ -17,6 +18,13 @@ nlohmann::json DataOf(const std::string& page) {
   const std::string open = "id=\"report-data\">";
   const std::size_t begin = page.find(open) + open.size();
   return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
+}
+
+// A backslash before a control character is one of its own.
+TEST(ScriptTextTest, WhatHidesIsReadAsItsEscape) {
+  const std::string text = ScriptText(nlohmann::ordered_json("a\\\033[2J\u202e\n</script>"));
+  EXPECT_EQ(nlohmann::json::parse(text), "a\\\\u001b[2J\\u202e\n</script>");
+  EXPECT_EQ(text.find('<'), std::string::npos);
 }
 
 std::string EffectsPage() {

@@ -9,6 +9,7 @@
 #include "src/core/file.h"
 #include "src/report/apply_report.h"
 #include "src/report/json.h"
+#include "src/report/read_json.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -31,6 +32,8 @@ Result<int> RunApply(const ApplyFlags& flags) {
                .out = flags.common.out,
                .setter = experiment.settings.empty() ? "" : experiment.path,
                .changes = applied.changes,
+               .time_step_s = json.contains("time_step_s") ? NumberFrom(json["time_step_s"]) : kNaN,
+               .model_time_step_s = result.model->rig()->compiled().opt.timestep,
                .left_out = applied.left_out};
   run.needs_plugins = applied.text.find("plugin=\"gapscope.") != std::string::npos;
   for (const auto& use : result.model->effects()) {

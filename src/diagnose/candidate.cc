@@ -37,8 +37,10 @@ std::string Candidate::Name() const {
 void ChooseWindows(const Model& model, std::size_t max_windows, Workbench* bench) {
   bench->max_windows = max_windows;
   bench->windows.reset();
-  bench->windows =
-      std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, bench->Options(model, true)));
+  FitOptions options = bench->Options(model, true);
+  bench->windows = std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, options));
+  options.max_windows = 0;
+  bench->all_windows = TakenWindows(bench->data.train, options).size();
 }
 
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use) {

@@ -58,6 +58,7 @@ struct Workbench {
   double time_step_s = 0;
   double sample_s = 0;                                    // of the logs as they are: what a delay must exceed
   std::size_t max_windows = 0;                            // to fit; of held-out logs half as many
+  std::size_t all_windows = 0;                            // that the training logs have
   std::shared_ptr<const std::vector<LogWindow>> windows;  // of the training logs: the same for all candidates
   Deadline deadline;
   std::shared_ptr<Work> work = std::make_shared<Work>();  // done so far

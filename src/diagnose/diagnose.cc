@@ -310,6 +310,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   result.work += lead.work;
   result.most_steps += lead.work.steps;
   NameLogs(at->data, &result);
+  result.time_step_s = at->time_step_s;
+  result.windows = {.fitted = at->windows->size(), .all = at->all_windows, .length_s = at->window_s};
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.interrupted = deadline.stopped();
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -156,6 +156,12 @@ struct VerdictEvidence {
   double free_run_before = 0, free_run_left = 0, free_run_removed = 0;
 };
 
+// Pieces that logs are fitted in; of long logs those that say most.
+struct FittedWindows {
+  std::size_t fitted = 0, all = 0;  // of the training logs
+  double length_s = 0;
+};
+
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   double probability = 0;
@@ -174,6 +180,8 @@ struct Diagnosis {
   std::vector<std::string> train_logs, held_out_logs;
   std::string split, explanation;
   double data_s = 0;  // of all logs
+  double time_step_s = 0;
+  FittedWindows windows;
   double wall_s = 0;
   Work work;                           // spent
   std::size_t most_steps = 0;          // the budget, simulator steps

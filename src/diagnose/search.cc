@@ -85,11 +85,8 @@ class Searcher {
     Settle();
     // What leads after an exchange has other gaps than what growth ended on.
     until_ = kPolicy.until_exchanged;
-    while (!grown_.contains(result_.chosen->effects)) {
-      Grow({result_.chosen});
-      Candidate* before = result_.chosen;
+    while (GrowFurther()) {
       Lead();
-      if (result_.chosen == before) break;
       Settle();
     }
   }
@@ -307,6 +304,32 @@ class Searcher {
       if (!again) return;
       leaders = {Leaders().front()};
     }
+  }
+
+  // What is behind in a member's place may lead with what it lacks: the nearest one is fitted to its end and added to, as
+  // the leader was.
+  void GrowRivals() {
+    if (AtNoise(*result_.chosen)) return;
+    Candidate* nearest = nullptr;
+    for (const Member& member : result_.members) {
+      for (const Rival& rival : member.rivals) {
+        const EffectSet set = With(Without(result_.chosen->effects, member.use), rival.use);
+        Candidate* other = grown_.contains(set) ? nullptr : result_.ledger.Find(set);
+        if (other && (!nearest || other->train_cost < nearest->train_cost)) nearest = other;
+      }
+    }
+    if (!nearest || Late(until_, "additions")) return;
+    say_("following " + NameOfSet(nearest->effects));
+    result_.ledger.Continue(nearest, Effort::kFinish);
+    Grow({nearest});
+  }
+
+  // Whether another set leads then.
+  bool GrowFurther() {
+    const Candidate* leader = Leaders().front();
+    Grow({result_.chosen});
+    if (Leaders().front() == leader) GrowRivals();
+    return Leaders().front() != leader;
   }
 
   // The cheapest set, its members charged.

@@ -120,6 +120,8 @@ ordered_json ToJson(const ApplyRun& run) {
                        {"out", run.out},
                        {"changes", ordered_json::array()},
                        {"needs_plugins", run.needs_plugins},
+                       {"time_step_s", JsonNumber(run.time_step_s)},
+                       {"model_time_step_s", run.model_time_step_s},
                        {"not_in_model", JsonEffects(run.of_signals)},
                        {"of_each_log", run.left_out},
                        {"versions", JsonVersions(run.info)}};
@@ -147,6 +149,9 @@ std::string ToTable(const ApplyRun& run) {
     text += fmt::format("  not in it: {}, which is the log's and not the mechanism's\n", use.Text());
   if (!run.left_out.empty()) text += fmt::format("  as it was, since each log sets it anew: {}\n", Join(run.left_out));
   if (run.needs_plugins) text += "  it has plugin elements: load libgapscope_plugins.so before it\n";
+  if (run.time_step_s < run.model_time_step_s)
+    text += fmt::format("  the result's errors are of steps of {:.4g} ms; this model's own are {:.4g} ms\n",
+                        1e3 * run.time_step_s, 1e3 * run.model_time_step_s);
   if (!run.setter.empty())
     text += fmt::format("  take out of 'set' in {} what stands here now: it writes nominal values over the MJCF's\n",
                         run.setter);

@@ -20,6 +20,7 @@ struct ApplyRun {
   std::string setter;              // the experiment file, where it sets fields itself; else empty
   std::vector<AppliedChange> changes;
   bool needs_plugins = false;
+  double time_step_s = 0, model_time_step_s = 0;  // of the result's errors, NaN: not said; the MJCF's own
   std::vector<EffectUse> of_signals;  // effects of the log's columns, which no mechanism holds
   std::vector<std::string> left_out;  // fields that each log sets anew
 };

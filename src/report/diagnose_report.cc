@@ -142,23 +142,30 @@ std::string RemainderText(const Remainder& remainder) {
   return Wrapped(text, 120, "  ") + "\n";
 }
 
-// What is there, what was considered and is not, and how many more.
+// What is there, what was considered and is not, and how large the others may be.
+constexpr std::size_t kMostBounds = 30;
 std::string StatementTable(const Diagnosis& d) {
   std::string text =
       fmt::format("\n{:>2} {:<34} {:<8} {:>11}  {}\n", "", "effect", "answer", "probability", "rests on");
+  std::string bounds;
   std::size_t absent = 0, unseen = 0;
   for (std::size_t i = 0; i < d.statements.size(); ++i) {
     const Statement& s = d.statements[i];
     const StatementNumbers& n = s.numbers;
     if (!s.sets) {
       ++(s.answer == Answer::kUnseen ? unseen : absent);
+      if (!s.bounds.empty() && absent <= kMostBounds)
+        bounds += fmt::format("{}{} {} {}", bounds.empty() ? "" : ", ", s.use.Text(), s.bounds.front().key, BoundText(s));
       continue;
     }
     text += fmt::format("{:>2} {:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", i + 1, s.use.Text(),
                         AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
   }
-  text += fmt::format("{} more gain too little (--json: below which size they stay), {} cannot be seen in these logs\n",
-                      absent, unseen);
+  text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
+  if (!bounds.empty()) {
+    const char* more = absent > kMostBounds ? ", ... (--json: all)" : "";
+    text += Wrapped("at most (of a limit: at least; 95 %): " + bounds + more, 120, "  ") + "\n";
+  }
   return text;
 }
 
@@ -311,6 +318,8 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   json["logs"] = {{"train", d.train_logs}, {"held_out", d.held_out_logs}, {"held_out_by", d.split}};
   if (d.model) json["model"] = JsonModel(RunModelOf(*d.model, d.values));
   if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
+  json["time_step_s"] = d.time_step_s;
+  json["windows"] = {{"fitted", d.windows.fitted}, {"all", d.windows.all}, {"length_s", d.windows.length_s}};
   if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
   json["budget"] = {{"work", d.most_steps}, {"spent", d.work.steps}, {"unit", "steps"}, {"cut", d.cut}};
   json["termination"] = d.interrupted ? "interrupted" : d.cut.empty() ? "finished" : "budget spent";
@@ -340,7 +349,9 @@ std::string ToTable(const DiagnoseRun& run) {
     if (!d.next.command.empty()) text += WrappedCommand(d.next.command, 120) + "\n";
   }
   const char* const early = d.interrupted ? ", interrupted" : d.cut.empty() ? "" : ", the whole budget";
-  text += fmt::format("\nheld out: {}; {:.1f} s{}\n", d.split, d.wall_s, early);
+  const auto& [fitted, all, length_s] = d.windows;
+  text += fmt::format("\nfitted: {} of {} windows of {:.3g} s; held out: {}; {:.1f} s{}\n", fitted, all, length_s,
+                      d.split, d.wall_s, early);
   return text;
 }
 

@@ -314,7 +314,6 @@ void AddFindings(const PageContent& content, ordered_json* data) {
     }
     json["statements"].push_back(std::move(entry));
   }
-  json["more_statements"] = content.more_statements;
 }
 
 // Words and tables, as they are shown.

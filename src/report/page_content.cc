@@ -7,7 +7,7 @@
 namespace gapscope {
 namespace {
 
-constexpr std::size_t kMostConditions = 10, kMostStatements = 40;
+constexpr std::size_t kMostConditions = 10;
 
 std::vector<ConditionShare> First(std::vector<ConditionShare> shares) {
   shares.resize(std::min(shares.size(), kMostConditions));
@@ -26,9 +26,6 @@ void AddStatements(const Diagnosis& d, PageContent* page) {
                                 .numbers = s.sets ? std::optional(s.numbers) : std::nullopt});
   }
   std::ranges::stable_sort(page->statements, std::ranges::greater{}, &PageContent::Looked::probability);
-  const std::size_t shown = std::min(page->statements.size(), kMostStatements);
-  page->more_statements = page->statements.size() - shown;
-  page->statements.resize(shown);
 }
 
 }  // namespace

@@ -48,8 +48,7 @@ struct PageContent {
   std::string gap;                  // how it went beyond what the headline says; may be empty
   std::vector<Part> remainder;      // of the misfit that retuning leaves
   double reachable = kNaN;          // by a free-form torque, of the same
-  std::vector<Looked> statements;   // the most probable first, as many as are shown
-  std::size_t more_statements = 0;  // that are not
+  std::vector<Looked> statements;   // the most probable first
   std::vector<Fitted> fitted;
   std::vector<std::pair<std::string, double>> values;  // of the result's model; what is not fitted is shown with these
   std::string next_text, next_command;                 // the next experiment; empty: none

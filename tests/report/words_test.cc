@@ -154,8 +154,7 @@ TEST(PageContentTest, StatementsByProbabilityAndTheNextExperiment) {
   EXPECT_EQ(page.statements[0].title, "cable spring on arm");
   EXPECT_EQ(page.statements[0].answer, "present");
   EXPECT_EQ(page.statements[2].title, "torque bias on arm");
-  EXPECT_EQ(page.statements.size(), 40u);
-  EXPECT_EQ(page.more_statements, 13u);
+  EXPECT_EQ(page.statements.size(), 53u);
   EXPECT_EQ(
       page.next_text,
       "These logs do not tell cable spring on arm from gravity offset on arm. With the proposed log beside these, P "

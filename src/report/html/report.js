@@ -119,7 +119,7 @@ writeConditions(data.where);
 choosers();
 listSignals();
 drawLog();
-writeStatements(data.statements, data.more_statements);
+writeStatements(data.statements);
 writeParameters(data.parameters, data.headline.notes);
 writeNext(data.next);
 writeQuality(data.logs);

@@ -53,7 +53,9 @@ function writeTables(tables) {
 const answerTag = (answer) =>
   element("span", {class: `tag ${answer === "present" ? "good" : answer === "unseen" ? "warn" : ""}`}, answer);
 
-function writeStatements(statements, more) {
+// The likeliest; the others, of which a robot of many joints has hundreds, unfold.
+function writeStatements(statements) {
+  const most = 40;
   if (!statements.length) return;
   const cells = statements.map((s) => [
     s.title,
@@ -76,15 +78,20 @@ function writeStatements(statements, more) {
     "why, or why not",
   ];
   const place = document.getElementById("statement-table");
-  place.append(table("Statements", heads, cells));
+  place.append(table("Statements", heads, cells.slice(0, most)));
+  if (cells.length > most) {
+    place.append(
+      element("details", {}, element("summary", {}, `${cells.length - most} more, less likely`),
+        table("More statements", heads, cells.slice(most))),
+    );
+  }
   place.append(
     element(
       "p",
       {class: "note"},
       "Gain: logarithm of the cost without the effect over the cost with it, all else refitted; on the fitted logs, on "
         + "logs held out, and over whole logs. Size, at most: with 95 % probability, of what is absent (of a limit: at "
-        + `least). Unseen: the base model's parameters do all that it would do.${
-          more ? ` ${more} more, less likely ones are in result.json.` : ""}`,
+        + "least). Unseen: the base model's parameters do all that it would do.",
     ),
   );
   show("statements");

@@ -82,5 +82,15 @@ class Options(unittest.TestCase):
         self.assertEqual(len(self.found("`--sanitize`", {"scripts/test": "--sanitize"})), 1)
 
 
+class Examples(unittest.TestCase):
+    def test_indented_commands_run(self):
+        page = "Text.\n\n    gapscope replay a.yaml b.csv\n"
+        self.assertEqual(len(check.not_run(page, "docs/page.md")), 1)
+        self.assertEqual(check.not_run("<!-- the indented commands run -->\n\n" + page, "docs/page.md"), [])
+        excepted = next(iter(check.NOT_RUN))
+        self.assertEqual(check.not_run(page, excepted), [])
+        self.assertEqual(len(check.not_run("Text.\n", excepted)), 1)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -44,6 +44,16 @@ class Sentences(unittest.TestCase):
             self.assertEqual(check.long_sentences(example.format("word " * 40)), [])
 
 
+class Terms(unittest.TestCase):
+    TERMS = check.glossary("| word | means |\n|---|---|\n| **free, frozen** | x |\n| **gap** | y |\n")
+
+    def test_a_word_in_bold_is_one_of_the_glossary(self):
+        good = "The **gap** of **Gaps**,\n**frozen**.\n\n**Heading.** Text.\n\n- **Item**: text\n1. **One**.\n"
+        self.assertEqual(check.unknown_terms(good + "\n| **cell** | a |\n", self.TERMS), [])
+        self.assertEqual(check.unknown_terms("A **hole**.", self.TERMS),
+                         ["in bold, not in docs/reference/glossary.md: hole"])
+
+
 class Links(unittest.TestCase):
     AT = ROOT / "docs/reference/page.md"
 

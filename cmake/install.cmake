@@ -7,7 +7,8 @@
 #                                        gapscope::replay, gapscope::plugins ...
 #   share/gapscope/models                rigs and experiment files
 #   share/man/man1/gapscope.1            made from the program's own --help
-#   share/bash-completion/completions/gapscope
+#   share/bash-completion/completions/gapscope, share/fish/vendor_completions.d/gapscope.fish
+#   share/zsh/site-functions/_gapscope   of a package in /usr share/zsh/vendor-completions/_gapscope, as Debian has it
 #   share/gapscope/demo/qube.csv         the log to try them with
 # Components: program (with the Python package too), documents, development (headers, archives, CMake package).
 include(CMakePackageConfigHelpers)
@@ -58,6 +59,12 @@ install(DIRECTORY models schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope C
 install(FILES demo/qube.csv DESTINATION ${CMAKE_INSTALL_DATADIR}/gapscope/demo COMPONENT documents)
 install(FILES cmake/gapscope.bash RENAME gapscope DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
         COMPONENT documents)
+install(FILES cmake/gapscope.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT documents)
+set(_zsh ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+if(CMAKE_INSTALL_PREFIX STREQUAL /usr)
+  set(_zsh ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
+endif()
+install(FILES cmake/_gapscope DESTINATION ${_zsh} COMPONENT documents)
 
 # The manual page says what the program says.
 set(_man ${CMAKE_BINARY_DIR}/share/man/man1/gapscope.1)

@@ -13,9 +13,11 @@ from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 
 WIDTH, HEIGHT, MARGIN = 1280, 1500, 6
-# Where the first element begins and the last one ends on the page; nothing that stays in view may cover them.
+# Where the first element begins and the last one ends on the page; nothing that stays in view may cover them, and what
+# stands above the first one is not in its margin.
 BOX = """
 document.querySelectorAll("header, nav").forEach((bar) => { bar.style.position = "static"; });
+document.querySelector(arguments[0])?.style.setProperty("margin-top", "24px");
 const [first, last] = [...arguments].map((selector) => {
   const part = document.querySelector(selector);
   if (!part || !part.checkVisibility()) throw new Error(`nothing to see of ${selector}`);

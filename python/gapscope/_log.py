@@ -32,10 +32,11 @@ _TIMES = {"time_s", "time", "t", "timestamp", "stamp", "__time", "time_ms", "tim
 class Log:
     """A hardware log.
 
-    ``data`` is a path to a file that the program reads (CSV, NPZ, bam JSON, a SAGE folder), or one of another tool's
-    format (docs/reference/formats.md: MAT, HDF5, Parquet, ROS bags, MCAP, LeRobot), a pandas DataFrame, a structured
-    array, or a mapping of names to arrays: of shape (rows,), or (rows, n), which become ``NAME[0]`` ...
-    ``NAME[n - 1]``. Values are in the units that the experiment file states; NaN is a missing value.
+    ``data`` is a path to a file that the program reads: CSV, NPZ, bam JSON, a SAGE folder. Or it is one of another
+    tool's format (docs/reference/formats.md): MAT, HDF5, Parquet, ROS bags, MCAP, LeRobot. In memory it is a pandas
+    DataFrame, a structured array, or a mapping of names to arrays. Arrays are of shape (rows,), or (rows, n), which
+    become ``NAME[0]`` ... ``NAME[n - 1]``. Values are in the units that the experiment file states; NaN is a missing
+    value.
 
     ``time`` names the column of stamps; without it a DataFrame's index of times is taken, else a column named like a
     time. ``time_unit`` is "s", "ms", "us" or "ns"; without it the program guesses from name and size, and says so.
@@ -391,9 +392,9 @@ def read(
     (5001,)
 
     ``exp`` is an experiment whose ``log: {source: {...}}`` says what to take of the file. ``source`` are the same keys,
-    before those of the experiment: ``topics`` of a bag, else all; ``msgs``, a folder of .msg files; ``variable`` of a
-    MAT file, or a group of an HDF5 file; ``time``, the column of stamps where its name does not say it; ``joints``,
-    names of the elements of arrays.
+    before those of the experiment. A bag has ``topics``, else all are read, and ``msgs``, a folder of .msg files.
+    ``variable`` is of a MAT file, or a group of an HDF5 file. ``time`` is the column of stamps where its name does not
+    say it; ``joints`` are names of the elements of arrays.
 
     Raises InputError: nothing is there, not a known format, its library is not installed, damaged, too large, several
     recordings.

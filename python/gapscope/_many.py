@@ -39,8 +39,8 @@ def diagnose_many(
     ``options`` are those of `diagnose`, with one job a group where they do not say; ``hold_out`` may be a mapping by
     group. ``progress`` is called in this thread whenever a group is done.
 
-    Ctrl-C ends the searches under way and raises Interrupted, whose ``partial`` is such a mapping too: of what was
-    done, and of the best so far of what was under way. A second Ctrl-C waits for none of these.
+    Ctrl-C ends the searches under way and raises Interrupted, whose ``partial`` is such a mapping too. It
+    has what was done, and the best so far of what was under way. A second Ctrl-C waits for none of these.
 
     Raises InputError: no group, a name that is no folder's, not an executor, groups to hold out that there are not.
     """

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, TypeAlias
 
 from gapscope._errors import Bug, InputError
 
@@ -37,7 +37,7 @@ class Progress:
     elapsed_s: float
 
 
-ProgressCallback = Callable[[Progress], object]
+ProgressCallback: TypeAlias = Callable[[Progress], object]
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,16 @@ class Sentences(unittest.TestCase):
             self.assertEqual(check.long_sentences(example.format("word " * 40)), [])
 
 
+class Terms(unittest.TestCase):
+    TERMS = check.glossary("| word | means |\n|---|---|\n| **free, frozen** | x |\n| **gap** | y |\n")
+
+    def test_a_word_in_bold_is_one_of_the_glossary(self):
+        good = "The **gap** of **Gaps**,\n**frozen**.\n\n**Heading.** Text.\n\n- **Item**: text\n1. **One**.\n"
+        self.assertEqual(check.unknown_terms(good + "\n| **cell** | a |\n", self.TERMS), [])
+        self.assertEqual(check.unknown_terms("A **hole**.", self.TERMS),
+                         ["in bold, not in docs/reference/glossary.md: hole"])
+
+
 class Links(unittest.TestCase):
     AT = ROOT / "docs/reference/page.md"
 
@@ -80,6 +90,16 @@ class Options(unittest.TestCase):
     def test_of_a_program_that_the_page_names(self):
         self.assertEqual(self.found("`scripts/test` has `--sanitize`", {"scripts/test": "--sanitize"}), [])
         self.assertEqual(len(self.found("`--sanitize`", {"scripts/test": "--sanitize"})), 1)
+
+
+class Examples(unittest.TestCase):
+    def test_indented_commands_run(self):
+        page = "Text.\n\n    gapscope replay a.yaml b.csv\n"
+        self.assertEqual(len(check.not_run(page, "docs/page.md")), 1)
+        self.assertEqual(check.not_run("<!-- the indented commands run -->\n\n" + page, "docs/page.md"), [])
+        excepted = next(iter(check.NOT_RUN))
+        self.assertEqual(check.not_run(page, excepted), [])
+        self.assertEqual(len(check.not_run("Text.\n", excepted)), 1)
 
 
 if __name__ == "__main__":

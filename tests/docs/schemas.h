@@ -1,4 +1,4 @@
-// The JSON Schemas of the results, as they stand in schemas/.
+// The JSON Schemas of the experiment file and of the results, as they stand in schemas/.
 #ifndef GAPSCOPE_TESTS_DOCS_SCHEMAS_H_
 #define GAPSCOPE_TESTS_DOCS_SCHEMAS_H_
 

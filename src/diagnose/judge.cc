@@ -137,15 +137,22 @@ class Judging {
     }
   }
 
-  // The one that helps least on held-out logs of those that the set can do without; what is left is then chosen.
+  // Whether nothing that was not fitted shows it: what each effect of the set must gain, it gains on fitted logs alone.
+  static bool IsUnconfirmed(const StatementNumbers& numbers) {
+    return std::max(numbers.gain_held_out, numbers.gain_free) < kDiagnosePolicy.search.member;
+  }
+
+  // The one that helps least on held-out logs of those that the set can do without; what is left is then chosen. The
+  // last one stays, unsure or not, unless it is unconfirmed.
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
     auto least = all.end();
     for (auto s = all.begin(); s != all.end(); ++s) {
-      const bool is_spare = s->probability < kDiagnosePolicy.probability.present &&
-                            (s->numbers.gain < kDiagnosePolicy.search.tie || s->numbers.gain_held_out < 0);
-      if (is_spare && (least == all.end() || s->numbers.gain_held_out < least->numbers.gain_held_out)) least = s;
+      const StatementNumbers& n = s->numbers;
+      const bool is_spare = IsUnconfirmed(n) || (s->probability < kDiagnosePolicy.probability.present &&
+                                                 (n.gain < kDiagnosePolicy.search.tie || n.gain_held_out < 0));
+      if (is_spare && (least == all.end() || n.gain_held_out < least->numbers.gain_held_out)) least = s;
     }
-    if (found_.members.size() < 2 || least == all.end()) return all.end();
+    if (least == all.end() || (found_.members.size() < 2 && !IsUnconfirmed(least->numbers))) return all.end();
     Candidate* without = found_.ledger.Find(Without(found_.chosen->effects, least->use));
     if (!without) return all.end();
     evidence_.Choose(without);

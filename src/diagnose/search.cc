@@ -306,8 +306,8 @@ class Searcher {
     }
   }
 
-  // What is behind in a member's place may lead with what it lacks: the nearest one is fitted to its end and added to, as
-  // the leader was.
+  // What is behind in a member's place may lead with what it lacks: the nearest one is fitted to its end and added to,
+  // as the leader was.
   void GrowRivals() {
     if (AtNoise(*result_.chosen)) return;
     Candidate* nearest = nullptr;

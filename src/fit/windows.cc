@@ -18,6 +18,19 @@ std::size_t FirstScored(const Recording& recording, const Window& rows, double l
   return first;
 }
 
+// The windows of a log as it is cut, but for its unknown past: the first one begins where that has passed, or goes
+// where that leaves less than half of it. A log's only window keeps at least its second half.
+std::vector<Window> KnownWindows(const Recording& recording, double window_s) {
+  std::vector<Window> known, all = MakeWindows(recording, ReplayMode::kWindows, window_s);
+  const auto& time = recording.time_s;
+  for (Window window : all) {
+    const std::size_t half = window.rows() / 2, whole = window.begin;
+    while (window.begin < whole + half && time[window.begin] < time.front() + kFitPolicy.unknown_past_s) ++window.begin;
+    if (window.begin < whole + half || all.size() == 1) known.push_back(window);
+  }
+  return known;
+}
+
 // Root mean square of each signal's residuals over a log; 0 where there are none.
 std::vector<double> MismatchOf(std::size_t log, const Recording& recording, const std::vector<FitWindow>& windows,
                                const Residuals& residuals) {
@@ -44,7 +57,7 @@ std::vector<LogWindow> TakenWindows(const std::vector<Recording>& recordings, co
   if (options.windows) return *options.windows;
   std::vector<LogWindow> windows;
   for (std::size_t l = 0; l < recordings.size(); ++l) {
-    const auto all = MakeWindows(recordings[l], ReplayMode::kWindows, options.window_s);
+    const auto all = KnownWindows(recordings[l], options.window_s);
     for (std::size_t i = 0; i < all.size(); ++i) {
       // Another third in each log: repeats of one command are not all held out at the same time.
       if (options.fold == Fold::kAll || ((i + l) % 3 == 1) == (options.fold == Fold::kHeldOut))

@@ -21,8 +21,8 @@ struct ApplyRun {
   std::vector<AppliedChange> changes;
   bool needs_plugins = false;
   double time_step_s = 0, model_time_step_s = 0;  // of the result's errors, NaN: not said; the MJCF's own
-  std::vector<EffectUse> of_signals;  // effects of the log's columns, which no mechanism holds
-  std::vector<std::string> left_out;  // fields that each log sets anew
+  std::vector<EffectUse> of_signals;              // effects of the log's columns, which no mechanism holds
+  std::vector<std::string> left_out;              // fields that each log sets anew
 };
 
 nlohmann::ordered_json ToJson(const ApplyRun& run);

@@ -155,7 +155,8 @@ std::string StatementTable(const Diagnosis& d) {
     if (!s.sets) {
       ++(s.answer == Answer::kUnseen ? unseen : absent);
       if (!s.bounds.empty() && absent <= kMostBounds)
-        bounds += fmt::format("{}{} {} {}", bounds.empty() ? "" : ", ", s.use.Text(), s.bounds.front().key, BoundText(s));
+        bounds +=
+            fmt::format("{}{} {} {}", bounds.empty() ? "" : ", ", s.use.Text(), s.bounds.front().key, BoundText(s));
       continue;
     }
     text += fmt::format("{:>2} {:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", i + 1, s.use.Text(),

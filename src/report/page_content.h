@@ -44,11 +44,11 @@ struct PageContent {
   std::vector<Table> tables;
   std::string mapped;  // whose missing torque is mapped: "model", "nominal model", "retuned model", "diagnosed model"
   std::vector<Conditions> where;
-  std::vector<Sentence> findings;   // what is present, the largest share of the gap first
-  std::string gap;                  // how it went beyond what the headline says; may be empty
-  std::vector<Part> remainder;      // of the misfit that retuning leaves
-  double reachable = kNaN;          // by a free-form torque, of the same
-  std::vector<Looked> statements;   // the most probable first
+  std::vector<Sentence> findings;  // what is present, the largest share of the gap first
+  std::string gap;                 // how it went beyond what the headline says; may be empty
+  std::vector<Part> remainder;     // of the misfit that retuning leaves
+  double reachable = kNaN;         // by a free-form torque, of the same
+  std::vector<Looked> statements;  // the most probable first
   std::vector<Fitted> fitted;
   std::vector<std::pair<std::string, double>> values;  // of the result's model; what is not fitted is shown with these
   std::string next_text, next_command;                 // the next experiment; empty: none

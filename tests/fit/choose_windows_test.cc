@@ -9,6 +9,8 @@
 #include <numbers>
 #include <set>
 
+#include "src/fit/windows.h"
+
 namespace gapscope {
 namespace {
 
@@ -84,6 +86,21 @@ TEST(ChooseWindowsTest, LogsNeedNotBeAlike) {
   ASSERT_EQ(chosen.size(), 20u);
   EXPECT_TRUE(
       std::any_of(chosen.begin(), chosen.end(), [](const auto& w) { return w.log == 0 && w.rows.begin == 400; }));
+}
+
+// Before a log's first row nobody knows what was commanded.
+TEST(TakenWindowsTest, NoneBeginsWhereAnUnknownPastMayAct) {
+  const Recording recording = MostlyAtRest(4, {1});
+  const std::vector<LogWindow> seconds = TakenWindows({recording}, {});
+  ASSERT_EQ(seconds.size(), 4u);
+  EXPECT_DOUBLE_EQ(recording.time_s[seconds[0].rows.begin], 0.08);
+  EXPECT_DOUBLE_EQ(recording.time_s[seconds[1].rows.begin], 1);
+  // Of windows of a tenth of a second the first one has too little left.
+  const std::vector<LogWindow> tenths = TakenWindows({recording}, {.window_s = 0.1});
+  EXPECT_DOUBLE_EQ(recording.time_s[tenths[0].rows.begin], 0.1);
+  const std::vector<LogWindow> whole = TakenWindows({MostlyAtRest(1, {0})}, {.window_s = 5});
+  ASSERT_EQ(whole.size(), 1u);
+  EXPECT_EQ(whole[0].rows.begin, 8u);
 }
 
 }  // namespace

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <filesystem>
 #include <random>
-#include <set>
 
 #include "src/diagnose/diagnosis.h"
 #include "tests/twin/case.h"
@@ -23,9 +22,8 @@ struct Logs {
   std::vector<twin::EffectLabel> effects;
 };
 
-// `signals`: of the experiment's measured ones the first so many.
 Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect, std::uint64_t seed,
-              std::uint64_t index = 0, std::size_t signals = 100) {
+              std::uint64_t index = 0) {
   twin::Case c;
   std::string problem;
   twin::CaseRequest request;
@@ -39,7 +37,6 @@ Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect
   auto experiment = LoadExperiment(GAPSCOPE_SOURCE_DIR "/models/" + rig + "/experiment.yaml");
   EXPECT_TRUE(experiment.ok());
   logs.experiment = experiment.value();
-  logs.experiment.measured.resize(std::min(signals, logs.experiment.measured.size()));
   logs.effects = c.effects;
   const std::string folder = ::testing::TempDir() + "diagnose_" + std::to_string(::getpid());
   int number = 0;
@@ -122,18 +119,6 @@ TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
   std::sort(names.begin(), names.end());
   EXPECT_EQ(names[0], "cable_spring@hub");
   EXPECT_EQ(names[1], "coulomb_friction@hub");
-}
-
-// An angle alone shows no difference. One of these logs begins with a step of the command, before whose first row
-// nobody knows what was commanded: no guess of that may tell the two apart.
-TEST(DiagnoseTest, LateCommandAndLateSensorAreToldTogetherFromAnAngle) {
-  const Logs logs = MakeLogs("joint", twin::Kind::kSingle, "command_delay@motor", 3, 1, 1);
-  const Diagnosis d = DiagnoseLogs(logs, {.effort = SearchEffort::kQuick, .next_experiment = false});
-  ASSERT_EQ(d.ambiguous.size(), 1u) << d.explanation;
-  std::set<std::string> together;
-  for (const EffectUse& use : d.ambiguous.front()) together.insert(use.Text());
-  EXPECT_TRUE(together.contains("command_delay@motor"));
-  EXPECT_TRUE(together.contains("sensor_delay@position_rad"));
 }
 
 // A sensor that is off by a constant changes no motion: free runs, too, find the constant.

@@ -8,8 +8,12 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    import gapscope as gs
 
 # scripts/wheel and scripts/bench_python run the first two, test_mjlab.py what is in mjlab.
 collect_ignore = ["try_wheel.py", "bench.py", "mjlab"]
@@ -33,6 +37,20 @@ def experiment() -> str:
 @pytest.fixture
 def demo() -> str:
     return str(ROOT / "demo" / "qube.csv")
+
+
+@pytest.fixture(scope="session")
+def tuned(tmp_path_factory: pytest.TempPathFactory) -> "gs.Tune":
+    """A fit that every test of draws reads: of the first 7 s of the demo's log, most parameters frozen."""
+    import gapscope as gs
+
+    folder = tmp_path_factory.mktemp("tuned")
+    log = folder / "log.csv"
+    log.write_text("".join((ROOT / "demo" / "qube.csv").read_text().splitlines(keepends=True)[:3501]))
+    return gs.tune(
+        ROOT / "models" / "qube" / "experiment.yaml", log, starts=1, out=folder / "out",
+        freeze=["motor.resistance", "motor.km", "arm.mass", "pendulum.mass"],
+    )  # fmt: skip
 
 
 @pytest.fixture

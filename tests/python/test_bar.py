@@ -61,8 +61,8 @@ def test_one_output_a_search_in_a_notebook(
     assert "fit" in line.getvalue() and len(ipython.shown) == 4
 
 
-def test_a_search_calls_it(experiment: str, demo: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_calls_it(experiment: str, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
     ipython = StandIn(monkeypatch, kernel=True)
     options: dict[str, Any] = {"starts": 1, "budget_s": 1, "jobs": 1}
-    gs.tune(experiment, demo, progress=gs.bar, **options)
+    gs.tune(experiment, short, progress=gs.bar, **options)
     assert len({name for name, _, _ in ipython.shown}) == 1 and "fit" in ipython.shown[-1][2]["text/plain"]

@@ -255,7 +255,7 @@ def test_ctrl_c_gives_the_best_so_far(experiment: str, demo: str) -> None:
     assert (partial.out / "model.xml").is_file()
 
 
-def test_an_interrupted_diagnosis_goes_on(experiment: str, demo: str, tmp_path: Path) -> None:
+def test_an_interrupted_diagnosis_goes_on(experiment: str, short: str, tmp_path: Path) -> None:
     """Ctrl-C at the first stage of the search: a verdict so far, and a journal to go on from."""
     stages: list[str] = []
 
@@ -265,7 +265,7 @@ def test_an_interrupted_diagnosis_goes_on(experiment: str, demo: str, tmp_path: 
             os.kill(os.getpid(), signal.SIGINT)
 
     quick: dict[str, Any] = {"effort": "quick", "out": tmp_path, "options": {"no-next-experiment": True}}
-    log = short_log(demo, "half")
+    log = gs.Log(np.genfromtxt(short, delimiter=",", names=True), name="half")
     with pytest.raises(gs.Interrupted) as raised:
         gs.diagnose(experiment, log, progress=first, **quick)
     partial = raised.value.partial
@@ -314,7 +314,8 @@ def test_threads(experiment: str, demo: str) -> None:
 
 def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -> None:
     values = {"coulomb_friction@arm.friction_n_m": 0.0006, "dead_zone@motor.half_width_v": 0.1}
-    result = gs.replay(experiment, demo, with_=["coulomb_friction@arm", "dead_zone@motor"], set=values)
+    log = short_log(demo, "short")
+    result = gs.replay(experiment, log, with_=["coulomb_friction@arm", "dead_zone@motor"], set=values)
     lost = result.export("mujoco_native", tmp_path / "native", timestep=0.001)
     assert [(e.name, e.form) for e in lost.effects] == [("coulomb_friction", "exact"), ("dead_zone", "host")]
     assert lost.time_step_s == 0.001
@@ -329,14 +330,14 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
     assert plain.nplugin == 0 and plain.dof_frictionloss[0] == pytest.approx(0.0006, rel=1e-4)
 
 
-def test_a_tune_is_drawn_from(experiment: str, demo: str, tmp_path: Path) -> None:
+def test_a_tune_is_drawn_from(tuned: gs.Tune, tmp_path: Path) -> None:
     """What stock MuJoCo makes of a draw is the draw: the arrays are named and shaped as its own."""
-    tuned = gs.tune(experiment, demo, freeze=["motor.resistance", "motor.km", "arm.mass", "pendulum.mass"], starts=1)
     out = Path(tuned.export("mujoco_native", tmp_path / "native", draws=20, seed=4).model).parent
     told = json.loads((out / "randomization.json").read_text())
     drawn = np.load(out / "randomization.npz")
     varied = [parameter["name"] for parameter in told["parameters"]]
     assert varied == [parameter.name for parameter in tuned.parameters if parameter.name in varied]
+    assert {"actuator_gainprm", "body_ipos", "dof_damping"} <= set(told["fields"])
     again = tuned.samples(20, seed=4)
     assert set(again) == set(drawn.files)
     np.testing.assert_array_equal(again["parameters"], drawn["parameters"])
@@ -375,7 +376,7 @@ def test_a_result_is_drawn(experiment: str, demo: str, tmp_path: Path) -> None:
     still = result.video(tmp_path / "still.png", log="monday", options=small)
     assert (still.path, still.frames, still.width, still.height) == (tmp_path / "still.png", 1, 320, 240)
     assert "data:image/png" in still._repr_html_()
-    tuned = gs.tune(experiment, demo, freeze=FROZEN[1:], starts=1, budget_s=1)
+    tuned = gs.tune(experiment, short_log(demo, "tuned"), freeze=FROZEN[1:], starts=1, budget_s=1)
     moving = tuned.video(compare=["nominal", result], options={"size": "320x240", "from": 0.5, "to": 0.7, "fps": 10})
     assert moving.path == tuned.out / "video.mp4" and moving.frames == 3
     del tuned

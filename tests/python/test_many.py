@@ -90,7 +90,7 @@ def test_ctrl_c_keeps_what_is_done_and_what_was_found(
     workers: Callable[[int], Executor], experiment: str, demo: str, tmp_path: Path
 ) -> None:
     """One worker: the first group is done, the second under way, the third never begun."""
-    groups = {"first": part(demo, 0), "second": part(demo, 0, 5000), "third": part(demo, 0)}
+    groups = {"first": part(demo, 0), "second": part(demo, 0, 2000), "third": part(demo, 0)}
 
     def soon(progress: gs.Progress) -> None:
         if progress.done == 1:
@@ -144,8 +144,9 @@ def test_a_worker_that_is_interrupted_ends_all(experiment: str, demo: str, tmp_p
             return done
 
     interrupt_when(lambda: any(tmp_path.glob("a/diagnosis.journal/*")))
+    log = part(demo, 0, 2000)
     with pytest.raises(gs.Interrupted) as raised:
-        gs.diagnose_many(experiment, {"a": demo, "b": demo}, Here(), out=tmp_path, **QUICK)
+        gs.diagnose_many(experiment, {"a": log, "b": log}, Here(), out=tmp_path, **QUICK)
     assert [(name, one.termination) for name, one in raised.value.partial.items()] == [("a", "interrupted")]
 
 

@@ -43,8 +43,7 @@ def jax(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "jax.numpy", numpy)
 
 
-def test_each_key_draws_a_row(experiment: str, demo: str, tmp_path: Path, jax: None) -> None:
-    tuned = gs.tune(experiment, demo, freeze=["motor.resistance", "motor.km", "arm.mass", "pendulum.mass"], starts=1)
+def test_each_key_draws_a_row(tuned: gs.Tune, tmp_path: Path, jax: None) -> None:
     lost = tuned.export("mjx", tmp_path / "to", draws=10, seed=4)
     assert [Path(path).name for path in lost.files] == ["gapscope_playground.py"]
     made = runpy.run_path(lost.files[0])

@@ -10,8 +10,9 @@ struct FitPolicy {
   // A window's initial state as the log has it counts as much as this many samples at the window's start.
   double state_prior_samples = 5;
   // How long what was commanded before a log's first row may still act: longer than any delay of the catalogue. Windows
-  // begin later, or a delay would be judged by a guess.
-  double unknown_past_s = 0.08;
+  // begin later, or a delay would be judged by a guess. Not so where the log begins at rest, nothing having acted: its
+  // angles then change over the first `start_s` by at most this share of the most that they ever do in as long.
+  double unknown_past_s = 0.08, start_s = 0.01, rest_share = 0.1;
   // How far the log's own initial speed is trusted: position over this time. The slope of a parabola through 40 ms of a
   // swing of 5 Hz is 4 % off, more than its standard error: kInitialFitHalfWidth_s here made fitted inertias 0.3 %
   // wrong with intervals half as wide.

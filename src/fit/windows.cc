@@ -18,10 +18,27 @@ std::size_t FirstScored(const Recording& recording, const Window& rows, double l
   return first;
 }
 
+bool BeginsAtRest(const Recording& recording) {
+  const auto& time = recording.time_s;
+  std::size_t start = 1;
+  while (start + 1 < time.size() && time[start] < time.front() + kFitPolicy.start_s) ++start;
+  return std::ranges::all_of(recording.measured, [&](const Recording::Measured& measured) {
+    if (measured.spec.kind != SignalKind::kPosition) return true;
+    const auto& values = measured.values;
+    double most = 0;
+    for (std::size_t i = 0; i + start < values.size(); ++i) {
+      const double change = std::abs(values[i + start] - values[i]);
+      if (change > most) most = change;
+    }
+    return !(std::abs(values[start] - values[0]) > kFitPolicy.rest_share * most);
+  });
+}
+
 // The windows of a log as it is cut, but for its unknown past: the first one begins where that has passed, or goes
 // where that leaves less than half of it. A log's only window keeps at least its second half.
 std::vector<Window> KnownWindows(const Recording& recording, double window_s) {
   std::vector<Window> known, all = MakeWindows(recording, ReplayMode::kWindows, window_s);
+  if (all.empty() || BeginsAtRest(recording)) return all;
   const auto& time = recording.time_s;
   for (Window window : all) {
     const std::size_t half = window.rows() / 2, whole = window.begin;

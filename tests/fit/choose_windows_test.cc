@@ -90,7 +90,7 @@ TEST(ChooseWindowsTest, LogsNeedNotBeAlike) {
 
 // Before a log's first row nobody knows what was commanded.
 TEST(TakenWindowsTest, NoneBeginsWhereAnUnknownPastMayAct) {
-  const Recording recording = MostlyAtRest(4, {1});
+  const Recording recording = MostlyAtRest(4, {0, 1, 2, 3});
   const std::vector<LogWindow> seconds = TakenWindows({recording}, {});
   ASSERT_EQ(seconds.size(), 4u);
   EXPECT_DOUBLE_EQ(recording.time_s[seconds[0].rows.begin], 0.08);
@@ -101,6 +101,8 @@ TEST(TakenWindowsTest, NoneBeginsWhereAnUnknownPastMayAct) {
   const std::vector<LogWindow> whole = TakenWindows({MostlyAtRest(1, {0})}, {.window_s = 5});
   ASSERT_EQ(whole.size(), 1u);
   EXPECT_EQ(whole[0].rows.begin, 8u);
+  // What stands still was not acted upon.
+  EXPECT_EQ(TakenWindows({MostlyAtRest(4, {1})}, {})[0].rows.begin, 0u);
 }
 
 }  // namespace

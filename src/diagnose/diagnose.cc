@@ -232,10 +232,12 @@ double FinestStep(const DataSplit& data) {
   return step_s;
 }
 
-void NameLogs(const DataSplit& data, Diagnosis* result) {
-  for (const auto& recording : data.train) result->train_logs.push_back(recording.log_path);
-  for (const auto& recording : data.held_out) result->held_out_logs.push_back(recording.log_path);
-  result->split = data.how;
+void SayWhatWasFitted(const Workbench& bench, Diagnosis* result) {
+  for (const auto& recording : bench.data.train) result->train_logs.push_back(recording.log_path);
+  for (const auto& recording : bench.data.held_out) result->held_out_logs.push_back(recording.log_path);
+  result->split = bench.data.how;
+  result->time_step_s = bench.time_step_s;
+  result->windows = {.fitted = bench.windows->size(), .all = bench.all_windows, .length_s = bench.window_s};
 }
 
 // Of the search; `replay_steps`: of one replay of the training windows.
@@ -309,9 +311,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   GS_ASSIGN(Diagnosis result, Describe(*found, *at, describe, say));
   result.work += lead.work;
   result.most_steps += lead.work.steps;
-  NameLogs(at->data, &result);
-  result.time_step_s = at->time_step_s;
-  result.windows = {.fitted = at->windows->size(), .all = at->all_windows, .length_s = at->window_s};
+  SayWhatWasFitted(*at, &result);
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.interrupted = deadline.stopped();
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -61,7 +61,7 @@ struct Dense {
   Eigen::VectorXd residual;  // at zero states and offset, the nominal gain
 };
 Dense DenseProblem(const Rig& rig, const Recording& recording, double lead_in_s) {
-  const auto windows = MakeWindows(recording, ReplayMode::kWindows, 0.5);
+  const std::vector<LogWindow> windows = TakenWindows({recording}, {.window_s = 0.5});
   const auto& y = recording.measured.front().values;
   const double weight = 1 / Deviation(y), gain = rig.model->Nominal()[0];
   const double scale = std::max(1.5, 0.05 * 20);  // of the gain's coordinate
@@ -70,7 +70,7 @@ Dense DenseProblem(const Rig& rig, const Recording& recording, double lead_in_s)
   std::vector<double> residual;
   const std::size_t columns = 2 + 2 * windows.size();
   for (std::size_t w = 0; w < windows.size(); ++w) {
-    const Window window = windows[w];
+    const Window window = windows[w].rows;
     const std::vector<double> u(recording.commands[0].values.begin() + static_cast<std::ptrdiff_t>(window.begin),
                                 recording.commands[0].values.begin() + static_cast<std::ptrdiff_t>(window.end));
     const std::vector<double> zero(u.size(), 0.0);

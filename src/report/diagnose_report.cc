@@ -165,7 +165,7 @@ std::string StatementTable(const Diagnosis& d) {
   text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
   if (!bounds.empty()) {
     const char* more = absent > kMostBounds ? ", ... (--json: all)" : "";
-    text += Wrapped("at most (of a limit: at least; 95 %): " + bounds + more, 120, "  ") + "\n";
+    text += Wrapped("at most (of a limit or a compliance: at least; 95 %): " + bounds + more, 120, "  ") + "\n";
   }
   return text;
 }

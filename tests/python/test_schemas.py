@@ -183,7 +183,7 @@ EXTRA = {
     "Tune": {*MADE_BY, "command_shift_s", "correlated", "cost", "effects", "force_shift_s", "left_frozen", "model"}
     | {"replays", "solve_s", "spread", "starts", "starts_agree", "time_step_s"},
     "Diagnosis": {*MADE_BY, "at_bounds", "budget", "candidates", "evidence", "left_out", "logs", "model", "policy"}
-    | {"refit_model", "remainder", "remains", "while"},
+    | {"refit_model", "remainder", "remains", "time_step_s", "while", "windows"},
     "Interval": {"ratio"},
     "Gap": {"held_out"},
     "Statement": {"blocks", "evidence", "group", "numbers", "prior", "rivals", "seen_beside", "with", "without"},

@@ -32,7 +32,7 @@ Result<int> RunApply(const ApplyFlags& flags) {
                .out = flags.common.out,
                .setter = experiment.settings.empty() ? "" : experiment.path,
                .changes = applied.changes,
-               .time_step_s = json.contains("time_step_s") ? NumberFrom(json["time_step_s"]) : kNaN,
+               .time_step_s = NumberIn(json, "time_step_s"),
                .model_time_step_s = result.model->rig()->compiled().opt.timestep,
                .left_out = applied.left_out};
   run.needs_plugins = applied.text.find("plugin=\"gapscope.") != std::string::npos;

@@ -38,9 +38,11 @@ void ChooseWindows(const Model& model, std::size_t max_windows, Workbench* bench
   bench->max_windows = max_windows;
   bench->windows.reset();
   FitOptions options = bench->Options(model, true);
-  bench->windows = std::make_shared<const std::vector<LogWindow>>(TakenWindows(bench->data.train, options));
   options.max_windows = 0;
-  bench->all_windows = TakenWindows(bench->data.train, options).size();
+  const std::vector<LogWindow> all = TakenWindows(bench->data.train, options);
+  bench->all_windows = all.size();
+  bench->windows =
+      std::make_shared<const std::vector<LogWindow>>(gapscope::ChooseWindows(bench->data.train, all, max_windows));
 }
 
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use) {

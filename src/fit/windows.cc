@@ -25,12 +25,11 @@ bool BeginsAtRest(const Recording& recording) {
   return std::ranges::all_of(recording.measured, [&](const Recording::Measured& measured) {
     if (measured.spec.kind != SignalKind::kPosition) return true;
     const auto& values = measured.values;
-    double most = 0;
-    for (std::size_t i = 0; i + start < values.size(); ++i) {
-      const double change = std::abs(values[i + start] - values[i]);
-      if (change > most) most = change;
-    }
-    return !(std::abs(values[start] - values[0]) > kFitPolicy.rest_share * most);
+    const double first = std::abs(values[start] - values[0]);
+    bool moves_more = !std::isfinite(first);
+    for (std::size_t i = 0; i + start < values.size() && !moves_more; ++i)
+      moves_more = kFitPolicy.rest_share * std::abs(values[i + start] - values[i]) >= first;
+    return moves_more;
   });
 }
 

@@ -8,6 +8,7 @@
 
 #include "src/core/names.h"
 #include "src/report/json.h"
+#include "src/report/read_json.h"
 #include "src/report/words.h"
 
 namespace gapscope {
@@ -21,10 +22,6 @@ constexpr int kDigits = 3;  // of a number in a comment
 struct Interval {
   double low = kNaN, high = kNaN;
 };
-
-double NumberIn(const ordered_json& json, const char* key) {
-  return json.contains(key) && json[key].is_number() ? json[key].get<double>() : kNaN;
-}
 
 // An entry of a list by NAME@ON; null: it has none.
 const ordered_json* EntryOf(const ordered_json& result, const char* list, const EffectUse& use) {

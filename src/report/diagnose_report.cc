@@ -143,8 +143,8 @@ std::string RemainderText(const Remainder& remainder) {
 }
 
 // What is there, what was considered and is not, and how large the others may be.
-constexpr std::size_t kMostBounds = 30;
 std::string StatementTable(const Diagnosis& d) {
+  constexpr std::size_t kMostBounds = 30;
   std::string text =
       fmt::format("\n{:>2} {:<34} {:<8} {:>11}  {}\n", "", "effect", "answer", "probability", "rests on");
   std::string bounds;

@@ -112,8 +112,8 @@ std::vector<std::string> SentencesOn(const Statement& s) {
     sentences.push_back(fmt::format("{}: {} (95 %: {} .. {}).", size.key, ShortNumber(size.value, 4),
                                     ShortNumber(size.low, 4), ShortNumber(size.high, 4)));
   for (const EffectEstimate& bound : s.bounds)
-    sentences.push_back(fmt::format("With 95 % probability {} is at most {} (of a limit: at least).", bound.key,
-                                    ShortNumber(bound.value, 3)));
+    sentences.push_back(fmt::format("With 95 % probability {} is at most {} (of a limit or a compliance: at least).",
+                                    bound.key, ShortNumber(bound.value, 3)));
   return sentences;
 }
 

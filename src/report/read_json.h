@@ -15,6 +15,11 @@ namespace gapscope {
 // Null stands for a number that does not exist.
 inline double NumberFrom(const nlohmann::ordered_json& json) { return json.is_null() ? kNaN : json.get<double>(); }
 
+// An entry of an object; NaN: it has none that is a number.
+inline double NumberIn(const nlohmann::ordered_json& json, const char* key) {
+  return json.contains(key) && json[key].is_number() ? json[key].get<double>() : kNaN;
+}
+
 // As JsonModel wrote it.
 RunModel RunModelFrom(const nlohmann::ordered_json& json);
 // The model of a whole result, with the experiment that the result names.

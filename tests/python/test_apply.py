@@ -1,6 +1,7 @@
 """The changed MJCF in the user's own MuJoCo: the error that was promised comes out of the stock package alone."""
 
-import csv
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 import gapscope as gs
 
+REPLAY = Path(__file__).resolve().parents[1] / "replay" / "replay_in_python.py"
 SIZES = {
     "cable_spring@arm.stiffness_n_m_per_rad": 1.2e-3,
     "cable_spring@arm.rest_rad": -0.4,
@@ -15,26 +17,17 @@ SIZES = {
 }
 
 
-def stock_error(model_path: Path, log: str, time_step_s: float) -> float:
+def stock_error(model: Path, log: str, time_step_s: float) -> float:
     """The root mean square over the signals of each one's error over its standard deviation, in one free run."""
-    mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_path(str(model_path))
-    # Dry friction written "as stiff as the step allows" (solreffriction="-1 ...") follows the step that is used.
-    stiff = model.dof_solref[:, 0] == -1
-    model.dof_solref[stiff, 1] = -0.9999 / time_step_s
-    model.opt.timestep = time_step_s
-    data = mujoco.MjData(model)
-    with open(log, newline="") as file:
-        rows = np.array(list(csv.reader(file))[1:], dtype=float)
-    signals = ["arm", "pendulum"]
-    predicted = np.empty((len(rows), len(signals)))
-    for k, (now, volts, *_) in enumerate(rows):
-        predicted[k] = [data.joint(name).qpos[0] for name in signals]
-        data.ctrl[0] = volts
-        last = rows[min(k + 1, len(rows) - 1), 0]
-        for _ in range(round((last - now) / model.opt.timestep)):
-            mujoco.mj_step(model, data)
-    measured = rows[:, 2:4]
+    pytest.importorskip("mujoco")
+    rows = np.genfromtxt(log, delimiter=",", names=True)
+    commands, states = model.with_suffix(".csv"), model.with_suffix(".states")
+    given = np.transpose([rows["time_s"], rows["voltage_v"]])
+    np.savetxt(commands, given, "%.17g", ",", header="time_s,motor", comments="")
+    replay = [sys.executable, REPLAY, gs.plugin_library(), model, commands, repr(time_step_s), states]
+    subprocess.run(list(map(str, replay)), check=True)
+    predicted = np.fromfile(states).reshape(len(rows), -1)[:, :2]
+    measured = np.transpose([rows["arm_rad"], rows["pendulum_rad"]])
     square = ((predicted - measured) ** 2).mean(axis=0) / measured.var(axis=0)
     return float(np.sqrt(square.mean()))
 

@@ -90,8 +90,8 @@ function writeStatements(statements) {
       "p",
       {class: "note"},
       "Gain: logarithm of the cost without the effect over the cost with it, all else refitted; on the fitted logs, on "
-        + "logs held out, and over whole logs. Size, at most: with 95 % probability, of what is absent (of a limit: at "
-        + "least). Unseen: the base model's parameters do all that it would do.",
+        + "logs held out, and over whole logs. Size, at most: with 95 % probability, of what is absent (of a limit "
+        + "or a compliance: at least). Unseen: the base model's parameters do all that it would do.",
     ),
   );
   show("statements");

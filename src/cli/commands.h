@@ -19,6 +19,8 @@ struct Command {
   std::function<Result<int>()> run;  // gives the exit status; none where there are commands below this one
   std::vector<Command> commands;
   std::vector<std::string>* plugins = nullptr;  // where the words of --plugin go, of a command that has to know them
+  // Of a command that goes on without plugins: told how its run crashed, it leaves them out. False: it has none.
+  std::function<bool(const std::string&)> leave_out_plugins;
 };
 
 Command InitCommand();

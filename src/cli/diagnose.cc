@@ -1,5 +1,6 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -179,6 +180,12 @@ std::vector<Option> OptionsOf(CommandFlags& flags) {
                CommonOptions(flags.common)});
 }
 
+bool HasPluginCandidates(const std::string& path) {
+  const auto experiment = LoadExperiment(path);
+  return experiment.ok() &&
+         std::ranges::any_of(experiment.value().candidates, [](const OwnEffect& own) { return !own.plugin.empty(); });
+}
+
 }  // namespace
 
 Command DiagnoseCommand() {
@@ -188,7 +195,14 @@ Command DiagnoseCommand() {
           .options = OptionsOf(*flags),
           .example = "gapscope diagnose models/qube/experiment.yaml a.csv b.csv c.csv --hold-out d.csv --out diagnosis",
           .run = [flags] { return RunDiagnose(*flags); },
-          .plugins = &flags->plugins};
+          .plugins = &flags->plugins,
+          .leave_out_plugins =
+              [flags](const std::string& crash) {
+                if (!HasPluginCandidates(flags->model.experiment)) return false;
+                flags->plugin_fault = crash.empty() ? "" : "the diagnosis crashed with it: " + crash;
+                flags->resume = flags->resume && crash.empty();
+                return true;
+              }};
 }
 
 }  // namespace gapscope::cli

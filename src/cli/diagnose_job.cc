@@ -180,6 +180,9 @@ Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags, StageClock* clock) 
   ThreadPool pool(WorkersOf(flags.common));
   GS_ASSIGN(Experiment experiment, LoadExperiment(flags.model.experiment));
   if (!flags.model.while_column.empty()) experiment.replay.while_column = flags.model.while_column;
+  for (OwnEffect& own : experiment.candidates) {
+    if (!own.plugin.empty()) own.fault = flags.plugin_fault;
+  }
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
   GS_ASSIGN(auto recordings, LoadRecordings(experiment, logs.all, pool));
   PrintFindings(recordings, flags.common.quiet);

@@ -16,6 +16,7 @@ struct DiagnoseFlags {
   ModelFlags model;
   std::vector<std::string> hold_out, prior, accept, freeze;
   std::string from;
+  std::string plugin_fault;  // why candidates that are plugins are left out; empty: they are not
   SearchEffort effort = SearchEffort::kNormal;
   double budget_s = 0, window_s = 0;
   bool resume = false, no_next_experiment = false;

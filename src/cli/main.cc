@@ -10,6 +10,7 @@
 #include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
+#include "src/core/apart.h"
 
 namespace gapscope::cli {
 namespace {
@@ -27,8 +28,17 @@ int Main(int argc, char** argv) {
   const auto command = ReadArguments(argc, argv, commands, &status);
   if (!command.ok()) return Refuse(command.error(), json);
   if (!command.value()) return status;
-  const auto done = command.value()->run();
-  return done.ok() ? done.value() : Refuse(done.error(), json);
+  const auto run = [&] {
+    const auto done = command.value()->run();
+    return done.ok() ? done.value() : Refuse(done.error(), json);
+  };
+  const auto& leave_out = command.value()->leave_out_plugins;
+  if (!leave_out || !leave_out("")) return run();
+  const ApartEnd end = RunApart(run);
+  if (end.crash.empty()) return end.status;
+  leave_out(end.crash);
+  Print(stderr, "warning: the run crashed ({}); it is made again without the candidates that are plugins\n", end.crash);
+  return run();
 }
 
 }  // namespace

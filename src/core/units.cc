@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <map>
 #include <numbers>
+#include <sstream>
 #include <vector>
 
 #include "src/core/names.h"
@@ -33,6 +34,24 @@ const std::map<std::string, Unit, std::less<>>& Table() {
   return table;
 }
 
+// Powers of s, m, kg, A, degC.
+const std::map<std::string, Dimension, std::less<>>& Symbols() {
+  static const std::map<std::string, Dimension, std::less<>> symbols = {
+      {"1", {}},
+      {"rad", {}},
+      {"s", {1}},
+      {"m", {0, 1}},
+      {"kg", {0, 0, 1}},
+      {"A", {0, 0, 0, 1}},
+      {"degC", {0, 0, 0, 0, 1}},
+      {"N", {-2, 1, 1}},
+      {"W", {-3, 2, 1}},
+      {"V", {-3, 2, 1, -1}},
+      {"ohm", {-3, 2, 1, -2}},
+  };
+  return symbols;
+}
+
 }  // namespace
 
 Result<Unit> ParseUnit(std::string_view text) {
@@ -49,23 +68,45 @@ Result<Unit> ParseUnit(std::string_view text) {
   return error;
 }
 
-Status CheckSiUnit(std::string_view text) {
-  static const std::vector<std::string> kSymbols = {"1", "rad", "s", "m", "kg", "N", "V", "A", "W", "ohm", "degC"};
+Result<Dimension> ParseSiUnit(std::string_view text) {
+  Dimension product{};
+  double sign = 1;
   std::size_t at = 0;
   do {
     const std::size_t end = std::min(text.find_first_of(" /", at), text.size());
     std::string symbol(text.substr(at, end - at));
+    double power = 1;
+    if (const auto last = symbol.find_last_not_of("0123456789^-"); last != std::string::npos) {
+      const std::size_t digits = symbol.find_first_not_of('^', last + 1);
+      if (digits != std::string::npos) power = std::strtod(symbol.c_str() + digits, nullptr);
+      symbol.resize(last + 1);
+    }
+    const auto known = Symbols().find(symbol);
+    if (known == Symbols().end()) {
+      std::vector<std::string> names;
+      for (const auto& [name, dimension] : Symbols()) names.push_back(name);
+      Error error = NoSuch("unknown unit", std::string(text), names, "");
+      error.allowed = "powers of " + error.allowed + ", as in N m s/rad";
+      const auto other = Table().find(symbol);
+      error.cure = other != Table().end() ? "write the value in " + other->second.si : DidYouMean(symbol, names);
+      return error;
+    }
+    for (std::size_t i = 0; i < product.size(); ++i) product[i] += sign * power * known->second[i];
+    sign = end < text.size() && text[end] == '/' ? -1 : 1;
     at = end + 1;
-    if (const auto power = symbol.find_last_not_of("0123456789^-"); power != std::string::npos)
-      symbol.resize(power + 1);
-    if (std::find(kSymbols.begin(), kSymbols.end(), symbol) != kSymbols.end()) continue;
-    Error error = NoSuch("unknown unit", std::string(text), kSymbols, "");
-    error.allowed = "powers of " + error.allowed + ", as in N m s/rad";
-    const auto other = Table().find(symbol);
-    error.cure = other != Table().end() ? "write the value in " + other->second.si : DidYouMean(symbol, kSymbols);
-    return error;
   } while (at <= text.size());
-  return Ok();
+  return product;
+}
+
+std::string TextOf(const Dimension& dimension) {
+  constexpr std::array kNames{"s", "m", "kg", "A", "degC"};
+  std::ostringstream text;
+  for (const std::size_t i : {2, 1, 0, 3, 4}) {
+    if (dimension[i] == 0) continue;
+    text << (text.view().empty() ? "" : " ") << kNames[i];
+    if (dimension[i] != 1) text << '^' << dimension[i];
+  }
+  return text.view().empty() ? "1" : text.str();
 }
 
 }  // namespace gapscope

@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_CORE_UNITS_H_
 #define GAPSCOPE_CORE_UNITS_H_
 
+#include <array>
 #include <string>
 #include <string_view>
 
@@ -17,9 +18,14 @@ struct Unit {
 // "deg", "rpm", "ms", "mA", "counts/2048" ... Errors: unknown unit, with the nearest known one.
 Result<Unit> ParseUnit(std::string_view text);
 
+// Powers of s, m, kg, A and degC; rad is 1.
+using Dimension = std::array<double, 5>;
+
 // "N m s/rad", "kg m^2", "1/s": whole powers of SI's symbols, '/' before each one that divides. Error: another unit,
 // with the nearest symbol, or what it is in SI.
-Status CheckSiUnit(std::string_view text);
+Result<Dimension> ParseSiUnit(std::string_view text);
+// "kg m^2 s^-2"; "1".
+std::string TextOf(const Dimension& dimension);
 
 }  // namespace gapscope
 

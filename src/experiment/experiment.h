@@ -158,6 +158,7 @@ struct OwnEffect {
   std::vector<FieldSetting> settings = {};  // expressions of its own and the experiment's parameters, and log values
   std::vector<OwnParameter> parameters = {};
   std::string where = "", torque_where = "";  // file:line:column, for errors; torque_where: of the plugin too
+  std::string fault = "";                     // why it is not asked about; empty: it is
 };
 
 // An effect that is not asked about, on one place or (empty) on all.

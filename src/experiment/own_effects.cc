@@ -48,7 +48,7 @@ Status ReadParameter(const YAML::Node& key, const YAML::Node& node, const std::s
   YamlMap map(node, path, "the parameter '" + p->key + "'");
   p->where = YamlPlace(path, key);
   p->unit = map.Text("unit");
-  if (const Status unit = CheckSiUnit(p->unit); !unit.ok()) map.Fail(node, unit.error());
+  if (const auto unit = ParseSiUnit(p->unit); !unit.ok()) map.Fail(node, unit.error());
   const std::vector<double> bounds = map.NumberList("bounds", 2);
   if (bounds.size() == 2) {
     p->low = bounds[0], p->high = bounds[1];

@@ -8,6 +8,7 @@
 #include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/experiment/expression.h"
+#include "src/experiment/formula_units.h"
 #include "src/model/fields.h"
 #include "src/model/own_probe.h"
 #include "src/model/rig.h"
@@ -106,6 +107,21 @@ Status CheckJoint(const OwnEffect& own, const Rig& rig) {
                  .allowed = "angle, speed, time and parameters"};
   }
   return Ok();
+}
+
+// Of the torque's formula. The command is in the unit of its column.
+Status CheckUnits(const OwnEffect& own, const Rig& rig) {
+  const mjModel& m = rig.compiled();
+  const bool slides = m.jnt_type[mj_name2id(&m, mjOBJ_JOINT, own.joint.c_str())] == mjJNT_SLIDE;
+  std::map<std::string, std::string> units;
+  for (const OwnParameter& p : own.parameters) units[p.key] = p.unit;
+  units[plugins::kFormulaInputs[plugins::kAngle]] = slides ? "m" : "rad";
+  units[plugins::kFormulaInputs[plugins::kSpeed]] = slides ? "m/s" : "rad/s";
+  units[plugins::kFormulaInputs[plugins::kTime]] = "s";
+  for (const CommandSpec& command : rig.experiment().commands) {
+    if (command.actuator == rig.ActuatorOf(own.joint)) units[plugins::kFormulaInputs[plugins::kCommand]] = command.unit;
+  }
+  return CheckFormulaUnits(own.torque, units, slides ? "N" : "N m", own.torque_where);
 }
 
 Status CheckTorque(const OwnEffect& own, OwnProbe& probe) {
@@ -266,8 +282,9 @@ Result<CandidateEffects> OwnCandidates(const Rig& rig) {
                    .cure = "rename the candidate"};
     }
     if (!own.joint.empty()) GS_RETURN_IF_ERROR(CheckJoint(own, rig));
+    if (!own.torque.empty()) GS_RETURN_IF_ERROR(CheckUnits(own, rig));
     if (!own.plugin.empty()) {
-      if (const std::string fault = FaultOfPlugin(own, rig); !fault.empty()) {
+      if (const std::string fault = own.fault.empty() ? FaultOfPlugin(own, rig) : own.fault; !fault.empty()) {
         own_effects.left_out.push_back({own.name, fault});
         continue;
       }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "tests/experiment/scratch.h"
@@ -48,6 +49,31 @@ TEST_F(OwnCandidateTest, IsNamedAndSizedByADiagnosis) {
     EXPECT_NEAR(size["value"].get<double>(), truth, 0.1 * std::abs(truth)) << size;
   }
   for (const auto& candidate : result["candidates"]) EXPECT_NE(candidate["name"], "cogging");
+}
+
+// A plugin that was tried and ran well crashes in the middle of the search.
+TEST_F(OwnCandidateTest, OneThatCrashesLateIsLeftOut) {
+  const std::string robot = scratch_.Write("late.yaml", R"(model: )" GAPSCOPE_SOURCE_DIR R"(/models/joint/joint.xml
+log: {time: {column: time_s, unit: s}}
+commands:
+  - {actuator: motor, column: target_rad, unit: rad}
+measured:
+  - {signal: position_rad, column: position_rad, joint: joint, unit: rad}
+candidates:
+  - name: late
+    joint: joint
+    plugin: faulty.late
+    parameters: {size: {unit: N m/rad, bounds: [0, 20], trials: [1, 5]}}
+)");
+  const std::string out = scratch_.Path("out");
+  const Answer answer = Run("diagnose", robot, "--budget 5 --plugin '" GAPSCOPE_FAULTY_PLUGINS "' --out '" + out + "'");
+  ASSERT_EQ(answer.status, 0) << answer.err;
+  EXPECT_NE(answer.err.find("the run crashed (Segmentation fault)"), std::string::npos) << answer.err;
+  const auto result = nlohmann::json::parse(answer.out);
+  ASSERT_EQ(result["left_out"].size(), 1u);
+  EXPECT_NE(result["left_out"][0]["why"].get<std::string>().find("crashed with it"), std::string::npos);
+  EXPECT_FALSE(result["statements"].empty());
+  EXPECT_TRUE(std::filesystem::exists(out + "/report.html"));
 }
 
 TEST_F(OwnCandidateTest, ExportedModelReplaysAlike) {

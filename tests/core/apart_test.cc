@@ -1,6 +1,7 @@
 #include "src/core/apart.h"
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -35,6 +36,36 @@ TEST(TryApartTest, ChangesNothingHere) {
     return std::string();
   });
   EXPECT_EQ(here, 1);
+}
+
+TEST(RunApartTest, GivesTheStatusOrTheCrash) {
+  EXPECT_EQ(RunApart([] { return 3; }).status, 3);
+  EXPECT_EQ(RunApart([] { return 3; }).crash, "");
+  EXPECT_EQ(RunApart([] { return raise(SIGSEGV); }).crash, "Segmentation fault");
+  EXPECT_EQ(RunApart([]() -> int { throw std::runtime_error("no table"); }).crash, "no table");
+}
+
+// The parent of both is the one that is interrupted.
+TEST(RunApartTest, PassesInterruptionsOn) {
+  const auto interrupted_in = [](int sign) {
+    const pid_t tester = fork();
+    if (tester == 0) {
+      const pid_t waits = getpid();
+      const ApartEnd end = RunApart([&] {
+        static volatile sig_atomic_t caught = 0;
+        signal(sign, [](int) { caught = 1; });
+        kill(waits, sign);
+        for (int i = 0; i < 100 && !caught; ++i) usleep(50'000);
+        return caught ? 5 : 6;
+      });
+      _exit(end.status);
+    }
+    int status = 0;
+    waitpid(tester, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  };
+  EXPECT_EQ(interrupted_in(SIGINT), 5);
+  EXPECT_EQ(interrupted_in(SIGTERM), 5);
 }
 
 }  // namespace

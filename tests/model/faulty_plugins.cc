@@ -1,7 +1,9 @@
 // Plugins that a run must survive, and one that acts at its neutral values.
 #include <mujoco/mujoco.h>
 
+#include <atomic>
 #include <csignal>
+#include <string>
 
 namespace {
 
@@ -18,6 +20,16 @@ mjpPlugin Plugin(const char* name, void (*compute)(const mjModel*, mjData*, int,
 
 void Idle(const mjModel*, mjData*, int, int) {}
 
+// A spring about zero by the numeric INSTANCE.size, which crashes long after a run has tried it.
+void CrashLate(const mjModel* m, mjData* d, int instance, int) {
+  constexpr int kLate = 20000;
+  static std::atomic<int> calls = 0;
+  if (++calls > kLate) raise(SIGSEGV);
+  const std::string name = mj_id2name(m, mjOBJ_PLUGIN, instance);
+  const int size = mj_name2id(m, mjOBJ_NUMERIC, (name + ".size").c_str());
+  d->qfrc_passive[0] -= m->numeric_data[m->numeric_adr[size]] * d->qpos[0];
+}
+
 }  // namespace
 
 mjPLUGIN_LIB_INIT(faulty) {
@@ -26,6 +38,8 @@ mjPLUGIN_LIB_INIT(faulty) {
   const mjpPlugin fatal =
       Plugin("faulty.fatal", +[](const mjModel*, mjData*, int, int) { mju_error("the table is empty"); });
   mjp_registerPlugin(&fatal);
+  const mjpPlugin late = Plugin("faulty.late", CrashLate);
+  mjp_registerPlugin(&late);
   mjpPlugin refuses = Plugin("faulty.refuses", Idle);
   refuses.init = +[](const mjModel*, mjData*, int) { return -1; };
   mjp_registerPlugin(&refuses);

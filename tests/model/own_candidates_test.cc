@@ -205,6 +205,8 @@ TEST(OwnCandidateErrorsTest, SayWhatAndWhere) {
        "name: eccentric\n    joint: hing",
        {"experiment.yaml:16:", "did you mean 'hinge'?"}},
       {"name: eccentric\n    joint: hinge", "name: eccentric", {"neither a torque nor a change of fields"}},
+      {"share: {unit: 1,", "share: {unit: s,", {"experiment.yaml:25:", "not in N m", "kg m^2 s^-1"}},
+      {"sin(angle - phase)", "sin(angle - speed * phase)", {"experiment.yaml:19:", "1 beside s^-1"}},
       {"name: leaky_drive\n    joint: hinge", "name: leaky_drive\n    joint: wrist", {"has no drive"}},
       {"body/tip/mass", "body/tipp/mass", {"experiment.yaml:28:", "did you mean 'tip'?"}},
       {"body/tip/mass", "body/tip/mas", {"experiment.yaml:28:", "did you mean 'mass'?"}},

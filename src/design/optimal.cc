@@ -105,15 +105,6 @@ double Relative(const SearchSpace& space, std::size_t k, double deviation) {
   return value != 0 ? deviation * c.scale / std::abs(value) : deviation / (c.high - c.low);
 }
 
-// Whether it has all effects of the other one, and more.
-bool HasMore(const Hypothesis& rival, const Hypothesis& other) {
-  const auto& more = rival.model->effects();
-  const auto& less = other.model->effects();
-  return more.size() > less.size() && std::all_of(less.begin(), less.end(), [&](const EffectUse& use) {
-           return std::find(more.begin(), more.end(), use) != more.end();
-         });
-}
-
 // Each rival's log on this input, imitated by every other one.
 void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& options, int jacobians, InputScore* score) {
   const Recording& input = score->rehearsal.recording;
@@ -127,7 +118,7 @@ void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& optio
     const Rehearsal foretold = Rehearse(*truth.model, simulator, input, truth.values);
     for (const Hypothesis& imitation : rivals) {
       if (&truth == &imitation) continue;
-      if (HasMore(imitation, truth)) {
+      if (Holds(imitation, truth)) {
         score->per_target.push_back(0);
         continue;
       }
@@ -144,6 +135,19 @@ void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& optio
 }
 
 }  // namespace
+
+bool Holds(const Hypothesis& rival, const Hypothesis& other) {
+  const auto &mine = rival.model->effects(), &others = other.model->effects();
+  const auto holds = [&](const EffectUse& richer, const EffectUse& simpler) {
+    if (richer == simpler) return true;
+    const auto& contains = EffectOf(richer, *rival.model->rig()).contains;
+    return richer.on == simpler.on && std::ranges::find(contains, simpler.effect, &Contained::effect) != contains.end();
+  };
+  const bool all = std::ranges::all_of(others, [&](const EffectUse& simpler) {
+    return std::ranges::any_of(mine, [&](const EffectUse& richer) { return holds(richer, simpler); });
+  });
+  return all && mine != others;
+}
 
 std::vector<LibraryInput> InputLibrary(double duration_s, double rate_hz) {
   const double top = std::min(10.0, rate_hz / 8), low = 1 / duration_s;

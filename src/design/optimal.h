@@ -7,7 +7,7 @@
 // "Dynamic System Identification", 1977, ch. 6.
 //
 // Effects: each rival's prediction is imitated by every other one, as `tune` would fit it. What is left, in sensor
-// floors, is how well the input separates the two (one that only has more effects imitates it fully, and is not asked);
+// floors, is how well the input separates the two (one that holds the other imitates it fully, and is not asked);
 // the input whose least separated pair is farthest apart wins (Hunter and Reiner, "Designs for discriminating between
 // two rival models", Technometrics 7, 1965).
 #ifndef GAPSCOPE_DESIGN_OPTIMAL_H_
@@ -65,6 +65,9 @@ Result<OptimalDesign> DesignForParameters(const Hypothesis& base, const std::vec
 // `rivals`: at least two. Errors: as above, and a rival that cannot be simulated.
 Result<OptimalDesign> DesignForRivals(const Hypothesis& base, const std::vector<Hypothesis>& rivals,
                                       const OptimalOptions& options, ThreadPool& pool);
+
+// Whether a rival has all effects of the other one, or in their places effects that contain them, and more.
+bool Holds(const Hypothesis& rival, const Hypothesis& other);
 
 // The command that makes an input again.
 std::string CommandFor(const std::string& experiment, const RehearsalOptions& rehearsal, const InputScore& input);

@@ -156,6 +156,10 @@ struct VerdictEvidence {
   double free_run_before = 0, free_run_left = 0, free_run_removed = 0;
 };
 
+// Of the errors of two free runs: both are further off than the signals' mean. Unstable plants end so, and runs that
+// swing over at another time: nothing can be seen there.
+inline bool AreLost(double before, double after) { return before > 1 && after > 1; }
+
 // Pieces that logs are fitted in; of long logs those that say most.
 struct FittedWindows {
   std::size_t fitted = 0, all = 0;  // of the training logs

@@ -21,10 +21,9 @@ double GainOf(double before, double after) {
   return before == kInfinity ? most : before - after;
 }
 
-// Errors of free runs as a gain; both beyond their signal: the motion was lost either way.
+// Errors of free runs as a gain.
 double FreeGain(double before, double after) {
-  constexpr double kLost = 1;
-  return std::min(before, after) > kLost ? kNaN : 2 * GainOf(std::log(before), std::log(std::max(after, 1e-300)));
+  return AreLost(before, after) ? kNaN : 2 * GainOf(std::log(before), std::log(std::max(after, 1e-300)));
 }
 
 // What each half second of the held-out logs gains.

@@ -4,6 +4,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
 
 namespace gapscope {
 namespace {
@@ -80,5 +81,7 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
   }
   return other;
 }
+
+double TieOf(double gain) { return std::max(kDiagnosePolicy.search.tie, kDiagnosePolicy.search.tie_share * gain); }
 
 }  // namespace gapscope

@@ -26,6 +26,9 @@ std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candi
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort);
 
+// By how much more a set may cost with a rival in the place of a member that gains so much: up to it they tie.
+double TieOf(double gain);
+
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_DIAGNOSE_EXCHANGE_H_

@@ -55,6 +55,15 @@ std::string EarlyEnd(const Diagnosis& d) {
   return d.cut.empty() ? "" : " The budget ended the search early.";
 }
 
+std::string FreeRunText(const Diagnosis& d) {
+  const VerdictEvidence& e = d.evidence;
+  if (d.effects.empty() || !std::isfinite(e.free_run_before) || !std::isfinite(e.free_run_left)) return "";
+  if (AreLost(e.free_run_before, e.free_run_left))
+    return " Over whole logs in one run the model leaves the logged motion, with what was found as without it.";
+  return fmt::format(" Over whole logs in one run the error goes from {:.3g} to {:.3g}.", e.free_run_before,
+                     e.free_run_left);
+}
+
 }  // namespace
 
 std::string Explain(const Diagnosis& d) {
@@ -97,11 +106,7 @@ std::string Explain(const Diagnosis& d) {
       text += RetunedText(d);
       break;
   }
-  const VerdictEvidence& e = d.evidence;
-  if (!d.effects.empty() && std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left)) {
-    text += fmt::format(" Over whole logs in one run the error goes from {:.3g} to {:.3g}.", e.free_run_before,
-                        e.free_run_left);
-  }
+  text += FreeRunText(d);
   if (!d.at_bounds.empty()) {
     std::string names;
     for (const auto& p : d.at_bounds)

@@ -280,7 +280,6 @@ class Judging {
 
   // What costs as little in a member's place is told with it.
   void AddRivals(Judgement* result) {
-    const SearchPolicy& policy = kDiagnosePolicy.search;
     EffectSet present;
     for (const Statement& s : result->statements) {
       if (s.probability >= kDiagnosePolicy.probability.present) present = With(present, s.use);
@@ -292,7 +291,7 @@ class Judging {
       for (const Rival& rival : rivals) {
         const Model& base = *found_.base->model;
         const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
-        if (!one && rival.behind > std::max(policy.tie, policy.tie_share * member.gain)) continue;
+        if (!one && rival.behind > TieOf(member.gain)) continue;
         if (IsLessLikely(rival.use, member.use, base)) continue;
         TellWith(member.use, rival.use, "costs as little in its place", result);
       }

@@ -67,18 +67,20 @@ RehearsalOptions RehearsalOf(const OpenQuestion& question, const Workbench& benc
   return options;
 }
 
-// Of the best input; where its pairs are the ordered ones of so many explanations.
-ForetoldMisfit MisfitOf(const InputScore& best, std::size_t explanations, double remaining) {
+// Of the best input: what the nearest of the other rivals leaves of the first one, and the first one of them. A rival
+// that holds the first one imitates it: by what it would show beyond it, it is told where it is there, and where not.
+ForetoldMisfit MisfitOf(const InputScore& best, const std::vector<Hypothesis>& rivals, bool nested, double remaining) {
+  const std::size_t others = rivals.size() - 1;
+  const auto square = [&](std::size_t truth, std::size_t imitation) {
+    const double floors = best.per_target[truth * others + imitation - (imitation > truth ? 1 : 0)];
+    return floors * floors / remaining;
+  };
   ForetoldMisfit misfit{.seconds = best.wave.duration_s, .there = kInfinity, .not_there = kInfinity};
-  std::size_t pair = 0;
-  for (std::size_t truth = 0; truth < explanations; ++truth) {
-    for (std::size_t imitation = 0; imitation < explanations; ++imitation) {
-      if (truth == imitation) continue;
-      const double square = best.per_target[pair] * best.per_target[pair] / remaining;
-      if (truth == 0) misfit.there = std::min(misfit.there, square);
-      if (imitation == 0) misfit.not_there = std::min(misfit.not_there, square);
-      ++pair;
-    }
+  for (std::size_t other = 1; other < rivals.size(); ++other) {
+    const double there = square(0, other), not_there = square(other, 0);
+    const bool held = !nested && Holds(rivals[other], rivals[0]), holds = !nested && Holds(rivals[0], rivals[other]);
+    misfit.there = std::min(misfit.there, held ? not_there : there);
+    misfit.not_there = std::min(misfit.not_there, holds ? there : not_there);
   }
   return misfit;
 }
@@ -108,13 +110,13 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
   const Hypothesis nominal{.name = "nominal", .model = bare, .values = bare->Nominal()};
   GS_ASSIGN(const OptimalDesign design, DesignForRivals(nominal, rivals, options, bench.pool));
   const InputScore& best = design.inputs.front();
-  const Foretold foretold = Foretell(question, MisfitOf(best, rivals.size(), question.remaining));
+  const Foretold foretold = Foretell(question, MisfitOf(best, rivals, question.nested, question.remaining));
   next.if_present = foretold.if_present;
   next.if_absent = foretold.if_absent;
   const double present = kDiagnosePolicy.probability.present;
   if (next.if_present < present || next.if_absent >= present) {
     next.problem = fmt::format(
-        "the best of {} inputs would bring P to {:.2f} if it is there and to {:.2f} if not. Another signal may tell.",
+        "none of {} inputs would settle it (the best: P {:.2f} if it is there, {:.2f} if not). Another signal may.",
         design.inputs.size(), next.if_present, next.if_absent);
     return next;
   }
@@ -123,26 +125,25 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
   return next;
 }
 
-}  // namespace
+// What is told together is told apart where one costs more than the other by more than what ties.
+Foretold ForetellBetween(const OpenQuestion& question, const ForetoldMisfit& misfit) {
+  const double old = question.seconds * std::exp(question.behind), total = question.seconds + misfit.seconds;
+  const double second_behind = std::log((old + misfit.seconds * (1 + misfit.there)) / total),
+               first_behind = std::log((total + misfit.seconds * misfit.not_there) / (old + misfit.seconds));
+  const double apart = kDiagnosePolicy.next.beyond_tie * question.tie;
+  return {.if_present = second_behind >= apart ? question.together : question.next.probability,
+          .if_absent = first_behind >= apart ? 0 : question.next.probability};
+}
 
 // What a size costs is a parabola of it: `known` is what these logs lose without the effect, `more` what the new one
 // would. Where the effect is not there, the size that suits both logs lies between them.
-Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit) {
+Foretold ForetellPresence(const OpenQuestion& question, const ForetoldMisfit& misfit) {
   const double gain = LargestGain(question.numbers), total = question.seconds + misfit.seconds;
   const double known = question.seconds * std::expm1(std::max(0.0, gain)), more = misfit.seconds * misfit.there;
-  double present = 0, absent = 0, kept = 0;
-  if (question.nested) {
-    kept = known + more > 0 ? known / (known + more) : 0;
-    present = std::log1p((known + more) / total);
-    absent = -std::log1p(-known * kept / (total + known));
-  } else {
-    const double old = question.seconds * std::exp(gain);
-    present = std::log((old + misfit.seconds * (1 + misfit.there)) / total);
-    absent = std::log((old + misfit.seconds) / (question.seconds + misfit.seconds * (1 + misfit.not_there)));
-  }
+  const double kept = known + more > 0 ? known / (known + more) : 0;
   // Of what an effect gains, random torques gain a part as well: the same one as in these logs, where they say.
   const double told = 0.5 * CountOf(question.seconds) * gain;
-  const bool says = question.nested && gain > kDiagnosePolicy.search.tie;
+  const bool says = gain > kDiagnosePolicy.search.tie;
   const double apart = says ? std::clamp(question.numbers.discrepancy / told, 0.0, 1.0) : kDiagnosePolicy.next.apart;
   const double clear = question.numbers.clear, count = CountOf(misfit.seconds);
   const auto at = [&](double gained, double clear_by) {
@@ -154,8 +155,15 @@ Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit) {
     return ProbabilityOf(numbers);
   };
   // A difference of squares over its standard error, where residuals are normal: half of the root of their sum.
-  return {.if_present = at(present, std::hypot(std::max(0.0, clear), 0.5 * std::sqrt(count * misfit.there))),
-          .if_absent = at(absent, question.nested ? clear * kept : -0.5 * std::sqrt(count * misfit.not_there))};
+  const double clear_there = std::hypot(std::max(0.0, clear), 0.5 * std::sqrt(count * misfit.there));
+  return {.if_present = at(std::log1p((known + more) / total), clear_there),
+          .if_absent = at(-std::log1p(-known * kept / (total + known)), clear * kept)};
+}
+
+}  // namespace
+
+Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit) {
+  return question.nested ? ForetellPresence(question, misfit) : ForetellBetween(question, misfit);
 }
 
 NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise) {

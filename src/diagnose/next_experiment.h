@@ -14,9 +14,12 @@ namespace gapscope {
 // What is asked of a further log.
 struct OpenQuestion {
   NextExperiment next;  // without its input
-  // The numbers of the first explanation beside the second one, by these logs.
+  // The second explanation lacks the first one's effect, and has no other one for it: `numbers` are the effect's. Else
+  // one of the explanations is there, with `together` as its probability, and they stand in for each other: by these
+  // logs the second one costs `behind` more, and is told with the first one up to `tie`.
   StatementNumbers numbers;
-  bool nested = false;   // the second one lacks the first one's effect, and has no other one for it
+  bool nested = false;
+  double together = 0, behind = 0, tie = 0;
   double seconds = 0;    // of these logs
   double remaining = 1;  // squared residual over the sensors' noise that the likeliest one leaves
 };

@@ -7,7 +7,7 @@
 #include "src/diagnose/exchange.h"
 #include "src/diagnose/next_experiment.h"
 #include "src/diagnose/policy.h"
-#include "src/diagnose/probability.h"
+#include "src/diagnose/rules.h"
 
 namespace gapscope {
 namespace {
@@ -46,19 +46,52 @@ class Asking {
     for (const EffectUse& use : uses) {
       if (Has(found_.chosen->effects, use)) members = With(members, use);
     }
-    std::vector<const Candidate*> tried;
+    const Candidate* first = nullptr;
     for (const EffectUse& use : uses) {
-      const Candidate* candidate =
-          members == EffectSet{use} ? found_.chosen : RefitInPlace(bench_, found_, members, use, Effort::kTry);
-      if (!candidate || tried.size() == kMost) continue;
-      tried.push_back(candidate);
+      std::optional<RunModel> tried = Beyond(members, use);
+      if (!tried) {
+        const Candidate* fitted =
+            members == EffectSet{use} ? found_.chosen : RefitInPlace(bench_, found_, members, use, Effort::kTry);
+        if (!fitted) continue;
+        tried = ModelOf(*fitted);
+        if (question.next.models.size() == 1 && first) question.behind = Gain(*fitted, *first);
+        if (question.next.models.empty()) first = fitted;
+      }
       question.next.separates.emplace_back(use);
-      question.next.models.push_back(ModelOf(*candidate));
+      question.next.models.push_back(*std::move(tried));
+      if (question.next.models.size() == kMost) break;
     }
-    if (tried.size() < 2) return std::nullopt;
-    question.next.probability = of.probability / static_cast<double>(tried.size());
-    question.numbers = {.gain = Gain(*tried[1], *tried[0]), .smooth = of.numbers.smooth, .dry = of.numbers.dry};
+    if (question.next.models.size() < 2) return std::nullopt;
+    question.together = of.probability;
+    question.next.probability = of.probability / static_cast<double>(question.next.models.size());
+    question.tie = TieOf(of.numbers.gain);
     return question;
+  }
+
+  // A richer effect in the only member's place, as it usually is: fitted it would be what the simpler one is.
+  std::optional<RunModel> Beyond(const EffectSet& members, const EffectUse& use) const {
+    if (members.size() != 1 || !Contains(use, members.front(), *bench_.rig)) return std::nullopt;
+    const auto usual = UsualBeyond(bench_, *found_.chosen, members.front(), use);
+    if (usual.empty()) return std::nullopt;
+    return WithValues(With(Without(found_.chosen->effects, members), use), use, usual.front());
+  }
+
+  // The chosen set's values, and those of an effect that it lacks, in the order of PlacedParameters.
+  std::optional<RunModel> WithValues(const EffectSet& set, const EffectUse& use,
+                                     const std::vector<double>& of_use) const {
+    auto made = MakeCandidate(bench_, set);
+    if (!made.ok()) return std::nullopt;
+    const Candidate candidate = std::move(made).value();
+    const Candidate& chosen = *found_.chosen;
+    std::vector<double> values = candidate.values;
+    for (std::size_t i = 0; i < chosen.values.size(); ++i) {
+      const int index = candidate.model->IndexOf(chosen.model->parameters()[i].name);
+      if (index >= 0) values[static_cast<std::size_t>(index)] = chosen.values[i];
+    }
+    const auto placed = PlacedParameters(use, *bench_.rig, bench_.scales);
+    for (std::size_t i = 0; i < placed.size(); ++i)
+      values[static_cast<std::size_t>(candidate.model->IndexOf(placed[i].name))] = of_use[i];
+    return RunModelOf(*candidate.model, values);
   }
 
   // Whether an effect is there at all.
@@ -110,19 +143,12 @@ class Asking {
   std::optional<OpenQuestion> Unseen() {
     for (const Statement& s : judgement_.statements) {
       if (s.answer != Answer::kUnseen) continue;
-      auto made = MakeCandidate(bench_, With(found_.chosen->effects, s.use));
-      if (!made.ok()) continue;
-      const Candidate candidate = std::move(made).value();
-      std::vector<double> values = candidate.values;
-      for (std::size_t i = 0; i < found_.chosen->values.size(); ++i) {
-        const int index = candidate.model->IndexOf(found_.chosen->model->parameters()[i].name);
-        values[static_cast<std::size_t>(index)] = found_.chosen->values[i];
-      }
-      for (const auto& p : PlacedParameters(s.use, *bench_.rig, bench_.scales))
-        values[static_cast<std::size_t>(candidate.model->IndexOf(p.name))] =
-            p.trials.empty() ? p.start : p.trials[p.trials.size() / 2];
-      OpenQuestion question =
-          WhetherThere(Why::kUnseen, s, RunModelOf(*candidate.model, values), ModelOf(*found_.chosen));
+      const auto middle = Collect(PlacedParameters(s.use, *bench_.rig, bench_.scales), [](const PlacedParameter& p) {
+        return p.trials.empty() ? p.start : p.trials[p.trials.size() / 2];
+      });
+      const auto with = WithValues(With(found_.chosen->effects, s.use), s.use, middle);
+      if (!with) continue;
+      OpenQuestion question = WhetherThere(Why::kUnseen, s, *with, ModelOf(*found_.chosen));
       question.numbers.dry = EffectOf(s.use, *bench_.rig).character == EffectCharacter::kDryFriction;
       question.numbers.smooth = EffectOf(s.use, *bench_.rig).of_motion;
       return question;

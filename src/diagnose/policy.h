@@ -78,6 +78,7 @@ struct NextPolicy {
   double of_one_log = 0.9;          // share of what an effect gains, above which one log alone shows it
   double duration_s = 8;            // of the input
   double apart = 0.5;               // of what an effect gains, what random torques do not, where the logs do not say
+  double beyond_tie = 2;            // what a foretold log must tell apart, over what ties: forecasts are rough
 };
 
 struct DiagnosePolicy {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/diagnose/policy.h"
+#include "src/fit/policy.h"
 #include "src/report/console.h"
 #include "src/report/sentences.h"
 #include "src/report/words.h"
@@ -235,6 +236,33 @@ ordered_json JsonSearchPolicy() {
           {"search.until_exchanged", policy.search.until_exchanged}};
 }
 
+ordered_json JsonFitPolicy() {
+  constexpr const FitPolicy& policy = kFitPolicy;
+  return {{"fit.state_prior_samples", policy.state_prior_samples},
+          {"fit.unknown_past_s", policy.unknown_past_s},
+          {"fit.start_s", policy.start_s},
+          {"fit.rest_share", policy.rest_share},
+          {"fit.speed_prior_s", policy.speed_prior_s},
+          {"fit.motor_side_prior_rad", policy.motor_side_prior_rad},
+          {"fit.unseen_prior_rad", policy.unseen_prior_rad},
+          {"fit.unseen_prior_m", policy.unseen_prior_m},
+          {"fit.unseen_rad_per_s", policy.unseen_rad_per_s},
+          {"fit.offset_bound_rad", policy.offset_bound_rad},
+          {"fit.anchor", policy.anchor},
+          {"fit.least_size_share", policy.least_size_share},
+          {"fit.shift_step", policy.shift_step},
+          {"fit.offset_step", policy.offset_step},
+          {"fit.state_step", policy.state_step},
+          {"fit.known_share", policy.known_share},
+          {"fit.known_offset_rad", policy.known_offset_rad},
+          {"fit.touches", policy.touches},
+          {"fit.block_s", policy.block_s},
+          {"fit.flat_share", kCovariancePolicy.flat_share},
+          {"fit.least_misfit", kCovariancePolicy.least_misfit},
+          {"fit.correlated", kCovariancePolicy.correlated},
+          {"fit.bound_share", kCovariancePolicy.bound_share}};
+}
+
 ordered_json JsonPolicy() {
   constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
   ordered_json json = JsonSearchPolicy();
@@ -270,8 +298,10 @@ ordered_json JsonPolicy() {
                                {"next.sure", policy.next.sure},
                                {"next.of_one_log", policy.next.of_one_log},
                                {"next.duration_s", policy.next.duration_s},
-                               {"next.apart", policy.next.apart}};
+                               {"next.apart", policy.next.apart},
+                               {"next.beyond_tie", policy.next.beyond_tie}};
   json.update(others);
+  json.update(JsonFitPolicy());
   return json;
 }
 

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/probability.h"
 #include "src/report/console.h"
@@ -76,8 +77,7 @@ Table BlockTable(const Statement& s) {
 }
 
 Table RivalTable(const Statement& s) {
-  const SearchPolicy& policy = kDiagnosePolicy.search;
-  const double tie = std::max(policy.tie, policy.tie_share * s.numbers.gain);
+  const double tie = TieOf(s.numbers.gain);
   Table table{.title = "What was tried in its place",
               .heads = {"effect", "costs more by, %", "so"},
               .note = fmt::format("What costs less than {:.0f} % more is told together with it, unless it is less "

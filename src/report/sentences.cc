@@ -103,6 +103,10 @@ std::string GapInWindows(const Diagnosis& d) {
 std::string GapInFreeRuns(const Diagnosis& d) {
   const VerdictEvidence& e = d.evidence;
   if (d.effects.empty() || !std::isfinite(e.free_run_before) || !std::isfinite(e.free_run_left)) return "";
+  if (AreLost(e.free_run_before, e.free_run_left)) {
+    return fmt::format("over whole logs in one run: the motion is lost, errors {} and {}: that shows nothing",
+                       ShortNumber(e.free_run_before, 3), ShortNumber(e.free_run_left, 3));
+  }
   return fmt::format("over whole logs in one run: retuned {} -> with what was found {}; {:.0f} % closed",
                      ShortNumber(e.free_run_before, 3), ShortNumber(e.free_run_left, 3), 100 * e.free_run_removed);
 }

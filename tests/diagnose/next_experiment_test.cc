@@ -55,14 +55,21 @@ TEST(ForetellTest, WhereItIsNotThereTheSizeSuitsBothLogs) {
   EXPECT_NEAR(Foretell(question, {.seconds = seconds, .there = there}).if_absent, ProbabilityOf(numbers), 1e-6);
 }
 
-// Two that stand in for each other: what one leaves where the other one is the truth counts against it.
+// Two that stand in for each other: what ties is told together, what costs more is not told.
 TEST(ForetellTest, ARivalThatDoesWorseSpeaksForTheOther) {
-  OpenQuestion question{.numbers = {.gain = 0.01, .gain_held_out = kNaN, .gain_free = kNaN}, .seconds = 20};
+  OpenQuestion question{.together = 0.8, .behind = 0.01, .tie = 0.1};
+  question.next.probability = 0.4;
+  question.seconds = 20;
   const Foretold alike = Foretell(question, {.seconds = 8, .there = 0.01, .not_there = 0.01});
   const Foretold apart = Foretell(question, {.seconds = 8, .there = 20, .not_there = 20});
-  EXPECT_LT(alike.if_present, 0.5) << "no log tells them";
-  EXPECT_GT(apart.if_present, 0.8);
-  EXPECT_LT(apart.if_absent, 0.05);
+  EXPECT_EQ(alike.if_present, 0.4) << "no log tells them";
+  EXPECT_EQ(alike.if_absent, 0.4);
+  EXPECT_EQ(apart.if_present, 0.8);
+  EXPECT_EQ(apart.if_absent, 0);
+  // Lines of equal weight: the cost of the second one is (20 + 8 * 2) / 28 of the first one's, beyond twice the tie.
+  EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 1, .not_there = 0}).if_present, 0.8);
+  EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 0.7, .not_there = 0}).if_present, 0.4);
+  EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 1, .not_there = 0}).if_absent, 0.4);
 }
 
 }  // namespace

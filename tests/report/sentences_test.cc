@@ -62,6 +62,9 @@ TEST(SentencesTest, TheGapInWindowsAndInFreeRuns) {
             "in windows: nominal 0.152 -> retuned 0.0507 -> with what was found 0.0132, the sensors' floor 0.00291; 79 "
             "% closed");
   EXPECT_EQ(GapInFreeRuns(d), "over whole logs in one run: retuned 0.267 -> with what was found 0.063; 76 % closed");
+  d.evidence.free_run_before = 36.5, d.evidence.free_run_left = 37.2;  // an unstable plant
+  EXPECT_EQ(GapInFreeRuns(d),
+            "over whole logs in one run: the motion is lost, errors 36.5 and 37.2: that shows nothing");
   d.evidence.free_run_left = INFINITY;
   EXPECT_EQ(GapInFreeRuns(d), "");
 }

@@ -51,6 +51,7 @@ Status WriteDiagnosis(const std::string& out, const Experiment& experiment, cons
   GS_ASSIGN(files.model_xml, diagnosis.model->ToXml(diagnosis.values, log_values, scales));
   const ReportLogs logs{data.train, data.held_out};
   ReportSource source = SourceOf(experiment, logs);
+  source.by_windows = diagnosis.by_windows;
   source.content = PageOf(run);
   source.predictions = Predict(experiment, logs,
                                {{"nominal", diagnosis.refit_model, diagnosis.nominal_values},

@@ -183,7 +183,8 @@ struct Diagnosis {
   NextExperiment next;
   std::vector<std::string> train_logs, held_out_logs;
   std::string split, explanation;
-  double data_s = 0;  // of all logs
+  bool by_windows = false;  // of each log every third window is held out, no log as a whole
+  double data_s = 0;        // of all logs
   double time_step_s = 0;
   FittedWindows windows;
   double wall_s = 0;

@@ -348,7 +348,9 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   // Held-out logs first: they are what counts.
   std::vector<std::size_t> order(source.recordings.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  const auto held_out = [&](std::size_t i) { return i < source.held_out.size() && source.held_out[i]; };
+  const auto held_out = [&](std::size_t i) {
+    return !source.by_windows && i < source.held_out.size() && source.held_out[i];
+  };
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return held_out(a) && !held_out(b); });
   std::vector<std::string> paths;
@@ -356,7 +358,8 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
     const std::size_t i = order[k];
     const Recording& recording = *source.recordings[i];
     ordered_json log = FileStamp(recording.log_path);
-    log["held_out"] = held_out(i);
+    log["held_out"] = held_out(i) ? "held out" : source.by_windows ? "every third window held out" : "";
+    log["from_s"] = recording.start_s;
     log["quality"] = Quality(recording);
     if (k < shown) {
       const ShownLog shown_log = ShowLog(source, i);

@@ -32,6 +32,7 @@ struct ReportSource {
   const Experiment* experiment = nullptr;
   std::vector<const Recording*> recordings;
   std::vector<bool> held_out;  // by recording; empty: none
+  bool by_windows = false;     // of each recording every third window is held out instead
   std::vector<ReportPrediction> predictions;
   std::vector<EffectCurve> curves;
   // Its missing torque is mapped, and it tells which command drives what. Null: no map.

@@ -69,7 +69,7 @@ Sentence SentenceOf(const std::vector<const Statement*>& members) {
 std::string Sentence::Text() const {
   std::string text = what;
   if (!size.empty()) text += ", " + size;
-  text += fmt::format(", {:.0f} % of the gap, P {:.2f}", 100 * share_of_gap, probability);
+  text += fmt::format(", {:.0f} % of what closes, P {:.2f}", 100 * share_of_gap, probability);
   if (!caveat.empty()) text += ", " + caveat;
   return told_apart.empty() ? text : text + "; " + told_apart;
 }

@@ -17,7 +17,7 @@ struct Sentence {
   std::string told_apart;   // "what would tell: tilt the rig", of a group; may be empty
   double share_of_gap = 0;  // of the gap that closes
   double probability = 0;
-  std::string Text() const;  // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of the gap, P 0.94"
+  std::string Text() const;  // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of what closes, P 0.94"
 };
 // The largest share first.
 std::vector<Sentence> SentencesOf(const Diagnosis& d);

@@ -34,7 +34,7 @@ void AddStage(std::vector<Stage>* stages, const std::string& name, double error,
   Stage stage{.name = name, .error = error, .mark = mark, .change = {}};
   if (!stages->empty() && mark != Stage::Mark::kFloor) stage.change = ChangeText(stages->back().error, error);
   if (std::isfinite(share_of_gap))
-    stage.change += fmt::format("{}{} of the gap", stage.change.empty() ? "" : ", ", WholePercent(share_of_gap));
+    stage.change += fmt::format("{}{} of what closes", stage.change.empty() ? "" : ", ", WholePercent(share_of_gap));
   stages->push_back(std::move(stage));
 }
 

@@ -22,7 +22,7 @@ struct Stage {
   std::string name;  // "with cable spring on arm"
   double error = 0;  // normalised; finite
   Mark mark = Mark::kNone;
-  std::string change;  // from the stage before: "−40 %, 80 % of the gap"; may be empty
+  std::string change;  // from the stage before: "−40 %, 80 % of what closes"; may be empty
 };
 
 struct Headline {

@@ -36,12 +36,14 @@ Diagnosis Made() {
 TEST(SentencesTest, OneForEachFindingTheLargestShareFirst) {
   const auto sentences = SentencesOf(Made());
   ASSERT_EQ(sentences.size(), 2u) << "what is absent has none, a group one";
-  EXPECT_EQ(sentences[0].Text(),
-            "cable spring or gravity offset on arm, cable spring 0.0012 (0.0003 .. 0.0047) N m/rad, 95 % of the gap, "
-            "P 0.85; what would tell: slow sweep of the range; tilt the rig");
-  EXPECT_EQ(sentences[1].Text(),
-            "command delay on motor, 5.73 (4.5 .. 6.9) ms, 2 % of the gap, P 0.68, seen only beside load friction on "
-            "arm");
+  EXPECT_EQ(
+      sentences[0].Text(),
+      "cable spring or gravity offset on arm, cable spring 0.0012 (0.0003 .. 0.0047) N m/rad, 95 % of what closes, "
+      "P 0.85; what would tell: slow sweep of the range; tilt the rig");
+  EXPECT_EQ(
+      sentences[1].Text(),
+      "command delay on motor, 5.73 (4.5 .. 6.9) ms, 2 % of what closes, P 0.68, seen only beside load friction on "
+      "arm");
 }
 
 TEST(SentencesTest, WhatTheClocksLeaveOpenIsToldWithIt) {

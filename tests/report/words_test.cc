@@ -69,8 +69,8 @@ TEST(HeadlineTest, ADiagnosisSaysHowFarTheErrorGoesDown) {
   EXPECT_EQ(stages,
             "nominal: 1.77 []\n"
             "best parameters: 1.2 [−32 %]\n"
-            "with cable spring on arm: 0.3 [−75 %, 80 % of the gap]\n"
-            "with Coulomb friction on arm: 0.01 [30 times smaller, 20 % of the gap]\n"
+            "with cable spring on arm: 0.3 [−75 %, 80 % of what closes]\n"
+            "with Coulomb friction on arm: 0.01 [30 times smaller, 20 % of what closes]\n"
             "floor of the sensors: 0.008 []\n");
   EXPECT_EQ(headline.stages[3].mark, Stage::Mark::kBest);
   EXPECT_EQ(headline.stages[4].mark, Stage::Mark::kFloor);

@@ -58,7 +58,7 @@ function pick(signal) {
 function choosers() {
   const select = document.getElementById("log");
   data.logs.forEach((log, i) => {
-    const name = fileName(log.path) + (log.held_out ? " (held out)" : "");
+    const name = logName(log) + (log.held_out ? ` (${log.held_out})` : "");
     if (log.traces) select.append(element("option", {value: i}, name));
   });
   select.addEventListener("change", () => {

@@ -195,8 +195,8 @@ function writeQuality(logs) {
       ? element("ul", {}, ...q.findings.map((f) => element("li", {}, f)))
       : element("span", {class: "tag good"}, "nothing to report");
     return [
-      element("code", {}, fileName(log.path)),
-      log.held_out ? element("span", {class: "tag"}, "held out") : "",
+      element("code", {}, logName(log)),
+      log.held_out ? element("span", {class: "tag"}, log.held_out) : "",
       {number: String(q.rows)},
       {number: `${number(q.duration_s)} s`},
       {number: `${number(rate)} Hz`},
@@ -225,7 +225,7 @@ function writeProvenance(data) {
   const file = (f) => element("code", {}, `${f.path} `, element("br"), `sha256 ${f.sha256}`);
   add("experiment", file(data.experiment));
   add("model", file(data.model));
-  for (const log of data.logs) add(log.held_out ? "log, held out" : "log", file(log));
+  for (const log of data.logs) add(log.held_out ? `log, ${log.held_out}` : "log", file(log));
   const parts = [list];
   if (data.command) parts.unshift(element("pre", {}, data.command));
   parts.push(element("p", {class: "note"}, "Charts: dygraphs 2.2, MIT licence."));

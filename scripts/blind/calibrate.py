@@ -91,17 +91,6 @@ def auc(values, truth):
     return above / (n * (len(truth) - n))
 
 
-def candidates(cases):
-    """(case, rig, numbers, truth) of all that is told present or absent; what is told together once."""
-    for at, case in enumerate(cases):
-        for finding in statements.findings(case):
-            best = max(finding.statements, key=lambda s: s["probability"] or 0)
-            yield at, case.rig, best.get("numbers") or {}, float(finding.true)
-        for s in statements.told(case.verdict):
-            if s["answer"] == "absent":
-                yield at, case.rig, s.get("numbers") or {}, float((s["name"], s["on"]) in case.truth)
-
-
 def read(features, numbers):
     row = []
     for feature in features:
@@ -113,7 +102,8 @@ def read(features, numbers):
 
 
 def of_statements(cases, features):
-    told = [entry for entry in candidates(cases) if entry[2]]
+    told = [(at, case.rig, s["numbers"], float(true), s["probability"] or 0)
+            for at, case in enumerate(cases) for s, true in statements.weighed(case)]
     if not told:
         sys.exit("calibrate.py: no statement with `numbers` in these banks")
     at, rigs, truth = [e[0] for e in told], [e[1] for e in told], [e[3] for e in told]
@@ -133,7 +123,8 @@ def of_statements(cases, features):
             for i in (i for i, g in enumerate(groups) if g == group):
                 apart[i] = probability(w, rows[i])
         return apart
-    for name, given in (("same statements", [probability(weights, row) for row in rows]),
+    for name, given in (("as they were told", [entry[4] for entry in told]),
+                        ("same statements", [probability(weights, row) for row in rows]),
                         ("each case by the others", by_others(at)), ("each rig by the others", by_others(rigs))):
         error, bins = statements.calibration(list(zip(given, truth)))
         sure = [t for p, t in zip(given, truth) if p >= statements.SURE]

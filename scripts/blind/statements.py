@@ -119,6 +119,18 @@ def sizes(judged):
                     yield value, entry
 
 
+def weighed(case):
+    """(statement, whether it is true) of all that was judged by its `numbers`, present or absent; what is told together
+    once, by its likeliest."""
+    for finding in findings(case):
+        best = max(finding.statements, key=lambda s: s["probability"] or 0)
+        if best.get("numbers"):
+            yield best, finding.true
+    for s in told(case.verdict):
+        if s["answer"] == "absent" and s.get("numbers"):
+            yield s, (s["name"], s["on"]) in case.truth
+
+
 def within_bound(case, statement):
     """Whether an effect told as absent is absent, or smaller than the bound."""
     truth = next((e["parameters"] for e in case.label["effects"]
@@ -170,6 +182,9 @@ def figures(cases, seed):
     error, bins = calibration(pairs)
     board.rows.append({"name": "calibration error of statements", "target": 0.06, "better": "lower", "value": error,
                        "low": math.nan, "high": math.nan, "cases": len(pairs)})
+    all_pairs = [(s["probability"] or 0.0, float(true)) for j in judged for s, true in weighed(j.case)]
+    board.rows.append({"name": "... of all that was judged, present or absent", "target": 0.06, "better": "lower",
+                       "value": calibration(all_pairs)[0], "low": math.nan, "high": math.nan, "cases": len(all_pairs)})
     share("95 % intervals that hold the truth (88 to 98)", 0.88, "higher",
                 [e["low"] <= v <= e["high"] for v, e in spans])
     board.number("effect parameter, median error", 0.05, "lower", [abs(e["value"] / v - 1) for v, e in found])

@@ -185,7 +185,12 @@ Result<DiagnoseRun> DiagnoseLogs(const DiagnoseFlags& flags, StageClock* clock) 
     if (!own.plugin.empty()) own.fault = flags.plugin_fault;
   }
   GS_ASSIGN(const HeldOutLogs logs, CombineHeldOut(flags.model.logs, flags.hold_out));
-  GS_ASSIGN(auto recordings, LoadRecordings(experiment, logs.all, pool));
+  auto loaded = [&] {
+    ProgressLine line(flags.common);
+    ShowReading(logs.all, &line);
+    return LoadRecordings(experiment, logs.all, pool);
+  }();
+  GS_ASSIGN(auto recordings, std::move(loaded));
   PrintFindings(recordings, flags.common.quiet);
   const auto log_values = recordings.front().values;
   const DataSplit data = SplitData(std::move(recordings), logs.held_out);

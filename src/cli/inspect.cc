@@ -6,6 +6,7 @@
 
 #include "src/cli/commands.h"
 #include "src/cli/print.h"
+#include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/report/inspect_report.h"
 #include "src/report/json.h"
@@ -109,7 +110,12 @@ Result<int> RunInspect(const InspectFlags& flags) {
   const bool bound = IsExperiment(flags.model.experiment);
   if (bound && flags.model.logs.empty())
     return Error{.what = "no log", .where = flags.model.experiment, .cure = "name the logs behind the experiment"};
-  GS_ASSIGN(const InspectRun run, bound ? InspectBound(flags) : InspectUnbound(all));
+  auto inspected = [&] {
+    ProgressLine line(flags.common);
+    ShowReading(all, &line);
+    return bound ? InspectBound(flags) : InspectUnbound(all);
+  }();
+  GS_ASSIGN(const InspectRun run, std::move(inspected));
   const nlohmann::ordered_json json = ToJson(run);
   if (!flags.common.out.empty()) GS_RETURN_IF_ERROR(WriteRun(flags.common.out, json));
   Print(stdout, "{}", flags.common.json ? JsonText(json) : ToTable(run));

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -70,6 +71,18 @@ void ProgressLine::Show(const ProgressPoint& point, const std::string& text) {
                      {"total", NumberOrNull(point.total)},
                      {"best", JsonNumber(point.best)},
                      {"elapsed_s", elapsed_s()}}));
+}
+
+void ShowReading(const std::vector<std::string>& files, ProgressLine* line) {
+  constexpr double kMuch = 1e7;
+  double bytes = 0;
+  std::error_code failure;
+  for (const std::string& file : files) {
+    if (const auto size = std::filesystem::file_size(file, failure); !failure) bytes += static_cast<double>(size);
+  }
+  if (bytes < kMuch) return;
+  const std::string text = fmt::format("reading {}, {:.0f} MB", files.size() == 1 ? "a log" : "logs", bytes / 1e6);
+  line->Show({.stage = "reading"}, text);
 }
 
 const std::atomic<bool>* CatchInterrupts() {

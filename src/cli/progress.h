@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "src/cli/profile.h"
 #include "src/cli/session.h"
@@ -41,6 +42,9 @@ class ProgressLine {
   std::chrono::steady_clock::time_point begin_, last_;
   std::string stage_;
 };
+
+// The line of a command that reads these files now, where that takes a while: 10 MB or more.
+void ShowReading(const std::vector<std::string>& files, ProgressLine* line);
 
 // From here on SIGINT, SIGTERM and SIGHUP (where it is not ignored) set what is returned; the second one ends the
 // program.

@@ -7,6 +7,7 @@
 #include "src/cli/html.h"
 #include "src/cli/print.h"
 #include "src/cli/profile.h"
+#include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/report/json.h"
 #include "src/report/replay_report.h"
@@ -88,33 +89,39 @@ Result<int> RunReplay(const ReplayFlags& flags) {
                    .cure = "leave it out, or replay in windows"};
     GS_ASSIGN(controller, LoadController(session.experiment));
   }
-  clock.Enter("replay");
+  std::optional<ProgressLine> line(std::in_place, flags.common);
+  const auto enter = [&](const char* stage) {
+    clock.Enter(stage);
+    line->Show({.stage = stage}, stage);
+  };
+  enter("replay");
   GS_ASSIGN(ClosedLoopResult replayed, ReplayLogs(*session.model, session, options, controller));
   ReplayResult& result = replayed.result;
   clock.Count(session.recordings.size(), result.steps);
   if (flags.nuisances) {
-    clock.Enter("nuisances");
+    enter("nuisances");
     const TuneOptions fit{.window_s = options.window_s, .time_step_s = result.time_step_s};
     result.logs =
         Evaluate(*session.model, session.recordings, {session.values, std::nullopt}, options.mode, fit, *session.pool);
   }
-  clock.Enter("compare");
+  enter("compare");
   std::optional<LoopStatistics> loop;
   if (controller) loop = LoopStatisticsOf(replayed, session.recordings, *controller);
   Comparison comparison = Compare(*session.model->rig(), result, session.recordings, *session.pool);
   ReplayRun run = ReplayRunOf(*session.model, session.values, std::move(result), std::move(comparison));
   run.info.seed = flags.common.seed;
-  clock.Enter("replay beside it");  // windows beside a free run, the nominal model beside a changed one
+  enter("replay beside it");  // windows beside a free run, the nominal model beside a changed one
   run.other_error = OtherError(session, options, run.result.time_step_s);
   run.loop = std::move(loop);
   GS_ASSIGN(std::vector<LogReplay> nominal, ReplayNominal(session, options, controller));
   if (!nominal.empty()) run.nominal_error = ReplayError(nominal);
-  clock.Enter("write");
+  enter("write");
   if (!flags.common.out.empty()) {
     std::vector<RunTable> sent;
     if (controller) sent = SentTables(run.result.logs, replayed.sent, session.recordings, *controller);
     GS_RETURN_IF_ERROR(WriteReplay(flags.common.out, session, run, std::move(sent), std::move(nominal)));
   }
+  line.reset();
   Print(stdout, "{}", flags.common.json ? JsonText(ToJson(run)) : ToTable(run, ConsoleOf(1)));
   const double error = run.comparison.error;
   if (flags.fail_above > 0 && !(error <= flags.fail_above)) {

@@ -12,6 +12,7 @@
 #include <set>
 
 #include "src/cli/print.h"
+#include "src/cli/progress.h"
 #include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/model/run_model.h"
@@ -255,7 +256,11 @@ Result<Session> LoadSession(const ModelFlags& flags, const CommonFlags& common) 
   session.pool = std::make_unique<ThreadPool>(WorkersOf(common));
   GS_ASSIGN(session.experiment, LoadExperiment(flags.experiment));
   if (!flags.while_column.empty()) session.experiment.replay.while_column = flags.while_column;
-  GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
+  {
+    ProgressLine line(common);
+    ShowReading(flags.logs, &line);
+    GS_ASSIGN(session.recordings, LoadRecordings(session.experiment, flags.logs, *session.pool));
+  }
   GS_ASSIGN(session.model, Model::Load(session.experiment));
   PrintLeftOut(*session.model->rig());
   if (const auto with = EffectsOf(earlier, flags.with); !with.empty()) {

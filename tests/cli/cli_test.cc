@@ -187,6 +187,8 @@ TEST_F(CliTest, ProgressAndErrorsAsJson) {
   }
   EXPECT_GT(seen, 0) << good.err;
   EXPECT_EQ(Run("tune " + Joint() + " '" + log + "' --starts 1 --json --progress json --quiet").err, "");
+  const Answer replayed = Run("replay " + Joint() + " '" + log + "' --json --progress json");
+  EXPECT_TRUE(replayed.err.starts_with(R"({"stage":"replay")")) << replayed.err;
   for (const std::string& wrong :
        {"replay " + Joint() + " 'gone.csv'", "replay " + Joint() + " '" + log + "' --jobs -1"}) {
     const Answer answer = Run(wrong + " --progress json");

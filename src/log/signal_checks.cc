@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <set>
 
 #include "src/core/statistics.h"
 
@@ -100,14 +102,18 @@ Wraps FindUndeclaredWraps(const std::vector<double>& values, double period) {
 
 Saturation FindSaturation(const std::vector<double>& values) {
   Saturation found;
-  std::vector<double> levels = Finite(values);
-  if (levels.size() < 2 * kSaturationRun) return found;
-  std::sort(levels.begin(), levels.end());
-  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
-  found.low = levels.front();
-  found.high = levels.back();
+  std::set<double> levels;  // as many as decide
+  std::size_t finite = 0;
+  found.low = kInfinity, found.high = -kInfinity;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    ++finite;
+    found.low = std::min(found.low, value), found.high = std::max(found.high, value);
+    if (levels.size() <= kSaturationLevels) levels.insert(value);
+  }
+  if (finite < 2 * kSaturationRun) return {};
   if (levels.size() <= kSaturationLevels) return found;
-  const double step = QuantisationStep(values);
+  std::optional<double> step;  // costs much, and most signals never stay at their limits
 
   for (const double limit : {found.high, found.low}) {
     std::size_t rows = 0, first = 0;
@@ -123,9 +129,10 @@ Saturation FindSaturation(const std::vector<double>& values) {
       if (length < kSaturationRun) continue;
       if (rows == 0) first = begin;
       rows += length;
-      if (begin >= 2 && k + 1 < values.size()) {
-        cut_off |= IsCutOff(values[begin - 2], values[begin - 1], limit, length, step) &&
-                   IsCutOff(values[k + 1], values[k], limit, length, step);
+      if (begin >= 2 && k + 1 < values.size() && !cut_off) {
+        if (!step) step = QuantisationStep(values);
+        cut_off = IsCutOff(values[begin - 2], values[begin - 1], limit, length, *step) &&
+                  IsCutOff(values[k + 1], values[k], limit, length, *step);
       }
     }
     if (rows == 0 || !cut_off) continue;
@@ -154,9 +161,11 @@ double QuantisationStep(const std::vector<double>& values) {
     if (const double distance = sorted[k] - sorted[k - 1]; distance > 1e-6 * range) distances.push_back(distance);
   }
   if (distances.size() < 2) return 0;
-  std::sort(distances.begin(), distances.end());
   for (const double share : {0.0, 0.02, 0.1, 0.25, 0.5}) {
-    const double candidate = distances[static_cast<std::size_t>(share * static_cast<double>(distances.size() - 1))];
+    const auto rank =
+        distances.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(distances.size() - 1));
+    std::nth_element(distances.begin(), rank, distances.end());
+    const double candidate = *rank;
     const GridFit coarse = FitGrid(steps, candidate, 8);
     const GridFit fit = FitGrid(steps, coarse.refined, 20);
     // Enough small steps must be there to tell a grid from chance.

@@ -40,6 +40,37 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
   return std::sqrt(sum / std::max(1.0, signals));
 }
 
+// Of the logs that `predicted` is of.
+std::vector<SignalFloors> FloorsOfSignals(const std::vector<LogReplay>& predicted,
+                                          const std::vector<Recording>& recordings, const std::vector<double>& noise) {
+  std::map<std::size_t, std::pair<double, double>> squares;  // their sum and count, by signal
+  std::map<std::size_t, std::string> names;
+  for (std::size_t l = 0; l < predicted.size(); ++l) {
+    for (std::size_t s = 0; s < predicted[l].signals.size(); ++s) {
+      const SignalTrace& trace = predicted[l].signals[s];
+      if (!trace.scored) continue;
+      const std::size_t index = recordings[l].measured[s].index;
+      names[index] = trace.signal;
+      for (std::size_t row = 0; row < trace.predicted.size(); ++row) {
+        const double missed = (trace.predicted[row] - trace.measured[row]) / noise[index];
+        if (std::isfinite(missed)) squares[index].first += missed * missed, squares[index].second += 1;
+      }
+    }
+  }
+  std::vector<SignalFloors> signals;
+  for (const auto& [index, of] : squares) signals.push_back({names[index], std::sqrt(of.first / of.second)});
+  std::stable_sort(signals.begin(), signals.end(), [](const auto& a, const auto& b) { return a.floors > b.floors; });
+  return signals;
+}
+
+// Signals in which the noise is the larger part of what is missed come last: the gap does not lie there.
+void SortByFloors(const std::vector<SignalFloors>& signals, std::vector<ConditionShare>* where) {
+  std::stable_partition(where->begin(), where->end(), [&](const ConditionShare& share) {
+    const auto found = std::ranges::find(signals, share.signal, &SignalFloors::signal);
+    return found != signals.end() && found->floors * found->floors > 2;
+  });
+}
+
 // Where a model's error lies, on the first held-out log, which stands for all (shares of several logs do not add up).
 std::vector<ConditionShare> Locate(const Rig& rig, const std::vector<LogReplay>& predicted,
                                    const std::vector<Recording>& held_out, std::uint64_t seed) {
@@ -219,14 +250,18 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.candidates = DescribeCandidates(bench, found, judgement);
   result.statements = judgement.statements;
   const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
+  result.evidence.signals = FloorsOfSignals(predicted, bench.data.held_out, noise);
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(bench, chosen, *base.model);
   if (next_experiment) {
     say("designing the next experiment");
     result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
   }
-  result.where = Locate(*bench.rig, PredictHeldOut(bench, base), bench.data.held_out, seed);
+  const std::vector<LogReplay> before = &chosen == &base ? predicted : PredictHeldOut(bench, base);
+  result.where = Locate(*bench.rig, before, bench.data.held_out, seed);
+  SortByFloors(FloorsOfSignals(before, bench.data.held_out, noise), &result.where);
   result.remains = &chosen == &base ? result.where : Locate(*bench.rig, predicted, bench.data.held_out, seed);
+  SortByFloors(result.evidence.signals, &result.remains);
   result.cut = found.cut;
   if (bench.TimeIsOver()) result.cut.emplace_back("fits while judging");
   result.work = *bench.work;

@@ -148,10 +148,17 @@ struct NextExperiment {
 std::string WhyName(NextExperiment::Why why);
 
 // What the verdict rests on as a whole.
+// What a signal misses, over its sensor's noise, root mean square.
+struct SignalFloors {
+  std::string signal;
+  double floors = 0;
+};
+
 struct VerdictEvidence {
   // Residual over the sensors' noise, root mean square, held out: refitted base model, final model.
   double floors_before = 0, floors_left = 0;
-  double removed = 0;  // share of what exceeds the noise that went away, in windows
+  std::vector<SignalFloors> signals;  // of the final model, the largest first
+  double removed = 0;                 // share of what exceeds the noise that went away, in windows
   // Normalised errors of one free run a log, and the share that went away; infinity, 0: it diverges.
   double free_run_before = 0, free_run_left = 0, free_run_removed = 0;
 };

@@ -55,6 +55,15 @@ std::string EarlyEnd(const Diagnosis& d) {
   return d.cut.empty() ? "" : " The budget ended the search early.";
 }
 
+// Of several signals: how much each one misses.
+std::string FloorsText(const VerdictEvidence& e) {
+  constexpr std::size_t kMost = 3;
+  std::string text;
+  for (std::size_t i = 0; e.signals.size() > 1 && i < std::min(kMost, e.signals.size()); ++i)
+    text += fmt::format("{}{} {:.1f}", i ? ", " : ": ", e.signals[i].signal, e.signals[i].floors);
+  return text;
+}
+
 std::string FreeRunText(const Diagnosis& d) {
   const VerdictEvidence& e = d.evidence;
   if (d.effects.empty() || !std::isfinite(e.free_run_before) || !std::isfinite(e.free_run_left)) return "";
@@ -98,8 +107,8 @@ std::string Explain(const Diagnosis& d) {
     case Verdict::kUnknown:
       text +=
           d.effects.empty()
-              ? fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise.",
-                            d.evidence.floors_left)
+              ? fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise{}.",
+                            d.evidence.floors_left, FloorsText(d.evidence))
               : ExplainEffects(d) + ", and no known effect explains what remains.";
       if (!d.remains.empty())
         text += " It lies mostly at: " + d.remains.front().signal + ", " + d.remains.front().condition + ".";

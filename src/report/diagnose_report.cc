@@ -53,11 +53,11 @@ ordered_json Json(const FoundEffect& found) {
 }
 
 ordered_json Json(const VerdictEvidence& e) {
-  return {{"floors_before", JsonNumber(e.floors_before)},
-          {"floors_left", JsonNumber(e.floors_left)},
-          {"removed", JsonNumber(e.removed)},
-          {"free_run_before", JsonNumber(e.free_run_before)},
-          {"free_run_left", JsonNumber(e.free_run_left)},
+  ordered_json signals = ordered_json::object();
+  for (const SignalFloors& signal : e.signals) signals[signal.signal] = JsonNumber(signal.floors);
+  return {{"floors_before", JsonNumber(e.floors_before)},      {"floors_left", JsonNumber(e.floors_left)},
+          {"floors_left_by_signal", std::move(signals)},       {"removed", JsonNumber(e.removed)},
+          {"free_run_before", JsonNumber(e.free_run_before)},  {"free_run_left", JsonNumber(e.free_run_left)},
           {"free_run_removed", JsonNumber(e.free_run_removed)}};
 }
 

@@ -54,6 +54,17 @@ TEST(DiagnoseReportTest, UnknownWithoutAnEffectSaysWhereTheGapLies) {
       << text;
 }
 
+TEST(DiagnoseReportTest, WhatRemainsIsToldBySignal) {
+  Diagnosis d = Unfinished();
+  d.effects.clear();
+  d.evidence.signals = {{"arm_rad", 7.21}, {"torque_n_m", 0.34}};
+  EXPECT_NE(Explain(d).find("the best leaves 5.1 times the sensors' noise: arm_rad 7.2, torque_n_m 0.3."),
+            std::string::npos)
+      << Explain(d);
+  const auto json = ToJson(DiagnoseRun{.info = {}, .diagnosis = d});
+  EXPECT_EQ(json["evidence"]["floors_left_by_signal"]["arm_rad"], 7.21);
+}
+
 TEST(DiagnoseReportTest, JsonHoldsBothPlaces) {
   const auto json = ToJson(DiagnoseRun{.info = {}, .diagnosis = Unfinished()});
   EXPECT_EQ(json["where"][0]["condition"], "angle 0.4..0.8 rad");

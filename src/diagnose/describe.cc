@@ -63,21 +63,14 @@ std::vector<SignalFloors> FloorsOfSignals(const std::vector<LogReplay>& predicte
   return signals;
 }
 
-// Signals in which the noise is the larger part of what is missed come last: the gap does not lie there.
-void SortByFloors(const std::vector<SignalFloors>& signals, std::vector<ConditionShare>* where) {
-  std::stable_partition(where->begin(), where->end(), [&](const ConditionShare& share) {
-    const auto found = std::ranges::find(signals, share.signal, &SignalFloors::signal);
-    return found != signals.end() && found->floors * found->floors > 2;
-  });
-}
-
 // Where a model's error lies, on the first held-out log, which stands for all (shares of several logs do not add up).
-std::vector<ConditionShare> Locate(const Rig& rig, const std::vector<LogReplay>& predicted,
-                                   const std::vector<Recording>& held_out, std::uint64_t seed) {
+// Signals in which the noise is the larger part of what is missed come last: the gap does not lie there.
+std::vector<ConditionShare> Locate(const Workbench& bench, const std::vector<LogReplay>& predicted,
+                                   const std::vector<SignalFloors>& signals, std::uint64_t seed) {
   LogComparison located;
   if (predicted.empty()) return {};
   const LogReplay& log = predicted.front();
-  const Recording& recording = held_out.front();
+  const Recording& recording = bench.data.held_out.front();
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
     const SignalTrace& trace = log.signals[s];
     if (!trace.scored) continue;
@@ -90,12 +83,26 @@ std::vector<ConditionShare> Locate(const Rig& rig, const std::vector<LogReplay>&
       input.speed = speed;
       input.angle = trace.measured;
     }
-    if (const int c = rig.CommandOfSignal(trace.signal); c >= 0)
+    if (const int c = bench.rig->CommandOfSignal(trace.signal); c >= 0)
       input.command = recording.commands[static_cast<std::size_t>(c)].values;
     located.signals.push_back(ScoreSignal(trace.signal, log.time_s, trace.measured, trace.predicted, trace.resolution));
     for (auto& share : LocateError(input, {.seed = seed})) located.where.push_back(std::move(share));
   }
-  return TellOfWorst(located, {.limit = 12});
+  std::vector<ConditionShare> where = TellOfWorst(located, {.limit = 12});
+  std::stable_partition(where.begin(), where.end(), [&](const ConditionShare& share) {
+    const auto found = std::ranges::find(signals, share.signal, &SignalFloors::signal);
+    return found != signals.end() && found->floors * found->floors > 2;
+  });
+  return where;
+}
+
+// Of the base model's predictions and the final one's.
+void SayWhereItLies(const Workbench& bench, const std::vector<LogReplay>& before, const std::vector<LogReplay>& after,
+                    const DescribeOptions& options, Diagnosis* result) {
+  const std::vector<Recording>& logs = bench.data.held_out;
+  result->where = Locate(bench, before, FloorsOfSignals(before, logs, options.noise), options.seed);
+  result->evidence.signals = FloorsOfSignals(after, logs, options.noise);
+  result->remains = Locate(bench, after, result->evidence.signals, options.seed);
 }
 
 // Base parameters that ended on a bound.
@@ -250,18 +257,13 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.candidates = DescribeCandidates(bench, found, judgement);
   result.statements = judgement.statements;
   const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
-  result.evidence.signals = FloorsOfSignals(predicted, bench.data.held_out, noise);
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(bench, chosen, *base.model);
   if (next_experiment) {
     say("designing the next experiment");
     result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
   }
-  const std::vector<LogReplay> before = &chosen == &base ? predicted : PredictHeldOut(bench, base);
-  result.where = Locate(*bench.rig, before, bench.data.held_out, seed);
-  SortByFloors(FloorsOfSignals(before, bench.data.held_out, noise), &result.where);
-  result.remains = &chosen == &base ? result.where : Locate(*bench.rig, predicted, bench.data.held_out, seed);
-  SortByFloors(result.evidence.signals, &result.remains);
+  SayWhereItLies(bench, &chosen == &base ? predicted : PredictHeldOut(bench, base), predicted, options, &result);
   result.cut = found.cut;
   if (bench.TimeIsOver()) result.cut.emplace_back("fits while judging");
   result.work = *bench.work;

@@ -126,7 +126,10 @@ def _drawn(result: "Diagnosis") -> str:
     memory = result.out / "logs"
     rows = [
         [
-            _text(Path(one.log).stem if Path(one.log).parent == memory else one.log),
+            _text(
+                (Path(one.log).stem if Path(one.log).parent == memory else one.log)
+                + (f", from {one.from_s:g} s" if one.from_s > 0 else "")
+            ),
             _text(one.signal),
             _number(one.error),
             sparkline(one.measured, one.predicted),

@@ -71,6 +71,7 @@ class Drawn:
     """What report.html draws of one signal of one log: ``measured`` and ``predicted`` of shape (points,), SI."""
 
     log: str
+    from_s: float  #: of a part of a log: where it begins
     signal: str
     error: float  #: normalised, of the model that was found
     measured: Floats
@@ -88,6 +89,7 @@ def judging(report: Path) -> tuple[Drawn, ...]:
     return tuple(
         Drawn(
             log["path"],
+            log["from_s"],
             signal["name"],
             _float(signal["error"]),
             _floats(signal["measured"]),

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "src/compare/comparison.h"
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
 #include "src/diagnose/explain.h"
@@ -57,8 +58,10 @@ std::vector<SignalFloors> FloorsOfSignals(const std::vector<LogReplay>& predicte
       }
     }
   }
-  std::vector<SignalFloors> signals;
-  for (const auto& [index, of] : squares) signals.push_back({names[index], std::sqrt(of.first / of.second)});
+  auto signals = Collect(squares, [&](const auto& entry) {
+    const auto& [sum, count] = entry.second;
+    return SignalFloors{names[entry.first], std::sqrt(sum / count)};
+  });
   std::stable_sort(signals.begin(), signals.end(), [](const auto& a, const auto& b) { return a.floors > b.floors; });
   return signals;
 }

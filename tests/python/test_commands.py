@@ -281,7 +281,9 @@ def test_a_diagnosis_shows_its_logs_and_what_is_absent(experiment: str, demo: st
     log = np.genfromtxt(demo, delimiter=",", names=True)[:400]
     found = gs.diagnose(experiment, gs.Log(log, name="monday"), **only)
     shown = found._repr_html_()
-    assert shown.count("<svg") == 2 == shown.count("<td style=\"text-align:left\">monday</td>") and "arm_rad" in shown
+    # Every third window of both its parts judged it, and two signals are drawn of each.
+    assert shown.count("<svg") == 4 and "arm_rad" in shown
+    assert shown.count(">monday</td>") == 2 == shown.count(">monday, from ")
     bounded = sum(1 for s in found.statements if s.answer == "absent" and s.bound)
     unseen = sum(1 for s in found.statements if s.answer == "unseen")
     assert bounded and f"{bounded} absent beyond a bound" in shown

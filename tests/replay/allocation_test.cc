@@ -15,10 +15,11 @@ namespace {
 TEST(AllocationTest, RunAllocatesNothing) {
   for (const char* rig : {"joint", "qube", "xl330"}) {
     Experiment experiment = ShippedExperiment(rig);
+    const std::string unit = "N m/" + experiment.commands.front().unit;
     experiment.candidates = {{.name = "own",
                               .joint = FactsOfRig(rig).joints.front(),
-                              .torque = "size * max(sin(angle), cos(time)) * command",
-                              .parameters = {{.key = "size", .unit = "N m", .low = 0, .high = 1, .trials = {0.1}}}}};
+                              .torque = "size * max(sin(angle), cos(5 * time)) * command",
+                              .parameters = {{.key = "size", .unit = unit, .low = 0, .high = 1, .trials = {0.1}}}}};
     const auto base = MakeModel(experiment);
     std::vector<std::string> texts = {"command_delay", "coulomb_friction", "stribeck_friction", "actuator_lag",
                                       "sensor_delay"};

@@ -198,7 +198,7 @@ Command DiagnoseCommand() {
           .plugins = &flags->plugins,
           .leave_out_plugins =
               [flags](const std::string& crash) {
-                if (!HasPluginCandidates(flags->model.experiment)) return false;
+                if (flags->plugins.empty() || !HasPluginCandidates(flags->model.experiment)) return false;
                 flags->plugin_fault = crash.empty() ? "" : "the diagnosis crashed with it: " + crash;
                 flags->resume = flags->resume && crash.empty();
                 return true;

@@ -41,26 +41,26 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
   return std::sqrt(sum / std::max(1.0, signals));
 }
 
-// Of the logs that `predicted` is of.
-std::vector<SignalFloors> FloorsOfSignals(const std::vector<LogReplay>& predicted,
-                                          const std::vector<Recording>& recordings, const std::vector<double>& noise) {
-  std::map<std::size_t, std::pair<double, double>> squares;  // their sum and count, by signal
-  std::map<std::size_t, std::string> names;
-  for (std::size_t l = 0; l < predicted.size(); ++l) {
-    for (std::size_t s = 0; s < predicted[l].signals.size(); ++s) {
-      const SignalTrace& trace = predicted[l].signals[s];
-      if (!trace.scored) continue;
-      const std::size_t index = recordings[l].measured[s].index;
-      names[index] = trace.signal;
-      for (std::size_t row = 0; row < trace.predicted.size(); ++row) {
-        const double missed = (trace.predicted[row] - trace.measured[row]) / noise[index];
-        if (std::isfinite(missed)) squares[index].first += missed * missed, squares[index].second += 1;
-      }
+// Of the held-out logs.
+std::vector<SignalFloors> FloorsOfSignals(const Workbench& bench, const BlockErrors& errors) {
+  struct Sum {
+    std::string signal;
+    double squares = 0, rows = 0;
+  };
+  std::map<std::size_t, Sum> sums;
+  for (std::size_t l = 0; l < errors.size(); ++l) {
+    for (std::size_t s = 0; s < errors[l].size(); ++s) {
+      if (!errors[l][s].scored || errors[l][s].rows == 0) continue;
+      const auto& measured = bench.data.held_out[l].measured[s];
+      Sum& sum = sums[measured.index];
+      sum.signal = measured.spec.signal;
+      sum.rows += errors[l][s].rows;
+      for (const auto& [block, square] : errors[l][s].squares) sum.squares += square;
     }
   }
-  auto signals = Collect(squares, [&](const auto& entry) {
-    const auto& [sum, count] = entry.second;
-    return SignalFloors{names[entry.first], std::sqrt(sum / count)};
+  auto signals = Collect(sums, [&](const auto& entry) {
+    const Sum& sum = entry.second;
+    return SignalFloors{sum.signal, bench.weights[entry.first] * std::sqrt(sum.squares / sum.rows)};
   });
   std::stable_sort(signals.begin(), signals.end(), [](const auto& a, const auto& b) { return a.floors > b.floors; });
   return signals;
@@ -99,13 +99,14 @@ std::vector<ConditionShare> Locate(const Workbench& bench, const std::vector<Log
   return where;
 }
 
-// Of the base model's predictions and the final one's.
-void SayWhereItLies(const Workbench& bench, const std::vector<LogReplay>& before, const std::vector<LogReplay>& after,
-                    const DescribeOptions& options, Diagnosis* result) {
-  const std::vector<Recording>& logs = bench.data.held_out;
-  result->where = Locate(bench, before, FloorsOfSignals(before, logs, options.noise), options.seed);
-  result->evidence.signals = FloorsOfSignals(after, logs, options.noise);
-  result->remains = Locate(bench, after, result->evidence.signals, options.seed);
+// `predicted`: by the final model.
+void SayWhereItLies(const Workbench& bench, const Candidate& base, const Candidate& chosen,
+                    const std::vector<LogReplay>& predicted, std::uint64_t seed, Diagnosis* result) {
+  result->evidence.signals = FloorsOfSignals(bench, chosen.held_out);
+  result->remains = Locate(bench, predicted, result->evidence.signals, seed);
+  result->where = &base == &chosen
+                      ? result->remains
+                      : Locate(bench, PredictHeldOut(bench, base), FloorsOfSignals(bench, base.held_out), seed);
 }
 
 // Base parameters that ended on a bound.
@@ -266,7 +267,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
     say("designing the next experiment");
     result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
   }
-  SayWhereItLies(bench, &chosen == &base ? predicted : PredictHeldOut(bench, base), predicted, options, &result);
+  SayWhereItLies(bench, base, chosen, predicted, seed, &result);
   result.cut = found.cut;
   if (bench.TimeIsOver()) result.cut.emplace_back("fits while judging");
   result.work = *bench.work;

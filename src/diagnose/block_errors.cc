@@ -48,4 +48,12 @@ BlockSquares NormalisedSquares(const BlockErrors& errors) {
   return SquaresByBlock(errors, weight);
 }
 
+std::vector<double> NormalisedErrors(const BlockErrors& errors) {
+  std::vector<double> of_logs(errors.size(), 0);
+  for (const auto& [block, square] : NormalisedSquares(errors))
+    of_logs[block.first] += square * static_cast<double>(errors.size());
+  for (double& error : of_logs) error = std::sqrt(error);
+  return of_logs;
+}
+
 }  // namespace gapscope

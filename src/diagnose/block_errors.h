@@ -29,6 +29,9 @@ BlockSquares SquaresByBlock(const BlockErrors& errors,
 // Weighed so that they add up to ReplayError's square, the same number of rows of each log taken as simulated.
 BlockSquares NormalisedSquares(const BlockErrors& errors);
 
+// Of each log: ReplayError of it alone.
+std::vector<double> NormalisedErrors(const BlockErrors& errors);
+
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_DIAGNOSE_BLOCK_ERRORS_H_

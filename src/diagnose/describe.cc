@@ -41,6 +41,14 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
   return std::sqrt(sum / std::max(1.0, signals));
 }
 
+std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, const Candidate& final) {
+  const std::vector<double> before = NormalisedErrors(base.held_out), after = NormalisedErrors(final.held_out);
+  std::vector<LogGap> gaps;
+  for (std::size_t l = 0; l < std::min(before.size(), after.size()); ++l)
+    gaps.push_back({bench.data.held_out[l].log_path, before[l], after[l]});
+  return gaps;
+}
+
 // Of the held-out logs.
 std::vector<SignalFloors> FloorsOfSignals(const Workbench& bench, const BlockErrors& errors) {
   struct Sum {
@@ -252,6 +260,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.closed = result.refit > result.floor
                       ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0)
                       : 0;
+  result.by_log = GapByLog(bench, base, chosen);
   result.effects = DescribeEffects(bench, found, chosen, beside, &judgement);
   for (const Statement& s : judgement.statements) {
     if (s.group < 0 || s.answer != Answer::kPresent) continue;

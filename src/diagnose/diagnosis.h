@@ -173,6 +173,13 @@ struct FittedWindows {
   double length_s = 0;
 };
 
+// The errors of one held-out log: of the refitted base model and of the final one. How far logs differ is how far
+// what closes on the next one may.
+struct LogGap {
+  std::string log;
+  double refit = 0, final = 0;
+};
+
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   double probability = 0;
@@ -183,6 +190,7 @@ struct Diagnosis {
   std::vector<std::vector<EffectUse>> ambiguous;  // groups that these logs cannot tell apart
   // Held-out errors, normalised: see ReplayError; in windows.
   double nominal = 0, refit = 0, final = 0, floor = 0, closed = 0;
+  std::vector<LogGap> by_log;
   VerdictEvidence evidence;
   std::vector<ConditionShare> where;    // the refitted base model's error, by condition
   std::vector<ConditionShare> remains;  // the final model's

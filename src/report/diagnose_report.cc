@@ -320,6 +320,10 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   }
   json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},   {"final", JsonNumber(d.final)},
                  {"floor", JsonNumber(d.floor)},     {"closed", JsonNumber(d.closed)}, {"held_out", true}};
+  json["gap"]["by_log"] = ordered_json::array();
+  for (const LogGap& gap : d.by_log)
+    json["gap"]["by_log"].push_back(
+        {{"log", gap.log}, {"refit", JsonNumber(gap.refit)}, {"final", JsonNumber(gap.final)}});
   json["evidence"] = Json(d.evidence);
   json["where"] = JsonConditions(d.where);
   json["remains"] = JsonConditions(d.remains);
@@ -366,7 +370,7 @@ std::string ToTable(const DiagnoseRun& run) {
   for (const Sentence& sentence : SentencesOf(d)) text += Wrapped("- " + sentence.Text(), 120, "  ") + "\n";
   if (!d.effects.empty()) text += SizeTable(d);
   text += "\nheld-out error, a share of the signals' standard deviation\n";
-  for (const std::string& sentence : {GapInWindows(d), GapInFreeRuns(d)}) {
+  for (const std::string& sentence : {GapInWindows(d), GapByLog(d), GapInFreeRuns(d)}) {
     if (!sentence.empty()) text += Wrapped("- " + sentence, 120, "  ") + "\n";
   }
   text += RemainderText(d.remainder);

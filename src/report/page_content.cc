@@ -55,7 +55,9 @@ PageContent PageOf(const DiagnoseRun& run) {
         {.title = "Of what " + Listed(found) + (found.size() > 1 ? " leave" : " leaves"), .shares = First(d.remains)});
   }
   page.findings = SentencesOf(d);
-  page.gap = GapInFreeRuns(d);  // the headline says how it went in windows
+  // The headline says how it went in windows.
+  const std::string by_log = GapByLog(d), free = GapInFreeRuns(d);
+  page.gap = by_log + (by_log.empty() || free.empty() ? "" : "; ") + free;
   page.remainder = PartsOf(d.remainder);
   page.reachable = d.remainder.reachable;
   AddStatements(d, &page);

@@ -100,6 +100,18 @@ std::string GapInWindows(const Diagnosis& d) {
       100 * d.closed);
 }
 
+std::string GapByLog(const Diagnosis& d) {
+  std::vector<double> shares;
+  for (const LogGap& gap : d.by_log) {
+    if (gap.refit > 0 && std::isfinite(gap.refit) && std::isfinite(gap.final))
+      shares.push_back(1 - gap.final / gap.refit);
+  }
+  if (d.effects.empty() || shares.size() < 2) return "";
+  const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
+  return fmt::format("log by log, {} held out: {:.0f} .. {:.0f} % of the error goes", shares.size(), 100 * *least,
+                     100 * *most);
+}
+
 std::string GapInFreeRuns(const Diagnosis& d) {
   const VerdictEvidence& e = d.evidence;
   if (d.effects.empty() || !std::isfinite(e.free_run_before) || !std::isfinite(e.free_run_left)) return "";

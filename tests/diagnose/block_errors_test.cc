@@ -33,6 +33,14 @@ TEST(BlockErrorsTest, NormalisedOnesAddUpToTheReplaysError) {
   EXPECT_EQ(squares.size(), 8U + 5U);  // 4 s and 2.5 s
 }
 
+TEST(BlockErrorsTest, EachLogHasItsOwnError) {
+  const std::vector<LogReplay> logs = {Log(40, 0.3, true), Log(25, 0.1, false)};
+  const std::vector<double> errors = NormalisedErrors(ErrorsByBlock(logs));
+  ASSERT_EQ(errors.size(), 2U);
+  EXPECT_NEAR(errors[0], ReplayError({logs[0]}), 1e-12);
+  EXPECT_NEAR(errors[1], ReplayError({logs[1]}), 1e-12);
+}
+
 TEST(BlockErrorsTest, HalfSecondsHoldWhatWasMissedInThem) {
   LogReplay log = Log(20, 0, true);
   log.signals[0].predicted[7] += 2;  // at 0.75 s

@@ -71,6 +71,16 @@ TEST(SentencesTest, TheGapInWindowsAndInFreeRuns) {
   EXPECT_EQ(GapInFreeRuns(d), "");
 }
 
+TEST(SentencesTest, LogsThatDifferAreARange) {
+  Diagnosis d = Made();
+  d.by_log = {{"a.csv", 0.2, 0.05}};
+  EXPECT_EQ(GapByLog(d), "");
+  d.by_log = {{"a.csv", 0.2, 0.05}, {"b.csv", 0.1, 0.11}, {"c.csv", INFINITY, 0.1}, {"d.csv", 0.4, 0.2}};
+  EXPECT_EQ(GapByLog(d), "log by log, 3 held out: -10 .. 75 % of the error goes");
+  d.effects.clear();
+  EXPECT_EQ(GapByLog(d), "");
+}
+
 TEST(SentencesTest, WhatIsNotKnownOfTheRemainderIsLeftOut) {
   const auto parts = PartsOf({.explained = 0.9, .systematic = 0.06, .sensors = 0.04, .not_repeatable = NAN});
   ASSERT_EQ(parts.size(), 3u);

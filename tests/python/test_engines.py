@@ -182,7 +182,7 @@ def test_what_mjx_ignores_it_ignores_without_a_word(joint: tuple[str, str], tmp_
 def test_a_late_command_is_late_by_its_whole_steps(
     engine: str, steps: int, joint: tuple[str, str], tmp_path: Path
 ) -> None:
-    """MuJoCo Warp's Runge-Kutta reads the command of the step's begin in all its stages; MuJoCo's last one a step early.
+    """MuJoCo Warp's Runge-Kutta keeps the time of a step's begin in all stages; MuJoCo's last one reads a step early.
 
     So the actuator's own delay is exact there. For MJX the host sends later, which is exact too.
     """

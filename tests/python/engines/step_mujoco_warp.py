@@ -1,6 +1,6 @@
-"""Run by the interpreter of scripts/engine_env mujoco_warp: step_mujoco_warp.py MODEL.xml IN.npz OUT.npz, as step_mjx.py.
+"""Run by the interpreter of scripts/engine_env mujoco_warp: step_mujoco_warp.py MODEL.xml IN.npz OUT.npz.
 
-MuJoCo Warp computes in single precision; here on the processor.
+As step_mjx.py. MuJoCo Warp computes in single precision; here on the processor.
 """
 
 import sys

@@ -15,8 +15,8 @@ import pytest
 if TYPE_CHECKING:
     import gapscope as gs
 
-# scripts/wheel and scripts/bench_python run the first two, test_mjlab.py what is in mjlab.
-collect_ignore = ["try_wheel.py", "bench.py", "mjlab"]
+# scripts/wheel and scripts/bench_python run the first two, test_mjlab.py and test_engines.py what is in the folders.
+collect_ignore = ["try_wheel.py", "bench.py", "mjlab", "engines"]
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 

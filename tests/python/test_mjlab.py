@@ -37,7 +37,7 @@ def target(t: float) -> float:
 
 @pytest.fixture(scope="session")
 def mjlab() -> Path:
-    made = subprocess.run([ROOT / "scripts" / "mjlab_env"], capture_output=True, text=True, check=True)
+    made = subprocess.run([ROOT / "scripts" / "engine_env", "mjlab"], capture_output=True, text=True, check=True)
     return Path(made.stdout.strip())
 
 

@@ -1,6 +1,6 @@
 """The function that is written for Playground, with numpy in the place of JAX.
 
-Tried with JAX 0.10.2 and MJX 3.17 too, which are too large for this environment.
+test_engines.py runs it with JAX and MJX themselves, where scripts/engine_env mjx made them.
 """
 
 import runpy

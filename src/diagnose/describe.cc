@@ -30,10 +30,10 @@ double Bic(const Candidate& candidate) {
 }
 
 // The sensors' noise as a normalised error.
-double FloorError(const std::vector<Recording>& recordings, const std::vector<double>& noise) {
+double FloorError(const Recording* const begin, const Recording* const end, const std::vector<double>& noise) {
   double sum = 0, signals = 0;
-  for (const auto& recording : recordings) {
-    for (const auto& measured : recording.measured) {
+  for (const Recording* recording = begin; recording != end; ++recording) {
+    for (const auto& measured : recording->measured) {
       const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
       if (measured.spec.scored && std::isfinite(share)) sum += share * share, signals += 1;
     }
@@ -41,11 +41,14 @@ double FloorError(const std::vector<Recording>& recordings, const std::vector<do
   return std::sqrt(sum / std::max(1.0, signals));
 }
 
-std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, const Candidate& final) {
+std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, const Candidate& final,
+                             const std::vector<double>& noise) {
   const std::vector<double> before = NormalisedErrors(base.held_out), after = NormalisedErrors(final.held_out);
   std::vector<LogGap> gaps;
-  for (std::size_t l = 0; l < std::min(before.size(), after.size()); ++l)
-    gaps.push_back({bench.data.held_out[l].log_path, before[l], after[l]});
+  for (std::size_t l = 0; l < std::min(before.size(), after.size()); ++l) {
+    const Recording& log = bench.data.held_out[l];
+    gaps.push_back({log.log_path, before[l], after[l], std::min(FloorError(&log, &log + 1, noise), after[l])});
+  }
   return gaps;
 }
 
@@ -233,6 +236,10 @@ Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement
 
 }  // namespace
 
+double ClosedShare(double refit, double final, double floor) {
+  return refit > floor ? std::clamp((refit - final) / (refit - floor), 0.0, 1.0) : 0;
+}
+
 Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const DescribeOptions& options,
                            const Say& say) {
   const auto& [noise, seed, next_experiment] = options;
@@ -256,11 +263,10 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.nominal = found.nominal->held_out_error;
   result.refit = base.held_out_error;
   result.final = chosen.held_out_error;
-  result.floor = std::min(FloorError(bench.data.held_out, noise), result.final);
-  result.closed = result.refit > result.floor
-                      ? std::clamp((result.refit - result.final) / (result.refit - result.floor), 0.0, 1.0)
-                      : 0;
-  result.by_log = GapByLog(bench, base, chosen);
+  const std::vector<Recording>& held_out = bench.data.held_out;
+  result.floor = std::min(FloorError(held_out.data(), held_out.data() + held_out.size(), noise), result.final);
+  result.closed = ClosedShare(result.refit, result.final, result.floor);
+  result.by_log = GapByLog(bench, base, chosen, noise);
   result.effects = DescribeEffects(bench, found, chosen, beside, &judgement);
   for (const Statement& s : judgement.statements) {
     if (s.group < 0 || s.answer != Answer::kPresent) continue;

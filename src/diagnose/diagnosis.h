@@ -173,12 +173,14 @@ struct FittedWindows {
   double length_s = 0;
 };
 
-// The errors of one held-out log: of the refitted base model and of the final one. How far logs differ is how far
-// what closes on the next one may.
+// Of one held-out log, or of one part of it: the refitted base model's error, the final one's, and what the sensors'
+// noise is of it. How far logs differ is how far what closes on the next one may.
 struct LogGap {
   std::string log;
-  double refit = 0, final = 0;
+  double refit = 0, final = 0, floor = 0;
 };
+// (refit - final) / (refit - floor), 0 .. 1; 0 where nothing is above the floor.
+double ClosedShare(double refit, double final, double floor);
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;

@@ -321,9 +321,12 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},   {"final", JsonNumber(d.final)},
                  {"floor", JsonNumber(d.floor)},     {"closed", JsonNumber(d.closed)}, {"held_out", true}};
   json["gap"]["by_log"] = ordered_json::array();
-  for (const LogGap& gap : d.by_log)
-    json["gap"]["by_log"].push_back(
-        {{"log", gap.log}, {"refit", JsonNumber(gap.refit)}, {"final", JsonNumber(gap.final)}});
+  for (const LogGap& gap : d.by_log) {
+    json["gap"]["by_log"].push_back({{"log", gap.log},
+                                     {"refit", JsonNumber(gap.refit)},
+                                     {"final", JsonNumber(gap.final)},
+                                     {"floor", JsonNumber(gap.floor)}});
+  }
   json["evidence"] = Json(d.evidence);
   json["where"] = JsonConditions(d.where);
   json["remains"] = JsonConditions(d.remains);

@@ -103,13 +103,13 @@ std::string GapInWindows(const Diagnosis& d) {
 std::string GapByLog(const Diagnosis& d) {
   std::vector<double> shares;
   for (const LogGap& gap : d.by_log) {
-    if (gap.refit > 0 && std::isfinite(gap.refit) && std::isfinite(gap.final))
-      shares.push_back(1 - gap.final / gap.refit);
+    if (std::isfinite(gap.refit) && std::isfinite(gap.final))
+      shares.push_back(ClosedShare(gap.refit, gap.final, gap.floor));
   }
   if (d.effects.empty() || shares.size() < 2) return "";
   const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
-  return fmt::format("log by log, {} held out: {:.0f} .. {:.0f} % of the error goes", shares.size(), 100 * *least,
-                     100 * *most);
+  return fmt::format("each of {} held-out logs or parts of a log by itself: {:.0f} .. {:.0f} % closed", shares.size(),
+                     100 * *least, 100 * *most);
 }
 
 std::string GapInFreeRuns(const Diagnosis& d) {

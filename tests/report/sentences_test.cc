@@ -73,10 +73,10 @@ TEST(SentencesTest, TheGapInWindowsAndInFreeRuns) {
 
 TEST(SentencesTest, LogsThatDifferAreARange) {
   Diagnosis d = Made();
-  d.by_log = {{"a.csv", 0.2, 0.05}};
+  d.by_log = {{"a.csv", 0.2, 0.05, 0}};
   EXPECT_EQ(GapByLog(d), "");
-  d.by_log = {{"a.csv", 0.2, 0.05}, {"b.csv", 0.1, 0.11}, {"c.csv", INFINITY, 0.1}, {"d.csv", 0.4, 0.2}};
-  EXPECT_EQ(GapByLog(d), "log by log, 3 held out: -10 .. 75 % of the error goes");
+  d.by_log = {{"a.csv", 0.2, 0.05, 0.04}, {"b.csv", 0.1, 0.11, 0}, {"c.csv", INFINITY, 0.1, 0}, {"d.csv", 0.4, 0.2, 0}};
+  EXPECT_EQ(GapByLog(d), "each of 3 held-out logs or parts of a log by itself: 0 .. 94 % closed");
   d.effects.clear();
   EXPECT_EQ(GapByLog(d), "");
 }

@@ -6,7 +6,7 @@
 For each case of finished banks that names an effect: both models on every log, and the share of the error that goes
 away. Prints a line a case, then how far each way to promise it is from what the withheld log shows; and how far apart
 logs of one case are, a bound for every promise."""
-import argparse, glob, math, statistics, sys
+import argparse, math, statistics, sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -37,12 +37,17 @@ def by_mean(pairs):
 
 
 def measured(build, bank, case):
-    """Errors by log of those that the program had, of those it held out, and of the one it never had."""
-    held = {path.split("#")[0] for path in case.verdict["logs"]["held_out"]}
-    logs = sorted(glob.glob(str(bank / "cases" / str(case.index) / "log_*.csv")))
-    errors = [replayed.errors(build, 1, case.verdict["experiment"], log, case.verdict) for log in logs]
-    seen = [(e, Path(log).name in {Path(h).name for h in held}) for log, e in zip(logs[:-1], errors) if None not in e]
-    return [e for e, _ in seen], [e for e, is_held in seen if is_held], errors[-1]
+    """Errors by log of those that the program had, and of those it held out."""
+    held_names = {Path(path).name for path in case.verdict["logs"]["held_out"]}
+    seen, held = [], []
+    for log in score.given(sorted((bank / "cases" / str(case.index)).glob("log_*.csv"))):
+        errors = replayed.errors(build, 1, case.verdict["experiment"], log, case.verdict)
+        if None in errors:
+            continue
+        seen.append(errors)
+        if log.name in held_names:
+            held.append(errors)
+    return seen, held
 
 
 def told(bank):
@@ -60,15 +65,16 @@ def main():
     off, apart, cases = {}, [], 0
     for bank in options.banks:
         for case in told(bank):
-            seen, held, withheld = measured(options.build, bank, case)
-            if not held or None in withheld:
+            seen, held = measured(options.build, bank, case)
+            if not held:
                 continue
-            gap, real = case.verdict["gap"], closed(withheld)
+            gap, real = case.verdict["gap"], closed(case.verdict["check"]["withheld"])
             print(f"{bank.name} {case.index:3d} {case.rig:10s} withheld {real:5.2f}; seen",
                   *(f"{closed(e):5.2f}" for e in seen), flush=True)
-            ways = {"as told (held out, pooled)": 1 - gap["final"] / gap["refit"], "held out, median": by_median(held),
-                    "held out, mean of logarithms": logarithmic(held), "all seen, pooled": pooled(seen),
-                    "all seen, median": by_median(seen), "all seen, mean": by_mean(seen)}
+            ways = {"as told (held out, pooled)": closed((gap["refit"], gap["final"])),
+                    "held out, median": by_median(held), "held out, mean of logarithms": logarithmic(held),
+                    "all seen, pooled": pooled(seen), "all seen, median": by_median(seen),
+                    "all seen, mean": by_mean(seen)}
             for name, promise in ways.items():
                 off.setdefault(name, []).append(promise - real)
             apart += [abs(closed(a) - by_median(seen[:k] + seen[k + 1:])) for k, a in enumerate(seen) if len(seen) > 1]

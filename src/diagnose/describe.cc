@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 
 #include "src/compare/comparison.h"
 #include "src/core/collect.h"
@@ -30,10 +31,10 @@ double Bic(const Candidate& candidate) {
 }
 
 // The sensors' noise as a normalised error.
-double FloorError(const Recording* const begin, const Recording* const end, const std::vector<double>& noise) {
+double FloorError(std::span<const Recording> recordings, const std::vector<double>& noise) {
   double sum = 0, signals = 0;
-  for (const Recording* recording = begin; recording != end; ++recording) {
-    for (const auto& measured : recording->measured) {
+  for (const auto& recording : recordings) {
+    for (const auto& measured : recording.measured) {
       const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
       if (measured.spec.scored && std::isfinite(share)) sum += share * share, signals += 1;
     }
@@ -47,7 +48,7 @@ std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, cons
   std::vector<LogGap> gaps;
   for (std::size_t l = 0; l < std::min(before.size(), after.size()); ++l) {
     const Recording& log = bench.data.held_out[l];
-    gaps.push_back({log.log_path, before[l], after[l], std::min(FloorError(&log, &log + 1, noise), after[l])});
+    gaps.push_back({log.log_path, before[l], after[l], std::min(FloorError({&log, 1}, noise), after[l])});
   }
   return gaps;
 }
@@ -263,8 +264,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.nominal = found.nominal->held_out_error;
   result.refit = base.held_out_error;
   result.final = chosen.held_out_error;
-  const std::vector<Recording>& held_out = bench.data.held_out;
-  result.floor = std::min(FloorError(held_out.data(), held_out.data() + held_out.size(), noise), result.final);
+  result.floor = std::min(FloorError(bench.data.held_out, noise), result.final);
   result.closed = ClosedShare(result.refit, result.final, result.floor);
   result.by_log = GapByLog(bench, base, chosen, noise);
   result.effects = DescribeEffects(bench, found, chosen, beside, &judgement);

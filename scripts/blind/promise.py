@@ -75,6 +75,11 @@ def main():
                     "held out, median": by_median(held), "held out, mean of logarithms": logarithmic(held),
                     "all seen, pooled": pooled(seen), "all seen, median": by_median(seen),
                     "all seen, mean": by_mean(seen)}
+            left_out = [(e["refit"], e["final"]) for e in gap.get("by_log", [])
+                        if e["refit"] is not None and e["final"] is not None]
+            if len(left_out) > len(held):
+                ways |= {"each log left out, pooled": pooled(left_out),
+                         "each log left out, median": by_median(left_out)}
             for name, promise in ways.items():
                 off.setdefault(name, []).append(promise - real)
             apart += [abs(closed(a) - by_median(seen[:k] + seen[k + 1:])) for k, a in enumerate(seen) if len(seen) > 1]

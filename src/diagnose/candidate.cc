@@ -39,10 +39,17 @@ void ChooseWindows(const Model& model, std::size_t max_windows, Workbench* bench
   bench->windows.reset();
   FitOptions options = bench->Options(model, true);
   options.max_windows = 0;
-  const std::vector<LogWindow> all = TakenWindows(bench->data.train, options);
+  const std::vector<LogWindow> all = TakenWindows(bench->data->train, options);
   bench->all_windows = all.size();
   bench->windows =
-      std::make_shared<const std::vector<LogWindow>>(gapscope::ChooseWindows(bench->data.train, all, max_windows));
+      std::make_shared<const std::vector<LogWindow>>(gapscope::ChooseWindows(bench->data->train, all, max_windows));
+}
+
+Workbench WithLogs(const Workbench& bench, const DataSplit& data, const Model& model) {
+  Workbench other = bench;
+  other.data = &data;
+  ChooseWindows(model, bench.max_windows, &other);
+  return other;
 }
 
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use) {
@@ -93,7 +100,7 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   all.insert(all.end(), effects.begin(), effects.end());
   GS_ASSIGN(candidate.model, Model::Build(bench.rig, all, bench.scales));
   candidate.values = bench.Nominal(*candidate.model);
-  candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data.train,
+  candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data->train,
                                                    bench.Options(*candidate.model, true), candidate.values, bench.pool);
   for (const auto& use : effects) {
     for (const auto& p : PlacedParameters(use, *bench.rig, bench.scales))
@@ -160,7 +167,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   fit.linear_terms = false;
   fit.logarithmic_effects = true;
   fit.prior_centre = bench.Nominal(*candidate->model);
-  auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data.train, fit, candidate->values, bench.pool);
+  auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data->train, fit, candidate->values, bench.pool);
   problem->CountKnown(VarianceAt(*problem, candidate->train_cost));
   const FitPoint start = CarryOver(*candidate->problem, candidate->point, *problem, candidate->values);
   const SolveOptions options{.max_iterations = 8,
@@ -191,7 +198,7 @@ namespace {
 std::unique_ptr<FitProblem> HeldOutProblem(const Workbench& bench, const Candidate& candidate, FitOptions options) {
   options.fit_shift = false;
   options.stamps = candidate.stamps;
-  return std::make_unique<FitProblem>(*candidate.model, bench.data.held_out, options, candidate.values, bench.pool);
+  return std::make_unique<FitProblem>(*candidate.model, bench.data->held_out, options, candidate.values, bench.pool);
 }
 
 // That problem fitted, as `options` score it. Null where the candidate cannot be simulated there.
@@ -242,7 +249,7 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   options.max_windows = 0;
   // Of long logs some parts: all of them would say the same again.
   const EvidencePolicy& policy = kDiagnosePolicy.evidence;
-  const bool is_long = std::any_of(bench.data.held_out.begin(), bench.data.held_out.end(), [&](const Recording& r) {
+  const bool is_long = std::any_of(bench.data->held_out.begin(), bench.data->held_out.end(), [&](const Recording& r) {
     return r.time_s.back() - r.time_s.front() > 2 * policy.free_run_s;
   });
   if (is_long) {

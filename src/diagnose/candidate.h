@@ -50,7 +50,7 @@ using Say = std::function<void(const std::string&)>;
 // What all candidates share.
 struct Workbench {
   std::shared_ptr<const Rig> rig;
-  const DataSplit& data;
+  const DataSplit* data;
   const ScaleTable& scales;
   ThreadPool& pool;
   std::vector<double> weights;  // per experiment signal: 1 / noise
@@ -91,6 +91,8 @@ struct Workbench {
 
 // The windows to fit are chosen once, not by every candidate: of long logs that is a look at every row.
 void ChooseWindows(const Model& model, std::size_t max_windows, Workbench* bench);
+// The same work on other logs, which must outlive what is made of it.
+Workbench WithLogs(const Workbench& bench, const DataSplit& data, const Model& model);
 
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use);
 

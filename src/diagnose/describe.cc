@@ -12,6 +12,7 @@
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
 #include "src/diagnose/explain.h"
+#include "src/diagnose/gap_by_log.h"
 #include "src/diagnose/gap_shares.h"
 #include "src/diagnose/judge.h"
 #include "src/diagnose/next_experiment.h"
@@ -30,29 +31,6 @@ double Bic(const Candidate& candidate) {
   return n * std::log(std::max(candidate.train_cost, 1e-300)) + std::log(n) * static_cast<double>(candidate.parameters);
 }
 
-// The sensors' noise as a normalised error.
-double FloorError(std::span<const Recording> recordings, const std::vector<double>& noise) {
-  double sum = 0, signals = 0;
-  for (const auto& recording : recordings) {
-    for (const auto& measured : recording.measured) {
-      const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
-      if (measured.spec.scored && std::isfinite(share)) sum += share * share, signals += 1;
-    }
-  }
-  return std::sqrt(sum / std::max(1.0, signals));
-}
-
-std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, const Candidate& final,
-                             const std::vector<double>& noise) {
-  const std::vector<double> before = NormalisedErrors(base.held_out), after = NormalisedErrors(final.held_out);
-  std::vector<LogGap> gaps;
-  for (std::size_t l = 0; l < std::min(before.size(), after.size()); ++l) {
-    const Recording& log = bench.data.held_out[l];
-    gaps.push_back({log.log_path, before[l], after[l], std::min(FloorError({&log, 1}, noise), after[l])});
-  }
-  return gaps;
-}
-
 // Of the held-out logs.
 std::vector<SignalFloors> FloorsOfSignals(const Workbench& bench, const BlockErrors& errors) {
   struct Sum {
@@ -63,7 +41,7 @@ std::vector<SignalFloors> FloorsOfSignals(const Workbench& bench, const BlockErr
   for (std::size_t l = 0; l < errors.size(); ++l) {
     for (std::size_t s = 0; s < errors[l].size(); ++s) {
       if (!errors[l][s].scored || errors[l][s].rows == 0) continue;
-      const auto& measured = bench.data.held_out[l].measured[s];
+      const auto& measured = bench.data->held_out[l].measured[s];
       Sum& sum = sums[measured.index];
       sum.signal = measured.spec.signal;
       sum.rows += errors[l][s].rows;
@@ -85,7 +63,7 @@ std::vector<ConditionShare> Locate(const Workbench& bench, const std::vector<Log
   LogComparison located;
   if (predicted.empty()) return {};
   const LogReplay& log = predicted.front();
-  const Recording& recording = bench.data.held_out.front();
+  const Recording& recording = bench.data->held_out.front();
   for (std::size_t s = 0; s < log.signals.size(); ++s) {
     const SignalTrace& trace = log.signals[s];
     if (!trace.scored) continue;
@@ -237,10 +215,6 @@ Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement
 
 }  // namespace
 
-double ClosedShare(double refit, double final, double floor) {
-  return refit > floor ? std::clamp((refit - final) / (refit - floor), 0.0, 1.0) : 0;
-}
-
 Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const DescribeOptions& options,
                            const Say& say) {
   const auto& [noise, seed, next_experiment] = options;
@@ -264,8 +238,9 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.nominal = found.nominal->held_out_error;
   result.refit = base.held_out_error;
   result.final = chosen.held_out_error;
-  result.floor = std::min(FloorError(bench.data.held_out, noise), result.final);
+  result.floor = std::min(FloorError(bench.data->held_out, noise), result.final);
   result.closed = ClosedShare(result.refit, result.final, result.floor);
+  say("leaving each log out");
   result.by_log = GapByLog(bench, base, chosen, noise);
   result.effects = DescribeEffects(bench, found, chosen, beside, &judgement);
   for (const Statement& s : judgement.statements) {
@@ -286,7 +261,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.cut = found.cut;
   if (bench.TimeIsOver()) result.cut.emplace_back("fits while judging");
   result.work = *bench.work;
-  for (const auto* part : {&bench.data.train, bench.by_windows ? nullptr : &bench.data.held_out}) {
+  for (const auto* part : {&bench.data->train, bench.by_windows ? nullptr : &bench.data->held_out}) {
     if (!part) continue;
     for (const auto& recording : *part) result.data_s += recording.time_s.back() - recording.time_s.front();
   }

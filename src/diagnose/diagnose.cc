@@ -233,9 +233,9 @@ double FinestStep(const DataSplit& data) {
 }
 
 void SayWhatWasFitted(const Workbench& bench, Diagnosis* result) {
-  for (const auto& recording : bench.data.train) result->train_logs.push_back(recording.log_path);
-  for (const auto& recording : bench.data.held_out) result->held_out_logs.push_back(recording.log_path);
-  result->split = bench.data.how;
+  for (const auto& recording : bench.data->train) result->train_logs.push_back(recording.log_path);
+  for (const auto& recording : bench.data->held_out) result->held_out_logs.push_back(recording.log_path);
+  result->split = bench.data->how;
   result->by_windows = bench.by_windows;
   result->time_step_s = bench.time_step_s;
   result->windows = {.fitted = bench.windows->size(), .all = bench.all_windows, .length_s = bench.window_s};
@@ -273,7 +273,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   bool fewer_windows = false;
   const auto make_bench = [&](const DataSplit& part, bool by_windows) {
     Workbench bench{.rig = model->rig(),
-                    .data = part,
+                    .data = &part,
                     .scales = scales,
                     .pool = pool,
                     .weights = WeightsOf(experiment, noise),

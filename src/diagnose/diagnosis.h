@@ -173,14 +173,21 @@ struct FittedWindows {
   double length_s = 0;
 };
 
-// Of one held-out log, or of one part of it: the refitted base model's error, the final one's, and what the sensors'
-// noise is of it. How far logs differ is how far what closes on the next one may.
+// Of one log, or of one part of it, by parameters fitted without it: the refitted base model's error, the final one's,
+// and what the sensors' noise is of it.
 struct LogGap {
   std::string log;
   double refit = 0, final = 0, floor = 0;
 };
 // (refit - final) / (refit - floor), 0 .. 1; 0 where nothing is above the floor.
 double ClosedShare(double refit, double final, double floor);
+// What closes on one log and another: what to expect of a further one.
+struct ClosedByLog {
+  double median = 0, least = 0, most = 0;  // shares
+  std::size_t logs = 0;
+};
+// Of those that the base model can be simulated on; where the final one cannot, nothing closes. None: fewer than two.
+std::optional<ClosedByLog> ClosedOf(std::span<const LogGap> gaps);
 
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;

@@ -29,7 +29,7 @@ double FreeGain(double before, double after) {
 // What each half second of the held-out logs gains.
 BlockSquares GainsByBlock(const Workbench& bench, const Candidate& without, const Candidate& with) {
   const auto weight = [&](std::size_t log, std::size_t signal) {
-    const double w = bench.weights[bench.data.held_out[log].measured[signal].index];
+    const double w = bench.weights[bench.data->held_out[log].measured[signal].index];
     return w * w;
   };
   BlockSquares gains = SquaresByBlock(without.held_out, weight);
@@ -52,7 +52,7 @@ std::vector<BlockGain> Carriers(const Workbench& bench, const BlockSquares& gain
   if (!(total > 0)) return {};
   std::vector<BlockGain> blocks;
   for (const auto& [block, gain] : gains) {
-    const Recording& log = bench.data.held_out[block.first];
+    const Recording& log = bench.data->held_out[block.first];
     const double from_s = log.start_s + static_cast<double>(block.second) * kFitPolicy.block_s;
     blocks.push_back(
         {.log = log.log_path, .from_s = from_s, .to_s = from_s + kFitPolicy.block_s, .share = gain / total});

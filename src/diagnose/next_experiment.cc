@@ -50,7 +50,7 @@ void FillLimits(const DataSplit& data, double margin, Experiment* experiment) {
 
 // The drive of the place that is asked about, else the first; others stand where the first log begins.
 RehearsalOptions RehearsalOf(const OpenQuestion& question, const Workbench& bench) {
-  const Recording& log = bench.data.train.front();
+  const Recording& log = bench.data->train.front();
   RehearsalOptions options{.log_values = log.values, .rate_hz = 1 / bench.sample_s};
   for (const Explanation& asked : question.next.separates) {
     if (!asked || !options.actuator.empty()) continue;
@@ -94,9 +94,9 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
                          .deadline = bench.deadline};
   Experiment experiment = bench.rig->experiment();
   GS_ASSIGN([[maybe_unused]] const std::size_t driven, DrivenCommand(experiment, {}));  // there is a command
-  FillLimits(bench.data, options.margin, &experiment);
+  FillLimits(*bench.data, options.margin, &experiment);
   // The new log has the columns that these have.
-  const LoggedSignals logged = WhatIsLogged(bench.data.train);
+  const LoggedSignals logged = WhatIsLogged(bench.data->train);
   for (MeasuredSpec& spec : experiment.measured) spec.scored = logged.signals.contains(spec.signal);
   experiment = WithLimitSignals(experiment);
   GS_ASSIGN(const auto rig, Rig::Load(experiment));

@@ -32,7 +32,7 @@ class Asking {
  private:
   OpenQuestion Empty(Why why) const {
     OpenQuestion question{.next = {.why = why}};
-    for (const auto& recording : bench_.data.train) question.seconds += recording.duration_s();
+    for (const auto& recording : bench_.data->train) question.seconds += recording.duration_s();
     const auto residuals = static_cast<double>(found_.chosen->problem->residuals());
     question.remaining = std::max(1.0, 2 * found_.chosen->train_cost / residuals);
     return question;
@@ -127,7 +127,7 @@ class Asking {
   }
 
   std::optional<OpenQuestion> OfOneLog() {
-    if (bench_.data.held_out.size() < 2) return std::nullopt;
+    if (bench_.data->held_out.size() < 2) return std::nullopt;
     for (const Statement& s : judgement_.statements) {
       if (s.answer != Answer::kPresent || !s.sets || s.sets->blocks.empty()) continue;
       std::map<std::string, double> logs;

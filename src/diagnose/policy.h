@@ -52,6 +52,10 @@ struct EvidencePolicy {
   // By which intervals of sizes are wider than their covariance says: a set that is not quite right leaves more than
   // noise and torques. Fitted to banks (docs/results/diagnosis.md).
   double interval_factor = 1.6;
+  // Training logs are left out in so many parts, the parameters fitted to the others from where they are.
+  std::size_t folds = 5;
+  int left_out_iterations = 3;
+  double left_out_tolerance = 1e-3;
   std::size_t draws = 200;  // of held-out half seconds, for the intervals of shares
   double most_gain = 3;     // above it a gain says nothing more
   // For two to be told as one: most of their gain that shows when one of them is taken out, or least share of the

@@ -82,8 +82,8 @@ Remainder Divide(const Workbench& bench, const Candidate& base, const Candidate&
   if (!(before > 0) || !std::isfinite(before)) return remainder;
   std::vector<Recording> logs;
   std::vector<LogReplay> predicted;
-  Gather(bench.data.train, final.problem->Predict(final.point), &logs, &predicted);
-  Gather(bench.data.held_out, held_out, &logs, &predicted);
+  Gather(bench.data->train, final.problem->Predict(final.point), &logs, &predicted);
+  Gather(bench.data->held_out, held_out, &logs, &predicted);
   const double left = std::min(1.0, final.held_out_error * final.held_out_error / before);
   remainder.explained = 1 - left;
   remainder.sensors = std::min(left, floor * floor / before);

@@ -461,7 +461,7 @@ double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(
 
 Result<std::unique_ptr<SearchResult>> FitBase(const Workbench& bench, const Say& say) {
   auto result = std::make_unique<SearchResult>(bench);
-  result->logged = WhatIsLogged(bench.data.train);
+  result->logged = WhatIsLogged(bench.data->train);
   Searcher searcher(bench, say, result.get());
   GS_RETURN_IF_ERROR(searcher.Fit());
   const double train_floors = std::sqrt(

@@ -63,7 +63,7 @@ Hint HintOf(const Candidate& candidate) {
 Result<ShortSearch> SearchShortWindows(const Workbench& bench, const Candidate& base, const Say& say) {
   ShortSearch result;
   if (!IsLost(base)) return result;
-  const double shortest_s = ShortestWindow(bench.data);
+  const double shortest_s = ShortestWindow(*bench.data);
   for (double window_s = bench.window_s / 2; window_s >= shortest_s; window_s /= 2) {
     const Workbench shorter = WithWindows(bench, *base.model, window_s);
     GS_ASSIGN(const bool lost, IsLostIn(shorter, base));

@@ -48,7 +48,7 @@ DriveMotion DriveOf(const Workbench& bench, int joint) {
     if (actuator < 0 || m.actuator_trntype[actuator] != mjTRN_JOINT || m.actuator_trnid[2 * actuator] != joint)
       continue;
     double most = 0;
-    for (const auto& recording : bench.data.train)
+    for (const auto& recording : bench.data->train)
       most = std::max(most, MomentsOf(recording.commands[c].values).deviation);
     if (most > 0) return {actuator, most};
   }
@@ -67,7 +67,7 @@ std::vector<ProbeTorque> DrawTorques(const Workbench& bench, std::size_t count, 
   for (int joint = 0; joint < m.njnt; ++joint) {
     const char* name = mj_id2name(&m, mjOBJ_JOINT, joint);
     if (!name || !bench.scales.contains(name)) continue;
-    const JointMotion motion = MotionOf(bench.data.train, name);
+    const JointMotion motion = MotionOf(bench.data->train, name);
     if (!(motion.angle_deviation > 0) || !(motion.speed_deviation > 0)) continue;
     const DriveMotion drive = free_form ? DriveOf(bench, joint) : DriveMotion{};
     for (std::size_t i = 0; i < count; ++i) {

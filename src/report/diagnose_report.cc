@@ -263,6 +263,24 @@ ordered_json JsonFitPolicy() {
           {"fit.bound_share", kCovariancePolicy.bound_share}};
 }
 
+ordered_json JsonGap(const Diagnosis& d) {
+  ordered_json gap = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},
+                      {"final", JsonNumber(d.final)},     {"floor", JsonNumber(d.floor)},
+                      {"closed", JsonNumber(d.closed)},   {"held_out", true}};
+  gap["by_log"] = ordered_json::array();
+  for (const LogGap& of_log : d.by_log) {
+    gap["by_log"].push_back({{"log", of_log.log},
+                             {"refit", JsonNumber(of_log.refit)},
+                             {"final", JsonNumber(of_log.final)},
+                             {"floor", JsonNumber(of_log.floor)}});
+  }
+  if (const auto closed = ClosedOf(d.by_log)) {
+    gap["further_log"] = {
+        {"closed", closed->median}, {"low", closed->least}, {"high", closed->most}, {"logs", closed->logs}};
+  }
+  return gap;
+}
+
 ordered_json JsonPolicy() {
   constexpr const DiagnosePolicy& policy = kDiagnosePolicy;
   ordered_json json = JsonSearchPolicy();
@@ -278,6 +296,9 @@ ordered_json JsonPolicy() {
                                {"evidence.free_run_s", policy.evidence.free_run_s},
                                {"evidence.free_runs", policy.evidence.free_runs},
                                {"evidence.interval_factor", policy.evidence.interval_factor},
+                               {"evidence.folds", policy.evidence.folds},
+                               {"evidence.left_out_iterations", policy.evidence.left_out_iterations},
+                               {"evidence.left_out_tolerance", policy.evidence.left_out_tolerance},
                                {"evidence.draws", policy.evidence.draws},
                                {"evidence.most_gain", policy.evidence.most_gain},
                                {"evidence.alone", policy.evidence.alone},
@@ -318,15 +339,7 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
     for (const auto& use : group) names.push_back(use.effect);
     json["ambiguous"].push_back(names);
   }
-  json["gap"] = {{"nominal", JsonNumber(d.nominal)}, {"refit", JsonNumber(d.refit)},   {"final", JsonNumber(d.final)},
-                 {"floor", JsonNumber(d.floor)},     {"closed", JsonNumber(d.closed)}, {"held_out", true}};
-  json["gap"]["by_log"] = ordered_json::array();
-  for (const LogGap& gap : d.by_log) {
-    json["gap"]["by_log"].push_back({{"log", gap.log},
-                                     {"refit", JsonNumber(gap.refit)},
-                                     {"final", JsonNumber(gap.final)},
-                                     {"floor", JsonNumber(gap.floor)}});
-  }
+  json["gap"] = JsonGap(d);
   json["evidence"] = Json(d.evidence);
   json["where"] = JsonConditions(d.where);
   json["remains"] = JsonConditions(d.remains);

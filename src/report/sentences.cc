@@ -101,15 +101,11 @@ std::string GapInWindows(const Diagnosis& d) {
 }
 
 std::string GapByLog(const Diagnosis& d) {
-  std::vector<double> shares;
-  for (const LogGap& gap : d.by_log) {
-    if (std::isfinite(gap.refit) && std::isfinite(gap.final))
-      shares.push_back(ClosedShare(gap.refit, gap.final, gap.floor));
-  }
-  if (d.effects.empty() || shares.size() < 2) return "";
-  const auto [least, most] = std::minmax_element(shares.begin(), shares.end());
-  return fmt::format("each of {} held-out logs or parts of a log by itself: {:.0f} .. {:.0f} % closed", shares.size(),
-                     100 * *least, 100 * *most);
+  const std::optional<ClosedByLog> closed = ClosedOf(d.by_log);
+  if (d.effects.empty() || !closed) return "";
+  return fmt::format(
+      "each of {} logs or parts of a log, left out of the fit: {:.0f} .. {:.0f} % closed, the median {:.0f} %",
+      closed->logs, 100 * closed->least, 100 * closed->most, 100 * closed->median);
 }
 
 std::string GapInFreeRuns(const Diagnosis& d) {

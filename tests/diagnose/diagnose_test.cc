@@ -60,6 +60,20 @@ Diagnosis DiagnoseLogs(const Logs& logs, const DiagnoseOptions& options = {}) {
   return std::move(result).value();
 }
 
+// Error on one of the logs by the model with its parameters tuned to the others.
+double TunedWithout(const Logs& logs, std::size_t left_out, const Model& model, const std::vector<double>& values) {
+  DataSplit split{.held_out = {logs.recordings[left_out]}};
+  for (std::size_t l = 0; l < logs.recordings.size(); ++l) {
+    if (l != left_out) split.train.push_back(logs.recordings[l]);
+  }
+  ThreadPool pool(2);
+  const TuneOptions options{.objective = ObjectiveKind::kWindows, .starts = 1};
+  const auto tuned = Tune(model, split, values, options, pool);
+  EXPECT_TRUE(tuned.ok());
+  return ReplayError(Evaluate(model, split.held_out, {tuned.value().values, tuned.value().stamps}, ReplayMode::kWindows,
+                              options, pool));
+}
+
 TEST(DiagnoseTest, NamesATorqueBias) {
   const Logs logs = MakeLogs("flexlink", twin::Kind::kSingle, "torque_bias@hub", 31);
   const Diagnosis d = DiagnoseLogs(logs);
@@ -72,6 +86,13 @@ TEST(DiagnoseTest, NamesATorqueBias) {
   EXPECT_NEAR(d.effects[0].parameters[0].value / truth, 1, 0.25);
   EXPECT_LT(d.final, 0.3 * d.refit);
   EXPECT_GT(d.closed, 0.8);
+  ASSERT_EQ(d.by_log.size(), logs.recordings.size());
+  // One of those that were fitted, left out. A tune weighs signals otherwise, which tells where much is missing.
+  const auto left_out = std::find_if(d.by_log.begin(), d.by_log.end(),
+                                     [&](const LogGap& gap) { return gap.log == logs.recordings[0].log_path; });
+  ASSERT_NE(left_out, d.by_log.end());
+  EXPECT_NEAR(left_out->refit / TunedWithout(logs, 0, *d.refit_model, d.refit_values), 1, 0.2);
+  EXPECT_NEAR(left_out->final / TunedWithout(logs, 0, *d.model, d.values), 1, 0.1);
   double sum = 0;
   for (const auto& c : d.candidates) sum += c.probability;
   EXPECT_NEAR(sum, 1, 1e-9);

@@ -76,7 +76,9 @@ TEST(SentencesTest, LogsThatDifferAreARange) {
   d.by_log = {{"a.csv", 0.2, 0.05, 0}};
   EXPECT_EQ(GapByLog(d), "");
   d.by_log = {{"a.csv", 0.2, 0.05, 0.04}, {"b.csv", 0.1, 0.11, 0}, {"c.csv", INFINITY, 0.1, 0}, {"d.csv", 0.4, 0.2, 0}};
-  EXPECT_EQ(GapByLog(d), "each of 3 held-out logs or parts of a log by itself: 0 .. 94 % closed");
+  EXPECT_EQ(GapByLog(d), "each of 3 logs or parts of a log, left out of the fit: 0 .. 94 % closed, the median 50 %");
+  d.by_log.push_back({"e.csv", 0.4, INFINITY, 0});  // where the final model cannot be simulated nothing closes
+  EXPECT_EQ(GapByLog(d), "each of 4 logs or parts of a log, left out of the fit: 0 .. 94 % closed, the median 25 %");
   d.effects.clear();
   EXPECT_EQ(GapByLog(d), "");
 }

@@ -1,0 +1,89 @@
+#include "src/diagnose/gap_by_log.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
+
+namespace gapscope {
+namespace {
+
+// Training logs number `fold`, and each `folds`th after it, kept back from the fit.
+DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds) {
+  DataSplit split{.how = "each log in turn", .asked = data.asked};
+  for (std::size_t l = 0; l < data.train.size(); ++l)
+    (l % folds == fold ? split.held_out : split.train).push_back(data.train[l]);
+  if (!data.asked) split.train.insert(split.train.end(), data.held_out.begin(), data.held_out.end());
+  return split;
+}
+
+// Errors on the held-out logs of `bench` by the model of `fitted`, its parameters fitted anew to the training logs
+// there. Empty: it cannot be simulated.
+std::vector<double> ErrorsWithout(const Workbench& bench, const Candidate& fitted) {
+  auto made = MakeCandidate(bench, fitted.effects);
+  if (!made.ok()) return {};
+  Candidate& candidate = made.value();
+  const double cost_per_residual = fitted.train_cost / static_cast<double>(std::max<std::size_t>(1, fitted.problem->residuals()));
+  const EvidencePolicy& policy = kDiagnosePolicy.evidence;
+  FitCandidate(bench, &candidate, candidate.problem->At(fitted.values, candidate.problem->Start()),
+               {.iterations = policy.left_out_iterations,
+                .tolerance = policy.left_out_tolerance,
+                .least_known = cost_per_residual * static_cast<double>(candidate.problem->residuals())});
+  if (!std::isfinite(candidate.train_cost)) return {};
+  ScoreCandidate(bench, &candidate);
+  return NormalisedErrors(candidate.held_out);
+}
+
+void Append(const std::vector<Recording>& logs, const std::vector<double>& before, const std::vector<double>& after,
+            const std::vector<double>& noise, std::vector<LogGap>* gaps) {
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const double refit = l < before.size() ? before[l] : kInfinity, final = l < after.size() ? after[l] : kInfinity;
+    gaps->push_back({logs[l].log_path, refit, final, std::min(FloorError({&logs[l], 1}, noise), final)});
+  }
+}
+
+}  // namespace
+
+double FloorError(std::span<const Recording> logs, const std::vector<double>& noise) {
+  double sum = 0, signals = 0;
+  for (const auto& log : logs) {
+    for (const auto& measured : log.measured) {
+      const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
+      if (measured.spec.scored && std::isfinite(share)) sum += share * share, signals += 1;
+    }
+  }
+  return std::sqrt(sum / std::max(1.0, signals));
+}
+
+double ClosedShare(double refit, double final, double floor) {
+  return refit > floor ? std::clamp((refit - final) / (refit - floor), 0.0, 1.0) : 0;
+}
+
+std::optional<ClosedByLog> ClosedOf(std::span<const LogGap> gaps) {
+  std::vector<double> shares;
+  for (const LogGap& gap : gaps) {
+    if (std::isfinite(gap.refit)) shares.push_back(ClosedShare(gap.refit, gap.final, gap.floor));
+  }
+  if (shares.size() < 2) return std::nullopt;
+  std::sort(shares.begin(), shares.end());
+  const double median = (shares[(shares.size() - 1) / 2] + shares[shares.size() / 2]) / 2;
+  return ClosedByLog{.median = median, .least = shares.front(), .most = shares.back(), .logs = shares.size()};
+}
+
+std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, const Candidate& final,
+                             const std::vector<double>& noise) {
+  std::vector<LogGap> gaps;
+  Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &gaps);
+  if (final.effects.empty() || bench.by_windows) return gaps;
+  const std::size_t folds = std::min(kDiagnosePolicy.evidence.folds, bench.data->train.size());
+  for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
+    const DataSplit split = LeaveOut(*bench.data, fold, folds);
+    if (split.train.empty()) break;
+    const Workbench without = WithLogs(bench, split, *base.model);
+    Append(split.held_out, ErrorsWithout(without, base), ErrorsWithout(without, final), noise, &gaps);
+  }
+  return gaps;
+}
+
+}  // namespace gapscope

@@ -24,7 +24,8 @@ std::vector<double> ErrorsWithout(const Workbench& bench, const Candidate& fitte
   auto made = MakeCandidate(bench, fitted.effects);
   if (!made.ok()) return {};
   Candidate& candidate = made.value();
-  const double cost_per_residual = fitted.train_cost / static_cast<double>(std::max<std::size_t>(1, fitted.problem->residuals()));
+  const double cost_per_residual =
+      fitted.train_cost / static_cast<double>(std::max<std::size_t>(1, fitted.problem->residuals()));
   const EvidencePolicy& policy = kDiagnosePolicy.evidence;
   FitCandidate(bench, &candidate, candidate.problem->At(fitted.values, candidate.problem->Start()),
                {.iterations = policy.left_out_iterations,

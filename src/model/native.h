@@ -39,6 +39,7 @@ struct NativeFeatures {
   bool tendons = true;            // stops, gaps and springs between two joints
   bool lags = true;               // an actuator's activation
   bool runge_kutta = true;        // else the implicitfast integrator in its place
+  bool late_in_stages = false;    // all of its stages read what is late at the step's begin; MuJoCo's at their own time
   double time_step_s = 0;         // 0: the MJCF's own
 };
 

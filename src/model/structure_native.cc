@@ -243,7 +243,8 @@ void Structure::NativeDelay(const std::string& joint, const std::string& key, do
     input->nsample = std::max(input->nsample, static_cast<int>(std::ceil(input->delay / step_s - 1e-6)) + 1);
     input->interp = whole ? 0 : 1;
   }
-  const bool early = spec->option.integrator == mjINT_RK4;  // whose last stage is at the end of a step
+  // MuJoCo's last stage is at the end of a step.
+  const bool early = spec->option.integrator == mjINT_RK4 && !features.late_in_stages;
   Tell(kMotorTerms, joint, key, late_feedback || early ? Fidelity::kApproximated : Fidelity::kExact,
        "the actuator's own delay of " + in_steps + (early ? ", by RK4 up to a step less" : "") + how_late);
 }

@@ -188,7 +188,7 @@ def test_a_late_command_is_late_by_its_whole_steps(engine: str, joint: tuple[str
     steps = 10
     values = SPRING | {"command_delay@motor": {"delay_s": steps * STEP_S}}
     path, forms = written(joint, values, engine, tmp_path / "to")
-    assert forms["command_delay"] == ("host" if engine == "mjx" else "approximated")
+    assert forms["command_delay"] == ("host" if engine == "mjx" else "exact")
     late = np.concatenate([np.full(steps, TARGETS[0]), TARGETS[:-steps]])
     at_once, _ = written(joint, SPRING, engine, tmp_path / "at_once")
     reference = mujoco.MjModel.from_xml_path(at_once)

@@ -156,6 +156,12 @@ def diagnosis(result: "Diagnosis") -> str:
     ]
     gap = result.gap
     closed = "" if math.isnan(gap.closed) else f", {100 * gap.closed:.0f} % closed"
+    further = gap.further_log
+    if result.effects and further.logs:
+        closed += (
+            f"; each of {further.logs} logs or parts of a log, left out of the fit: "
+            f"{100 * further.low:.0f} .. {100 * further.high:.0f} %"
+        )
     return (
         f"<b>{_text(result.verdict)}</b>, probability {result.probability:.2f}; held-out error "
         f"{_number(gap.nominal, 3)} &rarr; retuned {_number(gap.refit, 3)} &rarr; {_number(gap.final, 3)}{closed}"

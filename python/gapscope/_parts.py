@@ -196,14 +196,36 @@ class Statement(Open):
 
 
 @dataclass(frozen=True)
+class LogGap(Open):
+    """Normalised errors of one log, or of a part of one, by parameters fitted without it."""
+
+    log: str
+    refit: float
+    final: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class FurtherLog(Open):
+    """What to expect of a further log: the median, the least and the most share that closes on ``logs`` logs."""
+
+    closed: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    logs: int = 0
+
+
+@dataclass(frozen=True)
 class Gap(Open):
-    """Held-out normalised errors, and which share of what can close did."""
+    """Held-out normalised errors, which share of what can close did, and the same log by log."""
 
     nominal: float
     refit: float
     final: float
     floor: float
     closed: float
+    by_log: tuple[LogGap, ...] = ()
+    further_log: FurtherLog = field(default_factory=FurtherLog)
 
 
 @dataclass(frozen=True)

@@ -185,7 +185,7 @@ EXTRA = {
     "Diagnosis": {*MADE_BY, "at_bounds", "budget", "candidates", "evidence", "left_out", "logs", "model", "policy"}
     | {"refit_model", "remainder", "remains", "time_step_s", "while", "windows"},
     "Interval": {"ratio"},
-    "Gap": {"by_log", "further_log", "held_out"},
+    "Gap": {"held_out"},
     "Statement": {"blocks", "evidence", "group", "numbers", "prior", "rivals", "seen_beside", "with", "without"},
     "NextExperiment": {"file", "if_absent", "if_present", "probability", "problem", "separates", "why"},
     "Exported": {"logs", "of_each_log", "result", "schema", "versions"},

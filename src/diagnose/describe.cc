@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <span>
 
 #include "src/compare/comparison.h"
 #include "src/core/collect.h"

@@ -11,7 +11,7 @@ namespace {
 
 // Training logs number `fold`, and each `folds`th after it, kept back from the fit.
 DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds) {
-  DataSplit split{.how = "each log in turn", .asked = data.asked};
+  DataSplit split;
   for (std::size_t l = 0; l < data.train.size(); ++l)
     (l % folds == fold ? split.held_out : split.train).push_back(data.train[l]);
   if (!data.asked) split.train.insert(split.train.end(), data.held_out.begin(), data.held_out.end());
@@ -24,13 +24,13 @@ std::vector<double> ErrorsWithout(const Workbench& bench, const Candidate& fitte
   auto made = MakeCandidate(bench, fitted.effects);
   if (!made.ok()) return {};
   Candidate& candidate = made.value();
-  const double cost_per_residual =
-      fitted.train_cost / static_cast<double>(std::max<std::size_t>(1, fitted.problem->residuals()));
+  const double share = static_cast<double>(candidate.problem->residuals()) /
+                       static_cast<double>(std::max<std::size_t>(1, fitted.problem->residuals()));
   const EvidencePolicy& policy = kDiagnosePolicy.evidence;
   FitCandidate(bench, &candidate, candidate.problem->At(fitted.values, candidate.problem->Start()),
                {.iterations = policy.left_out_iterations,
                 .tolerance = policy.left_out_tolerance,
-                .least_known = cost_per_residual * static_cast<double>(candidate.problem->residuals())});
+                .least_known = share * fitted.train_cost});
   if (!std::isfinite(candidate.train_cost)) return {};
   ScoreCandidate(bench, &candidate);
   return NormalisedErrors(candidate.held_out);

@@ -25,7 +25,8 @@ std::vector<Sentence> SentencesOf(const Diagnosis& d);
 // How the gap went on held-out logs. In free runs: empty where no effect was found or no free run was made.
 std::string GapInWindows(const Diagnosis& d);
 std::string GapInFreeRuns(const Diagnosis& d);
-// What the next log may show: how far the held-out ones differ. Empty where there is one, or no effect was found.
+// What the next log may show: how far logs that are left out of the fit differ. Empty where there is one, or no effect
+// was found.
 std::string GapByLog(const Diagnosis& d);
 
 // Parts of the refitted base model's misfit, those that are known, in the order of a bar.

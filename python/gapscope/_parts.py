@@ -203,6 +203,8 @@ class LogGap(Open):
     refit: float
     final: float
     floor: float
+    from_s: float = 0.0
+    until_s: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -178,6 +178,7 @@ struct FittedWindows {
 struct LogGap {
   std::string log;
   double refit = 0, final = 0, floor = 0;
+  double from_s = 0, until_s = 0;  // since the log's first row
 };
 // (refit - final) / (refit - floor), 0 .. 1; 0 where nothing is above the floor.
 double ClosedShare(double refit, double final, double floor);

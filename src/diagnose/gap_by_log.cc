@@ -40,7 +40,12 @@ void Append(const std::vector<Recording>& logs, const std::vector<double>& befor
             const std::vector<double>& noise, std::vector<LogGap>* gaps) {
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const double refit = l < before.size() ? before[l] : kInfinity, final = l < after.size() ? after[l] : kInfinity;
-    gaps->push_back({logs[l].log_path, refit, final, std::min(FloorError({&logs[l], 1}, noise), final)});
+    gaps->push_back({.log = logs[l].log_path,
+                     .refit = refit,
+                     .final = final,
+                     .floor = std::min(FloorError({&logs[l], 1}, noise), final),
+                     .from_s = logs[l].start_s,
+                     .until_s = logs[l].start_s + logs[l].duration_s()});
   }
 }
 

@@ -270,6 +270,8 @@ ordered_json JsonGap(const Diagnosis& d) {
   gap["by_log"] = ordered_json::array();
   for (const LogGap& of_log : d.by_log) {
     gap["by_log"].push_back({{"log", of_log.log},
+                             {"from_s", of_log.from_s},
+                             {"until_s", of_log.until_s},
                              {"refit", JsonNumber(of_log.refit)},
                              {"final", JsonNumber(of_log.final)},
                              {"floor", JsonNumber(of_log.floor)}});

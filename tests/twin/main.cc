@@ -21,6 +21,7 @@ struct Options {
   CaseRequest request;
   std::string kind = "auto", out, label, drive;
   std::vector<std::string> set, shapes;
+  std::string drawing, shaping;  // the first option given that only a drawn case, or only a plant of one's own, heeds
   bool nominal = false, noise = true, loop = false, reference = false;
   double amplitude = 0, duration_s = 8, rate_hz = 500, low_hz = 0, high_hz = 0;
 };
@@ -150,10 +151,15 @@ int Run(const Options& o) {
     return Fail("--kind " + o.kind + ": none, single, pair, triple, unknown, ambiguous, rough or auto");
   const bool manual = o.nominal || !o.set.empty() || !o.shapes.empty();
   if (ArmRig arm; ParseArmRig(request.rig, &arm)) {
-    if (manual || !o.drive.empty())
-      return Fail("--rig " + request.rig + ": takes no --nominal, --set, --excitation, --drive");
+    if (manual || !o.drive.empty() || !o.shaping.empty())
+      return Fail("--rig " + request.rig + ": takes no --nominal, --set, --excitation, --drive" +
+                  (o.shaping.empty() ? "" : ", " + o.shaping));
     return RunArm(o, request, arm);
   }
+  if (manual && !o.drawing.empty())
+    return Fail(o.drawing + ": not beside --nominal, --set or --excitation, which say the plant; leave one of them out");
+  if (!manual && !o.shaping.empty())
+    return Fail(o.shaping + ": a drawn case has logs of its own; say --excitation or --nominal too");
   if (!(manual ? MakeManual(o, &c, &problem) : MakeCase(request, &c, &problem))) return Fail(problem);
   if (!o.drive.empty() && !DriveBy(o.drive, &c, &problem)) return Fail(problem);
   return Write(o, MakeRecords(c, o.noise), LabelOf(c));
@@ -194,6 +200,13 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
+  const auto first = [&](const std::vector<std::string>& names) {
+    for (const std::string& name : names)
+      if (app.count(name) > 0) return name;
+    return std::string();
+  };
+  o.drawing = o.kind != "auto" && o.kind != "none" ? "--kind " + o.kind : first({"--effect", "--severity"});
+  o.shaping = first({"--amplitude", "--duration", "--rate", "--low-hz", "--high-hz", "--loop", "--reference"});
   try {
     return gapscope::twin::Run(o);
   } catch (const std::exception& e) {

@@ -157,7 +157,8 @@ int Run(const Options& o) {
     return RunArm(o, request, arm);
   }
   if (manual && !o.drawing.empty())
-    return Fail(o.drawing + ": not beside --nominal, --set or --excitation, which say the plant; leave one of them out");
+    return Fail(o.drawing +
+                ": not beside --nominal, --set or --excitation, which say the plant; leave one of them out");
   if (!manual && !o.shaping.empty())
     return Fail(o.shaping + ": a drawn case has logs of its own; say --excitation or --nominal too");
   if (!(manual ? MakeManual(o, &c, &problem) : MakeCase(request, &c, &problem))) return Fail(problem);

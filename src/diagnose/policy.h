@@ -45,7 +45,9 @@ struct EvidencePolicy {
   double ratio_share = 0.5;                     // of a size's deviation, below which its ratio is told beside it
   double least_data_s = 60;                     // below it little rests on much
   double angle_waves = 1.6, speed_waves = 1.1;  // deviations of their phase's slopes, a deviation of the motion
-  double torque_share = 0.05;                   // of the joint's torque: their amplitude
+  // Their amplitude, a share of the joint's torque: about what is found on rigs. A larger torque ends dry friction's
+  // rests, so that its column says little of a small one.
+  double torque_share = 0.005;
   double per_block = 4;                         // what half a second of residuals counts for
   double free_run_s = 20;                       // free runs: of logs twice as long as this only parts this long
   std::size_t free_runs = 8;                    // so many of them

@@ -22,7 +22,7 @@ foreach(_wheel mujoco_core-4.0.0 mujoco-3.17.0 mujoco-3.16.0 mujoco-3.15.0 mujoc
   endif()
   set(_target gapscope_plugins_${_version})
   add_library(${_target} SHARED EXCLUDE_FROM_ALL ${_sources})
-  set_target_properties(${_target} PROPERTIES OUTPUT_NAME gapscope_plugins UNITY_BUILD OFF
+  set_target_properties(${_target} PROPERTIES OUTPUT_NAME gapscope_plugins UNITY_BUILD ${GAPSCOPE_UNITY}
                         LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/wheel/plugins/${_version})
   target_include_directories(${_target} PRIVATE ${CMAKE_SOURCE_DIR})
   target_include_directories(${_target} SYSTEM PRIVATE ${_sdk}/mujoco/include)

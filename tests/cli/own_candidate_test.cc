@@ -34,7 +34,7 @@ class OwnCandidateTest : public ::testing::Test {
 };
 
 TEST_F(OwnCandidateTest, IsNamedAndSizedByADiagnosis) {
-  const Answer answer = Run("diagnose", experiment_, "--effort quick");
+  const Answer answer = Run("diagnose", experiment_, "--effort quick --no-next-experiment");
   ASSERT_EQ(answer.status, 0) << answer.err;
   const auto result = nlohmann::json::parse(answer.out);
   EXPECT_EQ(result["verdict"], "effects");

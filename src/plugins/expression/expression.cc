@@ -18,7 +18,7 @@ std::string GivenMaxDelay(const mjModel* m, int instance) {
 }
 
 // A custom text that held it would not be there yet when MuJoCo asks for the state's size: hence a default.
-double MaxDelay(const mjModel* m, int instance) {
+double DelayToKeep(const mjModel* m, int instance) {
   double value = 0;
   if (ParseNumber(GivenMaxDelay(m, instance), &value)) return value;
   const std::string numeric = InstanceName(m, instance) + "." + kFormulaDelay;
@@ -29,7 +29,7 @@ double MaxDelay(const mjModel* m, int instance) {
 
 int Expression::StateSize(const mjModel* m, int instance) {
   constexpr double kStepRefinement = 4;  // of the model's step, that a host may take
-  const double max_delay = MaxDelay(m, instance);
+  const double max_delay = DelayToKeep(m, instance);
   if (!(max_delay > 0) || max_delay > kLongestDelay_s) return 0;
   const double steps = std::min(std::ceil(max_delay * kStepRefinement / m->opt.timestep) + 2, 1e6);
   return kSlots + History::Size(static_cast<int>(steps), 1);
@@ -62,7 +62,7 @@ std::string Expression::Resolve(const mjModel* m, int instance) {
 std::string Expression::ResolveDelay(const mjModel* m, int instance) {
   if (std::string fault = live_.Resolve(m, instance, kSpecs); !fault.empty()) return fault;
   const std::string text = GivenMaxDelay(m, instance);
-  max_delay_s_ = MaxDelay(m, instance);
+  max_delay_s_ = DelayToKeep(m, instance);
   if (!text.empty() && !(max_delay_s_ > 0 && max_delay_s_ <= kLongestDelay_s))
     return Fault(m, instance, "max_delay_s", text, "0 to 10 s, above 0", "leave it out for no delay");
   if (live_(m, kLateCommand) > max_delay_s_) {

@@ -29,7 +29,8 @@ Result<std::vector<Row>> WindowRows(const BenchOptions& options);
 // threads of bare mj_step gain over one in the same minute, which is what the machine had to give.
 Result<std::vector<Row>> ScalingRows(const BenchOptions& options);
 
-// read_csv_mb_per_s: ReadLog() of a CSV in the page cache, one thread; bytes of the file per wall second, MB = 1e6.
+// read_csv_mb_per_s: ReadLog() of a CSV in the page cache, one thread; bytes of the file per second of its processor
+// time, MB = 1e6.
 // read_csv_vs_from_chars: the same as a share of the rate of one pass of std::from_chars over the same bytes in memory.
 Result<std::vector<Row>> ReadRows(const BenchOptions& options);
 

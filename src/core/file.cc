@@ -1,12 +1,14 @@
 #include "src/core/file.h"
 
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 namespace gapscope {
 namespace {
@@ -65,6 +67,29 @@ Result<std::string> ReadFile(const std::string& path) {
   bytes.resize(used);
   return bytes;
 }
+
+Result<MappedFile> MappedFile::Open(const std::string& path) {
+  MappedFile file;
+  const Descriptor descriptor(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat info{};
+  if (descriptor.get() >= 0 && fstat(descriptor.get(), &info) == 0 && S_ISREG(info.st_mode) && info.st_size > 0) {
+    const auto size = static_cast<std::size_t>(info.st_size);
+    void* const at = mmap(nullptr, size, PROT_READ, MAP_PRIVATE | MAP_POPULATE, descriptor.get(), 0);
+    if (at != MAP_FAILED) {
+      file.mapped_ = {static_cast<const char*>(at), size};
+      return file;
+    }
+  }
+  GS_ASSIGN(file.read_, ReadFile(path));
+  return file;
+}
+
+MappedFile::~MappedFile() {
+  if (mapped_.data()) munmap(const_cast<char*>(mapped_.data()), mapped_.size());
+}
+
+MappedFile::MappedFile(MappedFile&& other) noexcept
+    : mapped_(std::exchange(other.mapped_, {})), read_(std::move(other.read_)) {}
 
 Result<std::string> TemporaryBeside(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();

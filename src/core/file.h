@@ -14,6 +14,24 @@ namespace gapscope {
 // The bytes of a regular file. Errors: absent, a folder, unreadable.
 Result<std::string> ReadFile(const std::string& path);
 
+// The bytes of a file as long as this lives, without a copy of them: a regular file is mapped, another one read.
+// Whoever cuts a mapped file short meanwhile ends the program (SIGBUS).
+class MappedFile {
+ public:
+  // Errors: those of ReadFile().
+  static Result<MappedFile> Open(const std::string& path);
+  ~MappedFile();
+  MappedFile(MappedFile&& other) noexcept;
+  MappedFile& operator=(MappedFile&& other) = delete;
+
+  std::string_view bytes() const { return mapped_.data() ? mapped_ : read_; }
+
+ private:
+  MappedFile() = default;
+  std::string_view mapped_;  // without data: not mapped
+  std::string read_;
+};
+
 // A new empty file beside `path`, making its folders; its name. Errors: cannot create.
 Result<std::string> TemporaryBeside(const std::string& path);
 

@@ -28,7 +28,8 @@ constexpr LogReader kReaders[] = {
 };
 
 Result<Log> ReadOne(const std::string& path, const LogReader* format) {
-  GS_ASSIGN(const std::string bytes, ReadFile(path));
+  GS_ASSIGN(const MappedFile file, MappedFile::Open(path));
+  const std::string_view bytes = file.bytes();
   if (!format) format = std::ranges::find_if(kReaders, [&](const auto& reader) { return reader.matches(path, bytes); });
   try {
     GS_ASSIGN(Log log, format->read(path, bytes));

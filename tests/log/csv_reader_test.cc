@@ -215,6 +215,21 @@ TEST(CsvReaderTest, EveryPrefixIsReadOrRefused) {
   }
 }
 
+// Room is made for as many rows as the first mebibyte lets expect: what follows may differ.
+TEST(CsvReaderTest, RowsMayBeMoreOrFewerThanTheFirstOnesLetExpect) {
+  constexpr std::size_t kRows = 100'000;
+  std::string rows = "t,x\n";
+  for (std::size_t k = 0; k < kRows; ++k) rows += fmt::format("{},{}\n", k, k + 0.25);
+  std::string comments = "t,x\n";
+  while (comments.size() < (1u << 20)) comments += "#" + std::string(10'000, 'c') + "\n";
+  for (const std::string& bytes : {rows + comments.substr(4), comments + rows.substr(4)}) {
+    const Log log = Read(bytes);
+    ASSERT_EQ(log.rows(), kRows);
+    EXPECT_EQ(log.columns[1].values.front(), 0.25);
+    EXPECT_EQ(log.columns[1].values.back(), static_cast<double>(kRows) - 0.75);
+  }
+}
+
 TEST(CsvReaderTest, DoesNotDependOnTheLocale) {
   const char* old = std::setlocale(LC_ALL, nullptr);
   const std::string saved = old ? old : "C";

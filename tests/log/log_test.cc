@@ -19,6 +19,34 @@ TEST(LogTest, FormatIsFoundByContentAndName) {
   }
 }
 
+// A mapped file may end where its page does: nothing behind the last cell may be read.
+TEST(LogTest, TheLastCellMayStandAtTheEndOfAPage) {
+  const TempFolder folder;
+  const auto page = static_cast<std::size_t>(getpagesize());
+  const std::string number = "-1.2345678901234567", head = "t,x\n0,1\n";
+  for (std::size_t length = 2; length <= number.size(); ++length) {
+    const std::string cell = number.substr(0, length);
+    for (const std::string& last : {"1," + cell, "1," + cell + "\n", "1," + cell + "\r\n", "1,\"" + cell + "\""}) {
+      const std::string comment = "#" + std::string(page - head.size() - last.size() - 2, 'c') + "\n";
+      const auto log = ReadLog(folder.Write("page.csv", head + comment + last), {});
+      ASSERT_TRUE(log.ok()) << log.error().Text();
+      EXPECT_EQ(log.value().columns[1].values, (std::vector<double>{1, std::stod(cell)})) << last;
+    }
+  }
+}
+
+TEST(LogTest, APipeIsReadToo) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  const std::string text = "t,x\n0,1\n1,2\n";
+  ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  close(ends[1]);
+  const auto log = ReadLog("/dev/fd/" + std::to_string(ends[0]), {});
+  close(ends[0]);
+  ASSERT_TRUE(log.ok()) << log.error().Text();
+  EXPECT_EQ(log.value().columns[1].values, (std::vector<double>{1, 2}));
+}
+
 class CompanionTest : public testing::Test {
  protected:
   Result<Log> Read(const std::string& own, const std::string& other) {

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, TypeVar, overload
 from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._json import from_json
-from gapscope._log import Log, read
+from gapscope._log import Log, read_all
 from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope.formats import format_of
 from gapscope._results import Diagnosis, Inspection, Replay, Run, Tune, Video, folders
@@ -71,18 +71,14 @@ def as_list(logs: Logs) -> list[OneLog]:
 
 
 def _files(job: _Job, logs: Logs, what: str = "logs") -> list[str]:
-    """The logs' files; those in memory are written beside the result."""
+    """The logs' files; those in memory are written beside the result. A dataset is as many logs as it has episodes."""
     files = []
-    for log in as_list(logs):
-        if isinstance(log, (str, os.PathLike)) and format_of(log) is None:
-            files.append(os.fspath(log))
+    for given in as_list(logs):
+        if isinstance(given, (str, os.PathLike)) and format_of(given) is None:
+            files.append(os.fspath(given))
             continue
-        if not isinstance(log, Log):
-            log = read(log, job.experiment)
-        if log.path is not None:
-            files.append(str(log.path))
-        else:
-            files.append(_written(job, log))
+        for log in [given] if isinstance(given, Log) else read_all(given, job.experiment):
+            files.append(_written(job, log) if log.path is None else str(log.path))
     if not files:
         raise InputError("no log", what, "an empty list", "at least one")
     return files

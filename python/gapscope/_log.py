@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from gapscope._errors import InputError, import_needed
+from gapscope._errors import InputError, Interrupted, import_needed
 from gapscope._experiment import Experiment
 from gapscope._program import run
 from gapscope.formats import Source, Table, format_of
@@ -134,7 +134,7 @@ class Log:
         """Writes the table as NPZ (``gapscope.log/1``), which the program reads to the last bit."""
         target = Path(path)
         if self.path is not None:
-            with _converted(self.path) as table:
+            with converted(self.path) as table:
                 return Path(shutil.copyfile(table, target))
         names = list(self._table)
         meta: dict[str, Any] = {"schema": SCHEMA, "name": self.name, "names": names}
@@ -161,7 +161,7 @@ class Log:
 
     def _load(self) -> dict[str, Floats]:
         if self.path is not None and not self._table:
-            with _converted(self.path) as table:
+            with converted(self.path) as table:
                 read = load_table(table)
                 self._table, self._units = dict(read.columns), dict(read.units)
         return self._table
@@ -364,10 +364,14 @@ class Log:
 
 
 @contextlib.contextmanager
-def _converted(path: Path) -> Iterator[Path]:
-    """A file that the program reads, as this package's own table."""
+def converted(path: Path) -> Iterator[Path]:
+    """A file that the program reads, as this package's own table, alone in a folder that is gone afterwards.
+
+    Raises InputError: as `read`. Interrupted: Ctrl-C came first.
+    """
     with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
-        run(["convert", str(path), "--out", folder, "--json"])
+        if not run(["convert", str(path), "--out", folder, "--json"]).stdout:
+            raise Interrupted
         (table,) = Path(folder).iterdir()
         yield table
 

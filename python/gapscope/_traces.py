@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gapscope._log import Floats
+from gapscope._log import Floats, converted
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,10 @@ class Trace:
 
 
 class Traces(Mapping[str, Trace]):
-    """The traces of one log by signal, arrays of shape (rows,) in SI; read from disk when the first is asked for."""
+    """The traces of one log by signal, arrays of shape (rows,) in SI; read from disk when the first is asked for.
+
+    They are views of a memory map, and cannot be written to: `.copy()` can. They outlive the result and its files.
+    """
 
     def __init__(self, path: Path, keep: Any = None) -> None:
         self.path = path
@@ -35,15 +38,7 @@ class Traces(Mapping[str, Trace]):
 
     def _load(self) -> dict[str, Floats]:
         if self._columns is None:
-            with self.path.open(encoding="utf-8") as file:
-                names = file.readline().rstrip("\n").split(",")
-                start = file.tell()
-                try:
-                    table = np.loadtxt(file, delimiter=",", ndmin=2)
-                except ValueError:  # a value that is not there: an empty field
-                    file.seek(start)
-                    table = np.loadtxt(file, delimiter=",", ndmin=2, converters=_number)
-            self._columns = {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)}
+            self._columns = _mapped(self.path)
         return self._columns
 
     def __getitem__(self, signal: str) -> Trace:
@@ -64,6 +59,22 @@ class Traces(Mapping[str, Trace]):
             for name, values in self._load().items()
             if name.startswith("command/")
         }
+
+
+def _mapped(path: Path) -> dict[str, Floats]:
+    """The columns of a CSV file, which the program reads, each of shape (rows,), as views of one map that is read only.
+
+    The mapped file is removed at once: the system keeps what it held until the last view is gone.
+    """
+    with converted(path) as table, np.load(table, allow_pickle=False) as archive:
+        names: list[str] = json.loads(archive["meta"].tobytes())["names"]
+        numbers = table.with_name("numbers")
+        # Written, not mapped to be written: what a full disk does to a map ends the interpreter.
+        with numbers.open("wb") as file:
+            for k in range(len(names)):
+                archive[f"c{k}"].tofile(file)
+        whole = np.memmap(numbers, np.float64, mode="r").reshape(len(names), -1)
+    return dict(zip(names, np.asarray(whole), strict=True))
 
 
 @dataclass(frozen=True)
@@ -107,7 +118,3 @@ def _floats(values: list[float | None]) -> Floats:
 
 def _float(value: float | None) -> float:
     return math.nan if value is None else float(value)
-
-
-def _number(text: str) -> float:
-    return float(text) if text.strip() else math.nan

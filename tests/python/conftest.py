@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -74,6 +75,16 @@ def shell_program(path: Path, body: str) -> str:
     path.write_text(f"#!/bin/sh\n{body}\n")
     path.chmod(0o755)
     return str(path)
+
+
+def interpreter(engine: str) -> str:
+    """Python of an environment of scripts/engine_env; without it the test is skipped."""
+    made = subprocess.run(
+        [ROOT / "scripts" / "engine_env", engine, "--made"], capture_output=True, text=True, check=False
+    )
+    if made.returncode:
+        pytest.skip(f"scripts/engine_env {engine} was not run")
+    return made.stdout.strip()
 
 
 def interrupt_when(ready: Callable[[], bool]) -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
+import mmap
 import os
 import pickle
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -88,6 +91,40 @@ def test_files_of_a_temporary_result_live_as_long(experiment: str, demo: str) ->
     assert model.xml() and len(traces[0]["arm_rad"].time_s) == 5001
     del model, traces
     assert not out.exists()
+
+
+def mapped(array: np.ndarray) -> mmap.mmap | None:
+    """The map that an array is a view of."""
+    base: Any = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    return base if isinstance(base, mmap.mmap) else None
+
+
+def test_traces_are_a_map_that_outlives_its_files(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    result = gs.replay(experiment, demo)
+    (out,) = tmp_path.iterdir()
+    assert out == result.out
+    with (out / "traces" / "qube.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    expected = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    (traces,) = result.traces
+    arrays = {"__time": traces["arm_rad"].time_s, "command/motor": traces.commands["motor"]}
+    for name in traces:
+        arrays |= {f"measured/{name}": traces[name].measured, f"predicted/{name}": traces[name].predicted}
+    assert set(arrays) == set(expected)
+    (whole,) = {mapped(array) for array in arrays.values()}
+    assert whole is not None and len(whole) == 8 * 5001 * len(expected)
+    assert list(tmp_path.iterdir()) == [out]  # what is mapped has no name any more
+    del result, traces
+    assert not list(tmp_path.iterdir())
+    for name, array in arrays.items():
+        assert np.array_equal(array, expected[name]) and array.flags.aligned and array.flags.c_contiguous
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
 
 
 def test_errors_are_fields(experiment: str, demo: str, tmp_path: Path) -> None:

@@ -18,11 +18,11 @@ from gapscope._program import program
 from test_formats import write_mcap_json
 
 
-def converter(folder: Path) -> dict[str, str]:
-    """The environment in which the program finds this checkout's converter."""
+def converter(folder: Path, python: str = sys.executable) -> dict[str, str]:
+    """The environment in which the program finds this checkout's converter, run by ``python``."""
     script = folder / "convert"
     package = Path(gs.__file__).parents[1]
-    script.write_text(f"#!/bin/sh\nPYTHONPATH={package} exec {sys.executable} -m gapscope.formats \"$@\"\n")
+    script.write_text(f"#!/bin/sh\nPYTHONPATH={package} exec {python} -m gapscope.formats \"$@\"\n")
     script.chmod(0o755)
     return {**os.environ, "GAPSCOPE_CONVERT": str(script)}
 

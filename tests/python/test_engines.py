@@ -16,7 +16,7 @@ import gapscope as gs
 import mujoco
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, interpreter
 
 STEP_S, STEPS = 0.002, 500
 # 0.5 to 1.7 Hz within the second.
@@ -31,15 +31,6 @@ DRAG: Values = {"quadratic_drag@joint": {"drag_n_m_s2_per_rad2": 3}}
 SOFT: Values = {"joint_compliance@joint": {"stiffness_n_m_per_rad": 300}}
 LIMIT: Values = {"torque_limit@motor": {"limit_n_m": 5}}
 GAP: Values = {"backlash@joint": {"gap_rad": 0.05}}
-
-
-def interpreter(engine: str) -> str:
-    made = subprocess.run(
-        [ROOT / "scripts" / "engine_env", engine, "--made"], capture_output=True, text=True, check=False
-    )
-    if made.returncode:
-        pytest.skip(f"scripts/engine_env {engine} was not run")
-    return made.stdout.strip()
 
 
 def run(engine: str, script: str, *arguments: str | Path) -> None:

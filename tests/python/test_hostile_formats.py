@@ -28,7 +28,7 @@ pytest.importorskip("mcap")
 # All files in one process of its own, with little memory: a line for each. It is what the converter does.
 READS = """
 import resource, sys
-resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 3 * 2**30))
+resource.setrlimit(resource.RLIMIT_AS, 2 * (int(sys.argv.pop(1)) * 2**30,))
 from gapscope import InputError
 from gapscope.formats import read_tables
 for path in sys.argv[1:]:
@@ -40,9 +40,9 @@ for path in sys.argv[1:]:
 """
 
 
-def outcomes(paths: list[Path]) -> list[str]:
+def outcomes(paths: list[Path], python: str = sys.executable, gigabytes: int = 3) -> list[str]:
     package = str(Path(gs.__file__).parents[1])
-    command = [sys.executable, "-W", "ignore", "-c", READS, *map(str, paths)]
+    command = [python, "-W", "ignore", "-c", READS, str(gigabytes), *map(str, paths)]
     run = subprocess.run(command, capture_output=True, text=True, cwd=package, timeout=120)
     lines = run.stdout.splitlines()
     assert run.returncode == 0, (run.returncode, paths[len(lines) : len(lines) + 1], lines[-1:], run.stderr[-800:])

@@ -1,0 +1,269 @@
+"""The laws of the program's plugins over tensors, for simulators that compute in PyTorch. Needs `torch`, 2.0 or newer.
+
+Every function is pure and acts element by element on tensors of shape (envs, joints), in SI; parameters are numbers or
+tensors on the same device that broadcast to it. Nothing is checked: a parameter out of range gives what the formula
+gives. Each is the law of one stage of gapscope.motor, gapscope.friction or gapscope.spring (src/plugins). `Drive` runs
+a servo's stages in the plugin's order. `import gapscope` does not import this module.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import torch
+
+Tensor: TypeAlias = Any  # torch.Tensor of shape (envs, joints)
+Value: TypeAlias = Any  # a number, or a tensor that broadcasts to (envs, joints)
+
+
+def _like(value: Value, x: Tensor) -> Tensor:
+    return torch.as_tensor(value, dtype=x.dtype, device=x.device).expand_as(x)
+
+
+def dead_zone(x: Tensor, half_width: Value) -> Tensor:
+    """``x`` less ``half_width``, 0 inside; both in the unit of ``x``, shape (envs, joints)."""
+    return torch.sign(x) * torch.clamp(x.abs() - half_width, min=0)
+
+
+def by_direction(x: Tensor, asymmetry: Value) -> Tensor:
+    """``x`` (1 + ``asymmetry`` sign x), in the unit of ``x``, shape (envs, joints); ``asymmetry`` in -1 .. 1."""
+    return x * (1 + torch.sign(x) * asymmetry)
+
+
+def late_command(history: Tensor, delay_s: Value, step_s: float) -> Tensor:
+    """The mean over this step of commands that were held and come ``delay_s`` late, shape (envs, joints).
+
+    ``history`` is of shape (steps, envs, joints), the present command first, in its own unit. It needs
+    floor(delay / step) + 2 steps; a longer delay takes its oldest.
+    """
+    steps = _like(delay_s, history[0]) / step_s
+    whole = torch.floor(steps + 1e-9)
+    part = torch.clamp(steps - whole, min=0)
+    last = len(history) - 1
+    newer = history.gather(0, whole.long().clamp(0, last)[None])[0]
+    older = history.gather(0, (whole.long() + 1).clamp(0, last)[None])[0]
+    return (1 - part) * newer + part * older
+
+
+def lag_output(state: Tensor, request: Tensor, time_constant_s: Value, step_s: float) -> Tensor:
+    """What a lag of first order gives out in this step, in the unit of ``request``, shape (envs, joints).
+
+    It is the state, and below one step a blend with the request, which at a time constant of 0 is the request.
+    """
+    weight = torch.clamp(_like(time_constant_s, request) / step_s, 0, 1)
+    return request + weight * (state - request)
+
+
+def lag_next(state: Tensor, request: Tensor, time_constant_s: Value, step_s: float) -> Tensor:
+    """The lag's state after the step, exact for a held request, in the unit of ``request``, shape (envs, joints)."""
+    constant = torch.clamp(_like(time_constant_s, request), min=step_s)
+    return state - torch.expm1(-step_s / constant) * (request - state)
+
+
+def power_limit(speed: Tensor, power_w: Value) -> Tensor:
+    """The torque at which ``power_w`` is reached, N m, shape (envs, joints); infinite at rest. ``speed`` in rad/s."""
+    size = speed.abs()
+    return torch.where(size > 0, power_w / size, math.inf)
+
+
+def trapeze_limit(speed: Tensor, peak_n_m: Value, rated: Value, no_load: Value) -> Tensor:
+    """``peak_n_m`` up to the speed ``rated``, then a line to 0 at ``no_load``, shape (envs, joints), N m and rad/s.
+
+    ``no_load`` of 0: the peak at all speeds.
+    """
+    size = speed.abs()
+    peak, rated, no_load = _like(peak_n_m, speed), _like(rated, speed), _like(no_load, speed)
+    line = peak * torch.clamp((no_load - size) / (no_load - rated), 0, 1)
+    return torch.where((no_load <= 0) | (size <= rated), peak, torch.where(size >= no_load, 0.0, line))
+
+
+def table_limit(speed: Tensor, speeds: Tensor, torques: Tensor) -> Tensor:
+    """A torque over the speed's size by straight lines between points, held at the ends, shape (envs, joints), N m.
+
+    ``speeds`` in rad/s and ``torques`` in N m are of shape (points,), ``speeds`` ascending.
+    """
+    size = speed.abs().clamp(speeds[0], speeds[-1])
+    right = torch.searchsorted(speeds, size.contiguous(), right=True).clamp(1, len(speeds) - 1)
+    share = (size - speeds[right - 1]) / (speeds[right] - speeds[right - 1])
+    return (1 - share) * torques[right - 1] + share * torques[right]
+
+
+def soft_limit(torque: Tensor, limit_n_m: Value, softness: Value) -> Tensor:
+    """``torque`` within +-``limit_n_m``, shape (envs, joints), N m.
+
+    The corner is a parabola from (1 - softness) to (1 + softness) times the limit; a softness of 0 is a sharp one.
+    """
+    limit = _like(limit_n_m, torque)
+    half = torch.where(torch.isinf(limit), 0.0, _like(softness, torque) * limit)
+    into = torque.abs() - (limit - half)
+    corner = torque.abs() - into**2 / torch.where(half > 0, 4 * half, 1.0)
+    size = torch.where(into > 0, torch.where(into >= 2 * half, limit, corner), torque.abs())
+    return torch.copysign(size, torque)
+
+
+def droop(torque: Tensor, loss: Value, reference_n_m: Value, exponent: Value = 1.0) -> Tensor:
+    """A torque constant that falls: at ``reference_n_m`` the share ``loss`` is lost, shape (envs, joints), N m."""
+    return torque * torch.clamp(1 - loss * (torque.abs() / reference_n_m) ** exponent, min=0)
+
+
+def efficiency(torque: Tensor, speed: Tensor, drive: Value, backdrive: Value) -> Tensor:
+    """What gears pass on of a torque, N m, shape (envs, joints): the share ``drive``, ``backdrive`` against speed."""
+    return torque * torch.where(torque * speed < 0, _like(backdrive, torque), _like(drive, torque))
+
+
+def winding(voltage: Tensor, speed: Tensor, kt: Value, ke: Value, resistance: Value, gear: Value = 1.0) -> Tensor:
+    """The torque of a winding, N m at the joint, shape (envs, joints): V, rad/s, N m/A, V s/rad, ohm."""
+    return gear * kt * (voltage - ke * gear * speed) / resistance
+
+
+def dry_level(
+    speed: Tensor,
+    coulomb_n_m: Value,
+    breakaway_n_m: Value = 0.0,
+    stribeck_speed: Value = 0.05,
+    stribeck_exponent: Value = 2.0,
+    load_n_m: Value = 0.0,
+    load_coefficient: Value = 0.0,
+    load_quadratic: Value = 0.0,
+) -> Tensor:
+    """The level of dry friction that sliding meets and that holds at rest, N m, shape (envs, joints).
+
+    A ``breakaway_n_m`` above ``coulomb_n_m`` is a hump that ends at about ``stribeck_speed``, rad/s. ``load_n_m`` is
+    the torque through the gears; of it ``load_coefficient`` and, per N m, ``load_quadratic`` are added.
+    """
+    coulomb, width = _like(coulomb_n_m, speed), _like(stribeck_speed, speed)
+    hump = torch.clamp(_like(breakaway_n_m, speed) - coulomb, min=0)
+    ratio = speed.abs() / torch.where(width > 0, width, 1.0)
+    share = torch.where(speed == 0, 1.0, torch.where(width > 0, torch.exp(-(ratio**stribeck_exponent)), 0.0))
+    load = _like(load_n_m, speed)
+    return coulomb + load_coefficient * load.abs() + load_quadratic * load**2 + hump * share
+
+
+def bend(state: Tensor, displacement: Tensor, reach_rad: Value) -> Tensor:
+    """A bristle's bend in -1 .. 1 after a displacement in rad, shape (envs, joints); a reach of 0 slides at once."""
+    reach, sign = _like(reach_rad, state), torch.sign(displacement)
+    rest = torch.where(reach > 0, torch.exp(-displacement.abs() / torch.where(reach > 0, reach, 1.0)), 0.0)
+    return torch.where(displacement == 0, state, sign + (state - sign) * rest)
+
+
+def spring_torque(
+    angle: Tensor,
+    stiffness: Value = 0.0,
+    rest_rad: Value = 0.0,
+    cubic: Value = 0.0,
+    gravity_n_m: Value = 0.0,
+    gravity_rest_rad: Value = 0.0,
+    bias_n_m: Value = 0.0,
+    cogging_n_m: Value = 0.0,
+    cogging_periods: Value = 12.0,
+    cogging_phase_rad: Value = 0.0,
+) -> Tensor:
+    """The torque of a cable, a hanging mass, a bias and cogging at an angle in rad: N m, shape (envs, joints).
+
+    ``stiffness`` in N m/rad and ``cubic`` in N m/rad^3, from ``rest_rad`` on; ``cogging_periods`` a revolution.
+    Hysteresis of N m comes on top: - height * `bend`.
+    """
+    e = angle - rest_rad
+    torque = bias_n_m - (stiffness + cubic * e**2) * e - gravity_n_m * torch.sin(angle - gravity_rest_rad)
+    return torque + cogging_n_m * torch.sin(cogging_periods * angle + cogging_phase_rad)
+
+
+@dataclass
+class Drive:
+    """A position servo as gapscope.motor has it: its parameters, all neutral at their defaults, and its state.
+
+    Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Its units are N m, rad
+    and s. `step` is called once a time step, under an integrator that evaluates forces once (not RK4). The state is
+    made by the first `step`; `reset` takes it from environments.
+    """
+
+    step_s: float
+    kp: Value
+    kd: Value = 0.0
+    max_delay_s: float = 0.0
+    command_delay_s: Value = 0.0
+    command_asymmetry: Value = 0.0
+    time_constant_s: Value = 0.0
+    dead_zone: Value = 0.0
+    torque_limit_n_m: Value = 0.0
+    limit_softness: Value = 0.0
+    power_w: Value = 0.0
+    generating_power_w: Value = 0.0
+    peak_torque_n_m: Value = 0.0
+    rated_speed_rad_per_s: Value = 0.0
+    no_load_speed_rad_per_s: Value = 0.0
+    generating_factor: Value = 1.0
+    sag_fraction: Value = 0.0
+    sag_time_constant_s: Value = 0.3
+    droop_at_peak: Value = 0.0
+    droop_reference_n_m: Value = 1.0
+    droop_exponent: Value = 1.0
+    asymmetry: Value = 0.0
+    efficiency_drive: Value = 1.0
+    efficiency_backdrive: Value = 1.0
+
+    def __post_init__(self) -> None:
+        self._fresh: Tensor = None  # of shape (envs,): the next step is the first one
+        self._history: Tensor = None
+        self._lag: Tensor = None
+        self._sag: Tensor = None
+
+    def reset(self, envs: Any = slice(None)) -> None:
+        """The next `step` is the first one of these environments (indices, a mask or a slice): all is at rest."""
+        if self._fresh is not None:
+            self._fresh[envs] = True
+
+    def limit(self, torque: Tensor, speed: Tensor) -> Tensor:
+        """The limit on a torque's size in its direction, before sag: N m, shape (envs, joints). ``speed``: rad/s."""
+        power = torque * speed
+        watts = torch.where(power > 0, _like(self.power_w, speed), _like(self.generating_power_w, speed))
+        level, peak = _like(self.torque_limit_n_m, speed), _like(self.peak_torque_n_m, speed)
+        curve = trapeze_limit(speed, peak, self.rated_speed_rad_per_s, self.no_load_speed_rad_per_s)
+        curve = torch.where(power < 0, peak * self.generating_factor, curve)
+        bounds = (
+            torch.where(level > 0, level, math.inf),
+            torch.where((watts > 0) & (power != 0), power_limit(speed, watts), math.inf),
+            torch.where(peak > 0, curve, math.inf),
+        )
+        return torch.minimum(torch.minimum(bounds[0], bounds[1]), bounds[2])
+
+    def step(self, target: Tensor, angle: Tensor, speed: Tensor) -> Tensor:
+        """The joint's torque in this step, N m, of shape (envs, joints): target and angle in rad, speed in rad/s."""
+        self._begin(target)
+        command = by_direction(late_command(self._history, self.command_delay_s, self.step_s), self.command_asymmetry)
+        request = self.kp * (command - angle) - self.kd * speed
+        fresh = self._fresh[:, None]
+        self._lag = torch.where(fresh, request, self._lag)
+        self._sag = torch.where(fresh, self._resting_sag(request, speed), self._sag)
+        self._fresh = torch.zeros_like(self._fresh)
+        torque = lag_output(self._lag, request, self.time_constant_s, self.step_s)
+        self._lag = lag_next(self._lag, request, self.time_constant_s, self.step_s)
+        torque = dead_zone(torque, self.dead_zone)
+        limit = self.limit(torque, speed)
+        torque = soft_limit(torque, limit * (1 - self.sag_fraction * self._sag), self.limit_softness)
+        self._sag = lag_next(self._sag, _load(torque, limit), self.sag_time_constant_s, self.step_s)
+        torque = droop(torque, self.droop_at_peak, self.droop_reference_n_m, self.droop_exponent)
+        return efficiency(
+            by_direction(torque, self.asymmetry), speed, self.efficiency_drive, self.efficiency_backdrive
+        )
+
+    def _begin(self, target: Tensor) -> None:
+        if self._fresh is None:
+            steps = int(self.max_delay_s / self.step_s + 1e-9) + 2
+            self._history = target.expand(steps, *target.shape).clone()
+            self._lag, self._sag = torch.zeros_like(target), torch.zeros_like(target)
+            self._fresh = torch.ones(len(target), dtype=torch.bool, device=target.device)
+        # Before the first step the command was what it is there.
+        shifted = torch.cat([target[None], self._history[:-1]])
+        self._history = torch.where(self._fresh[None, :, None], target[None], shifted)
+
+    def _resting_sag(self, request: Tensor, speed: Tensor) -> Tensor:
+        return torch.minimum(_load(request, self.limit(request, speed)), 1 / (1 + _like(self.sag_fraction, request)))
+
+
+def _load(torque: Tensor, limit: Tensor) -> Tensor:
+    """The torque as a share of its limit, 0 .. 1; 0 where there is none."""
+    there = (limit > 0) & ~torch.isinf(limit)
+    return torch.where(there, torch.clamp(torque.abs() / torch.where(there, limit, 1.0), max=1), 0.0)

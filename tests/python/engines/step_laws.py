@@ -1,0 +1,51 @@
+"""Run by the interpreter of scripts/engine_env torch: step_laws.py IN.npz OUT.npz.
+
+gapscope.torch on the motions in IN.npz, arrays of (steps, envs, joints); parameters by name, of (joints,).
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+import torch as pytorch
+from gapscope import torch as laws
+
+given = {name: pytorch.from_numpy(values) for name, values in np.load(sys.argv[1]).items()}
+
+
+def of(prefix: str) -> dict[str, Any]:
+    return {name.removeprefix(prefix): values for name, values in given.items() if name.startswith(prefix)}
+
+
+step_s, out = float(given["step_s"]), {}
+motion = list(zip(given["target"], given["angle"], given["speed"], strict=True))
+parameters = {"step_s": step_s, "max_delay_s": 0.05, **of("drive.")}
+for left_out in ("", *(name for name in of("drive.") if name != "kp")):
+    drive = laws.Drive(**{name: value for name, value in parameters.items() if name != left_out})
+    out[f"drive.{left_out}"] = pytorch.stack([drive.step(*now) for now in motion]).numpy()
+# From rest again, half of the environments alone.
+drive = laws.Drive(**parameters)
+for now in motion[:7]:
+    drive.step(*now)
+drive.reset(pytorch.tensor([0]))
+out["reset"] = pytorch.stack([drive.step(*now) for now in motion]).numpy()
+# One joint with plain numbers, in single and in double precision.
+numbers = {name: value if isinstance(value, float) else float(value[0]) for name, value in parameters.items()}
+for kind in (pytorch.float64, pytorch.float32):
+    drive = laws.Drive(**numbers)
+    torques = [drive.step(*(values[:, :1].to(kind) for values in now)) for now in motion]
+    assert all(torque.dtype == kind for torque in torques)
+    out[f"numbers.{str(kind)[-2:]}"] = pytorch.stack(torques).numpy()
+
+hysteresis, state, springs = of("hysteresis."), pytorch.zeros_like(given["angle"][0]), []
+for k, angle in enumerate(given["angle"]):
+    if k:
+        state = laws.bend(state, angle - given["angle"][k - 1], hysteresis["rad"])
+    springs.append(laws.spring_torque(angle, **of("spring.")) - hysteresis["n_m"] * state)
+out["spring"] = pytorch.stack(springs).numpy()
+out["friction"] = laws.dry_level(given["speed"], load_n_m=given["load"], **of("friction.")).numpy()
+volts = given["target"]
+out["winding"] = laws.winding(volts, given["speed"], **of("winding.")).numpy()
+speeds = pytorch.linspace(-12, 12, 97, dtype=pytorch.float64)[None]
+out["table"] = laws.table_limit(speeds, given["speeds"], given["torques"]).numpy()
+np.savez(sys.argv[2], **out)

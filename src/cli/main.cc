@@ -11,6 +11,7 @@
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
 #include "src/core/apart.h"
+#include "src/core/file.h"
 
 namespace gapscope::cli {
 namespace {
@@ -48,6 +49,7 @@ int main(int argc, char** argv) {
   // What is larger goes back to the system when it is freed. By glibc's own rule it stays, with gaps between: a quarter
   // of what a robot of 29 joints takes.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  gapscope::EndWhereMappedFileIsCut();
   try {
     return gapscope::cli::Main(argc, argv);
   } catch (const std::exception& e) {

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <utility>
@@ -90,6 +91,18 @@ MappedFile::~MappedFile() {
 
 MappedFile::MappedFile(MappedFile&& other) noexcept
     : mapped_(std::exchange(other.mapped_, {})), read_(std::move(other.read_)) {}
+
+void EndWhereMappedFileIsCut() {
+  struct sigaction action{};
+  action.sa_handler = [](int) {
+    // Nothing but system calls is allowed here.
+    constexpr std::string_view kText =
+        "gapscope: a file was cut short while it was read; read it again when nobody writes to it\n";
+    [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kText.data(), kText.size());
+    _exit(2);
+  };
+  sigaction(SIGBUS, &action, nullptr);
+}
 
 Result<std::string> TemporaryBeside(const std::string& path) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();

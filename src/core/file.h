@@ -15,7 +15,7 @@ namespace gapscope {
 Result<std::string> ReadFile(const std::string& path);
 
 // The bytes of a file as long as this lives, without a copy of them: a regular file is mapped, another one read.
-// Whoever cuts a mapped file short meanwhile ends the program (SIGBUS).
+// Whoever cuts a mapped file short meanwhile ends the program by SIGBUS: EndWhereMappedFileIsCut().
 class MappedFile {
  public:
   // Errors: those of ReadFile().
@@ -31,6 +31,9 @@ class MappedFile {
   std::string_view mapped_;  // without data: not mapped
   std::string read_;
 };
+
+// From now on the program then ends with a message on stderr and exit status 2 instead.
+void EndWhereMappedFileIsCut();
 
 // A new empty file beside `path`, making its folders; its name. Errors: cannot create.
 Result<std::string> TemporaryBeside(const std::string& path);

@@ -48,9 +48,9 @@ struct EvidencePolicy {
   // Their amplitude, a share of the joint's torque: about what is found on rigs. A larger torque ends dry friction's
   // rests, so that its column says little of a small one.
   double torque_share = 0.005;
-  double per_block = 4;                         // what half a second of residuals counts for
-  double free_run_s = 20;                       // free runs: of logs twice as long as this only parts this long
-  std::size_t free_runs = 8;                    // so many of them
+  double per_block = 4;       // what half a second of residuals counts for
+  double free_run_s = 20;     // free runs: of logs twice as long as this only parts this long
+  std::size_t free_runs = 8;  // so many of them
   // By which intervals of sizes are wider than their covariance says: a set that is not quite right leaves more than
   // noise and torques. Fitted to banks (docs/results/diagnosis.md).
   double interval_factor = 1.6;

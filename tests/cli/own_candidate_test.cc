@@ -66,7 +66,9 @@ candidates:
     parameters: {size: {unit: N m/rad, bounds: [0, 20], trials: [1, 5]}}
 )");
   const std::string out = scratch_.Path("out");
-  const Answer answer = Run("diagnose", robot, "--budget 5 --plugin '" GAPSCOPE_FAULTY_PLUGINS "' --out '" + out + "'");
+  const Answer answer =
+      Run("diagnose", robot,
+          "--effort quick --no-next-experiment --plugin '" GAPSCOPE_FAULTY_PLUGINS "' --out '" + out + "'");
   ASSERT_EQ(answer.status, 0) << answer.err;
   EXPECT_NE(answer.err.find("the run crashed (Segmentation fault)"), std::string::npos) << answer.err;
   const auto result = nlohmann::json::parse(answer.out);

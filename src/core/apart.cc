@@ -99,7 +99,6 @@ class Interruptions {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != waits) _exit(1);
-  signal(SIGBUS, SIG_DFL);  // a plugin's, as any other crash
   int status = 1;
   try {
     status = work();

@@ -32,13 +32,11 @@ class Descriptor {
   int fd_;
 };
 
-}  // namespace
-
-Result<std::string> ReadFile(const std::string& path) {
-  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.get() < 0) return SystemError("cannot open the file", path);
+// The bytes of what was opened; `file` below zero: why it could not be.
+Result<std::string> ReadOpened(int file, const std::string& path) {
+  if (file < 0) return SystemError("cannot open the file", path);
   struct stat info{};
-  if (fstat(file.get(), &info) != 0) return SystemError("cannot read the file", path);
+  if (fstat(file, &info) != 0) return SystemError("cannot read the file", path);
   if (S_ISDIR(info.st_mode)) {
     return Error{.what = "cannot read the file",
                  .where = path,
@@ -52,14 +50,14 @@ Result<std::string> ReadFile(const std::string& path) {
   while (true) {
     if (used == bytes.size()) {
       char extra;
-      const ssize_t more = read(file.get(), &extra, 1);
+      const ssize_t more = read(file, &extra, 1);
       if (more < 0) return SystemError("cannot read the file", path);
       if (more == 0) break;
       bytes.resize(bytes.size() * 2);
       bytes[used++] = extra;
       continue;
     }
-    const ssize_t got = read(file.get(), bytes.data() + used, bytes.size() - used);
+    const ssize_t got = read(file, bytes.data() + used, bytes.size() - used);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) return SystemError("cannot read the file", path);
     if (got == 0) break;
@@ -67,6 +65,13 @@ Result<std::string> ReadFile(const std::string& path) {
   }
   bytes.resize(used);
   return bytes;
+}
+
+}  // namespace
+
+Result<std::string> ReadFile(const std::string& path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  return ReadOpened(file.get(), path);
 }
 
 Result<MappedFile> MappedFile::Open(const std::string& path) {
@@ -81,7 +86,7 @@ Result<MappedFile> MappedFile::Open(const std::string& path) {
       return file;
     }
   }
-  GS_ASSIGN(file.read_, ReadFile(path));
+  GS_ASSIGN(file.read_, ReadOpened(descriptor.get(), path));
   return file;
 }
 
@@ -94,8 +99,13 @@ MappedFile::MappedFile(MappedFile&& other) noexcept
 
 void EndWhereMappedFileIsCut() {
   struct sigaction action{};
-  action.sa_handler = [](int) {
-    // Nothing but system calls is allowed here.
+  action.sa_flags = SA_SIGINFO | SA_RESETHAND;
+  // Nothing but system calls is allowed here.
+  action.sa_sigaction = [](int, siginfo_t* info, void*) {
+    if (info->si_code != BUS_ADRERR) {  // no page of a file that is gone: as without this
+      raise(SIGBUS);
+      return;
+    }
     constexpr std::string_view kText =
         "gapscope: a file was cut short while it was read; read it again when nobody writes to it\n";
     [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kText.data(), kText.size());

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,6 +75,20 @@ def shell_program(path: Path, body: str) -> str:
     path.write_text(f"#!/bin/sh\n{body}\n")
     path.chmod(0o755)
     return str(path)
+
+
+JOINT = ROOT / "models" / "joint" / "experiment.yaml"
+
+
+def experiment_at(
+    target: Path, source: Path | str, columns: Mapping[str, str] | None = None, log: str = ""
+) -> Path:
+    """An experiment file's copy elsewhere: ``columns`` by other names, ``log`` the first lines of its log."""
+    text = Path(source).read_text().replace("model: ", f"model: {Path(source).parent}/")
+    for name, column in (columns or {}).items():
+        text = text.replace(f"column: {name}", f"column: {column}")
+    target.write_text(text.replace("log:", f"log:{log}"))
+    return target
 
 
 def interpreter(engine: str) -> str:

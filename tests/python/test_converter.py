@@ -13,8 +13,8 @@ from typing import Any
 import gapscope as gs
 import numpy as np
 import pytest
+from conftest import experiment_at
 from gapscope._program import program
-
 from test_formats import write_mcap_json
 
 
@@ -74,13 +74,8 @@ def split_demo(demo: str, path: Path) -> None:
 
 def of_topics(experiment: str, target: Path, more: str = "") -> Path:
     """The demo's experiment, for `split_demo`."""
-    text = Path(experiment).read_text().replace("model: ", f"model: {Path(experiment).parent}/")
-    text = text.replace("log:", "log:\n  source: {topics: [/drive, /angles]}" + more)
     names = {"voltage_v": "/drive/voltage", "arm_rad": "/angles/arm", "pendulum_rad": "/angles/pendulum"}
-    for column, name in names.items():
-        text = text.replace(f"column: {column}", f"column: {name}")
-    target.write_text(text)
-    return target
+    return experiment_at(target, experiment, names, log="\n  source: {topics: [/drive, /angles]}" + more)
 
 
 def test_two_rates_in_a_bag_replay_as_the_csv_does(experiment: str, demo: str, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import gapscope as gs
 import numpy as np
 import pytest
-from conftest import ROOT, interpreter
+from conftest import JOINT, ROOT, experiment_at, interpreter
 from gapscope._program import program
 from test_converter import converter
 from test_hostile_formats import outcomes
@@ -62,11 +62,8 @@ def test_a_file_of_torch_is_the_csv_to_the_last_bit(saved: Path, torch: str, tmp
 
 
 def test_it_replays_as_the_csv_does(saved: Path, torch: str, tmp_path: Path) -> None:
-    text = (ROOT / "models" / "joint" / "experiment.yaml").read_text()
-    for name, column in (("target_rad", "des_dof_pos/knee"), ("position_rad", "dof_pos/knee"), ("time_s", "time")):
-        text = text.replace(f"column: {name}", f"column: {column}")
-    bound = tmp_path / "experiment.yaml"
-    bound.write_text(text.replace("model: ", f"model: {ROOT / 'models' / 'joint'}/"))
+    names = {"target_rad": "des_dof_pos/knee", "position_rad": "dof_pos/knee", "time_s": "time"}
+    bound = experiment_at(tmp_path / "experiment.yaml", JOINT, names)
     command = [str(program()), "replay", str(bound), str(saved / "whole" / "run.pt"), "--json"]
     run = subprocess.run(command, capture_output=True, text=True, env=converter(tmp_path, torch), check=False)
     assert run.returncode == 0, run.stderr

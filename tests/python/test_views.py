@@ -13,7 +13,7 @@ import pytest
 from gapscope._program import program
 from gapscope.formats import Table, _joint_states, read_table
 
-from conftest import ROOT
+from conftest import JOINT, experiment_at
 from test_converter import converter
 
 
@@ -36,10 +36,7 @@ def joint_result(tmp_path_factory: pytest.TempPathFactory) -> gs.Replay:
     }
     for name in ("position_rad", "velocity_rad_per_s", "torque_n_m"):
         columns[name][100:110] = np.nan
-    text = (ROOT / "models" / "joint" / "experiment.yaml").read_text()
-    text = text.replace("model: ", f"model: {ROOT / 'models' / 'joint'}/")
-    bound = folder / "experiment.yaml"
-    bound.write_text(text.replace("log:", "log:\n  repair: {missing: keep}"))
+    bound = experiment_at(folder / "experiment.yaml", JOINT, log="\n  repair: {missing: keep}")
     return gs.replay(bound, gs.Log(columns, name="run.1"))
 
 

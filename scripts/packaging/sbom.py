@@ -15,6 +15,8 @@ import zipfile
 
 NO = "NOASSERTION"
 COMMON = pathlib.Path("/usr/share/common-licenses")
+# What is compiled in from headers, or embedded (the charts of report.html).
+COMPILED_IN = ["libcli11-dev", "libeigen3-dev", "libjs-dygraphs", "nlohmann-json3-dev"]
 # Debian's short names that mean a licence of SPDX's list word by word. Any other becomes a LicenseRef with its text.
 SPDX_NAMES = {
     "apache-2.0": "Apache-2.0", "bsd-2-clause": "BSD-2-Clause", "bsd-3-clause": "BSD-3-Clause",
@@ -122,7 +124,15 @@ def mujoco(wheel):
     return {"entry": entry, "references": {}, "texts": texts, "parts": parts}
 
 
-def document(name, version, commit, made_at, kind, contained, needed):
+def built_from(build, source):
+    """What every package of that build of that source holds: the wheel of MuJoCo, and what is compiled in."""
+    cache = re.search(r"^GAPSCOPE_CACHE_DIR:PATH=(.*)$", (build / "CMakeCache.txt").read_text(), re.M)[1]
+    version = re.search(r"set\(GAPSCOPE_MUJOCO_VERSION (\S+)\)", (source / "cmake/mujoco.cmake").read_text())[1]
+    wheel = next(pathlib.Path(cache).glob(f"mujoco_core-{version}-cp311-*.whl"))
+    return [mujoco(wheel)] + [debian(package) for package in COMPILED_IN]
+
+
+def document(name, version, commit, made_at, kind, contained, needed, made_by="package"):
     """The SPDX document of a package: what it contains, and what it needs of the system."""
     own = {"name": name, "SPDXID": "SPDXRef-gapscope", "versionInfo": version, "supplier": NO,
            "downloadLocation": NO, "filesAnalyzed": False, "sourceInfo": f"commit {commit}",
@@ -144,7 +154,7 @@ def document(name, version, commit, made_at, kind, contained, needed):
     return json.dumps({
         "spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT", "name": f"{name}-{kind}",
         "documentNamespace": uuid.uuid5(uuid.NAMESPACE_OID, f"{name} {version} {commit} {kind}").urn,
-        "creationInfo": {"created": made_at, "creators": ["Tool: scripts/package"]},
+        "creationInfo": {"created": made_at, "creators": [f"Tool: scripts/{made_by}"]},
         "packages": packages, "relationships": relations,
         **({"hasExtractedLicensingInfos": [{"licenseId": key, "extractedText": references[key]}
                                            for key in sorted(references)]} if references else {}),

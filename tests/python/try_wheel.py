@@ -3,8 +3,10 @@
 try_wheel.py EXPERIMENT LOG MUJOCO_VERSION      MUJOCO_VERSION is empty where there is no mujoco
 """
 
+import json
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import gapscope as gs
@@ -28,6 +30,14 @@ assert nominal.error > 1 and repaired.error < 0.01
 shared = site / "share" / "gapscope"
 assert (shared / "models" / "qube" / "experiment.yaml").is_file()
 assert (shared / "schemas" / "replay.schema.json").is_file()
+
+# What it holds is named, each with a licence.
+holds = {str(file).partition("/")[2]: file for file in metadata.files("gapscope") or []}
+packages = {one["name"]: one for one in json.loads(holds["sboms/gapscope.spdx.json"].read_text())["packages"]}
+for library in site.parent.joinpath("gapscope.libs").iterdir():
+    assert any(library.name.split("-")[0] in name for name in packages), library
+assert packages["mujoco"]["licenseDeclared"] == "Apache-2.0", packages["mujoco"]
+assert any(name.startswith("licenses/libnlopt") for name in holds), sorted(holds)
 
 if not version:
     try:

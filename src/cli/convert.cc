@@ -129,9 +129,10 @@ Command ConvertCommand() {
       .what = "Logs of any format as NPZ tables, which every command reads to the last bit; results for viewers",
       .options = Join({{{.flag = "files",
                          .value = &flags->files,
+                         .stands_for = LogsNamed,
                          .required = true,
-                         .help = "Logs; of a LeRobot dataset an episode, dataset#3. For mcap results of replay, tune "
-                                 "or diagnose",
+                         .help = "Logs; of a LeRobot dataset all episodes, or dataset#3. For mcap results of replay, "
+                                 "tune or diagnose",
                          .more = "docs/reference/formats.md tells the formats"},
                         folder,
                         {.flag = "--to",

@@ -11,6 +11,7 @@
 #include "src/cli/profile.h"
 #include "src/core/option_words.h"
 #include "src/diagnose/policy.h"
+#include "src/log/foreign.h"
 #include "src/report/json.h"
 #include "src/report/read_run.h"
 
@@ -101,6 +102,7 @@ std::vector<Option> SearchOptions(CommandFlags& flags) {
   return {
       {.flag = "--hold-out",
        .value = &flags.hold_out,
+       .stands_for = LogsNamed,
        .help = "A log to judge by, not to fit; more than once",
        .more = "Without it whole logs are held out where there are several, blocks of time where there is one; the "
                "result says which"},

@@ -7,6 +7,7 @@
 #include "src/cli/print.h"
 #include "src/cli/session.h"
 #include "src/core/collect.h"
+#include "src/log/foreign.h"
 #include "src/report/identify_report.h"
 #include "src/report/json.h"
 #include "src/report/write_run.h"
@@ -169,12 +170,14 @@ std::vector<Option> OwnOptions(const std::string& method, IdentifyFlags& flags) 
              .unset = "fitted",
              .help = "Dry friction, held at this"}};
   if (method == "state-space")
-    return {
-        {.flag = "--bounds",
-         .value = &o.bounds_share,
-         .range = Above(0),
-         .help = "Coefficients stay within this share of nominal"},
-        {.flag = "--hold-out", .value = &flags.hold_out, .help = "Score on this log, do not fit it; more than once"}};
+    return {{.flag = "--bounds",
+             .value = &o.bounds_share,
+             .range = Above(0),
+             .help = "Coefficients stay within this share of nominal"},
+            {.flag = "--hold-out",
+             .value = &flags.hold_out,
+             .stands_for = LogsNamed,
+             .help = "Score on this log, do not fit it; more than once"}};
   return {};
 }
 

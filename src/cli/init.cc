@@ -9,6 +9,7 @@
 #include "src/cli/session.h"
 #include "src/core/file.h"
 #include "src/draft/draft.h"
+#include "src/log/foreign.h"
 
 namespace gapscope::cli {
 namespace {
@@ -151,6 +152,7 @@ Command InitCommand() {
           .options = {{.flag = "model", .value = &flags->model, .required = true, .help = "MJCF file"},
                       {.flag = "logs",
                        .value = &flags->logs,
+                       .stands_for = LogsNamed,
                        .required = true,
                        .help = "Hardware logs; the first one is looked at",
                        .more = "The draft is then tried on all of them. docs/reference/init.md tells how columns are "

@@ -8,6 +8,7 @@
 #include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
+#include "src/log/foreign.h"
 #include "src/report/inspect_report.h"
 #include "src/report/json.h"
 #include "src/report/write_run.h"
@@ -105,7 +106,7 @@ Result<InspectRun> InspectUnbound(const std::vector<std::string>& logs) {
 bool IsExperiment(const std::string& path) { return path.ends_with(".yaml") || path.ends_with(".yml"); }
 
 Result<int> RunInspect(const InspectFlags& flags) {
-  std::vector<std::string> all = {flags.model.experiment};
+  GS_ASSIGN(std::vector<std::string> all, LogsNamed(flags.model.experiment));  // or an experiment
   all.insert(all.end(), flags.model.logs.begin(), flags.model.logs.end());
   const bool bound = IsExperiment(flags.model.experiment);
   if (bound && flags.model.logs.empty())

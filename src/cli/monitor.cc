@@ -11,6 +11,7 @@
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
 #include "src/core/change_point.h"
+#include "src/log/foreign.h"
 #include "src/report/json.h"
 #include "src/report/read_diagnosis.h"
 #include "src/report/read_run.h"
@@ -207,7 +208,7 @@ Command MonitorCommand() {
        .required = true,
        .help = "Folder of a finished tune or diagnosis",
        .more = "Its logs must still be there: new ones are compared with them, log by log"},
-      {.flag = "logs", .value = &flags->logs, .required = true, .help = "New hardware logs"},
+      {.flag = "logs", .value = &flags->logs, .stands_for = LogsNamed, .required = true, .help = "New hardware logs"},
       {.flag = "--experiment",
        .value = &flags->source.experiment,
        .unset = "the one that the result names",

@@ -15,6 +15,7 @@
 #include "src/cli/progress.h"
 #include "src/core/collect.h"
 #include "src/core/names.h"
+#include "src/log/foreign.h"
 #include "src/model/run_model.h"
 #include "src/report/read_run.h"
 
@@ -72,13 +73,17 @@ Option WhileOption(std::string& column) {
 }
 
 std::vector<Option> LogOptions(ModelFlags& flags) {
-  return {ExperimentOption(flags.experiment),
-          {.flag = "logs",
-           .value = &flags.logs,
-           .required = true,
-           .help = "Hardware logs",
-           .more = "CSV or what else docs/reference/experiment.md names; they are read by path and may lie anywhere"},
-          WhileOption(flags.while_column)};
+  return {
+      ExperimentOption(flags.experiment),
+      {.flag = "logs",
+       .value = &flags.logs,
+       .stands_for = LogsNamed,
+       .required = true,
+       .help = "Hardware logs",
+       .more =
+           "CSV or what else docs/reference/experiment.md names; they are read by path and may lie anywhere. A LeRobot "
+           "dataset is as many logs as it has episodes, dataset#0:20 twenty of them, dataset#3 one"},
+      WhileOption(flags.while_column)};
 }
 
 std::vector<Option> ValueOptions(std::vector<std::string>& set, std::vector<std::string>& params) {

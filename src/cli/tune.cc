@@ -10,6 +10,7 @@
 #include "src/cli/print.h"
 #include "src/cli/progress.h"
 #include "src/cli/session.h"
+#include "src/log/foreign.h"
 #include "src/report/json.h"
 #include "src/report/tune_report.h"
 #include "src/report/write_run.h"
@@ -193,6 +194,7 @@ std::vector<Option> FreedomOptions(TuneFlags& flags) {
   return {
       {.flag = "--hold-out",
        .value = &flags.hold_out,
+       .stands_for = LogsNamed,
        .help = "A log to score on, not to fit; more than once",
        .more = "Without it every third log is held out, of two the second, of one its last 30 % of time; the result "
                "says which"},

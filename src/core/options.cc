@@ -92,7 +92,12 @@ struct Reader {
   }
   Status operator()(std::vector<std::string>* value) const {
     for (const auto& word : given) GS_RETURN_IF_ERROR(OneOf(option.flag, option.words, word));
-    *value = given;
+    std::vector<std::string> meant = option.stands_for ? std::vector<std::string>() : given;
+    for (std::size_t i = 0; option.stands_for && i < given.size(); ++i) {
+      GS_ASSIGN(const auto words, option.stands_for(given[i]));
+      meant.insert(meant.end(), words.begin(), words.end());
+    }
+    *value = std::move(meant);
     return Ok();
   }
   Status operator()(const Choice& choice) const {

@@ -71,13 +71,16 @@ struct Option {
   std::string unit;  // "" for words and pure numbers
   NumberRange range;
   std::vector<std::string> words;  // of a list of words: the ones allowed; empty: any
-  std::string unset;               // what holds when it is not given and the value cannot say: "the experiment's"
+  // Of a list of words: what a given one stands for. Null: itself.
+  Result<std::vector<std::string>> (*stands_for)(const std::string& word) = nullptr;
+  std::string unset;  // what holds when it is not given and the value cannot say: "the experiment's"
   bool required = false;
   bool commas = false;  // a list's items are parted by commas, rather than the flag given again
   std::string help;     // a line for `--help`
   std::string more;     // the rest of its paragraph in docs/reference/options.md
 
-  // Reads the words that were given. Errors: not a number, out of range, not one of the words; nothing is written then.
+  // Reads the words that were given. Errors: not a number, out of range, not one of the words, those of
+  // `stands_for`; nothing is written then.
   Status Read(const std::vector<std::string>& given) const;
   // The present value against the range.
   Status Check() const;

@@ -69,6 +69,10 @@ Status Convert(const Conversion& conversion, const std::string& said) {
   return Ok();
 }
 
+std::string Needed(const ForeignFormat& format) {
+  return "the log is a " + format.name + ", which the Python package reads";
+}
+
 Error NoRoom(const std::string& path) {
   return {.what = "no room to convert the log", .where = path, .actual = std::strerror(errno), .cure = "$TMPDIR"};
 }
@@ -107,14 +111,28 @@ const ForeignFormat* ForeignFormatOf(const std::string& path) {
   return is(".bag", ".db3") ? &kRos : nullptr;
 }
 
+Result<std::vector<std::string>> LogsNamed(const std::string& path) {
+  const ForeignFormat* format = ForeignFormatOf(path);
+  if (format != &kLerobot) return std::vector{path};
+  const std::string asked = path.substr(WithoutEpisodes(path).size());
+  if (!asked.empty() && asked.find(':') == std::string::npos) return std::vector{path};
+  const ScratchFolder scratch;
+  if (!scratch.made()) return NoRoom(path);
+  GS_RETURN_IF_ERROR(Convert(
+      {.words = {"--episodes", "--", path}, .path = path, .needed = Needed(*format), .install = format->install},
+      scratch.Path("said")));
+  GS_ASSIGN(const std::string said, ReadFile(scratch.Path("said")));
+  std::istringstream lines(said);
+  std::vector<std::string> logs;
+  for (std::string line; std::getline(lines, line);) logs.push_back(WithoutEpisodes(path) + "#" + line);
+  return logs;
+}
+
 Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, const std::string& source) {
   const ScratchFolder scratch;
   if (!scratch.made()) return NoRoom(path);
   const std::string table = scratch.Path("table.npz");
-  Conversion conversion{.words = {"--out", table},
-                        .path = path,
-                        .needed = "the log is a " + format.name + ", which the Python package reads",
-                        .install = format.install};
+  Conversion conversion{.words = {"--out", table}, .path = path, .needed = Needed(format), .install = format.install};
   if (!source.empty()) conversion.words.insert(conversion.words.end(), {"--options", source});
   conversion.words.insert(conversion.words.end(), {"--", path});
   GS_RETURN_IF_ERROR(Convert(conversion, scratch.Path("said")));

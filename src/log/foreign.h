@@ -4,6 +4,7 @@
 #define GAPSCOPE_LOG_FOREIGN_H_
 
 #include <string>
+#include <vector>
 
 #include "src/log/log.h"
 
@@ -18,6 +19,10 @@ const ForeignFormat* ForeignFormatOf(const std::string& path);
 
 // "dataset#3" names an episode of "dataset".
 std::string WithoutEpisodes(const std::string& path);
+
+// The logs that a path names: of a LeRobot dataset ("dataset", "dataset#0:20") one for each of its episodes, which the
+// converter lists; else itself. Errors: as ReadForeign.
+Result<std::vector<std::string>> LogsNamed(const std::string& path);
 
 // The converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH.
 std::string ConverterProgram();

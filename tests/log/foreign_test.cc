@@ -72,6 +72,21 @@ TEST_F(ForeignTest, WordsArriveAsTheyStand) {
   EXPECT_TRUE(words.ends_with("\n--options\n{\"variable\": \"a 'b\"}\n--\n" + path + "\n")) << words;
 }
 
+TEST_F(ForeignTest, ADatasetIsTheLogsThatTheConverterLists) {
+  folder_.Write("set/meta/info.json", "{}");
+  const std::string set = folder_.Path("set");
+  Install("printf '0\\n7\\n'");
+  EXPECT_EQ(LogsNamed(set).value(), (std::vector{set + "#0", set + "#7"}));
+  EXPECT_EQ(LogsNamed(set + "#0:8").value(), (std::vector{set + "#0", set + "#7"}));
+  EXPECT_EQ(ReadFile(folder_.Path("words")).value(), "--episodes\n--\n" + set + "#0:8\n");
+  // One episode, or a file: no converter is asked.
+  setenv("GAPSCOPE_CONVERT", folder_.Path("gone").c_str(), 1);
+  for (const std::string& one : {set + "#3", folder_.Write("a.mat", "?"), folder_.Path("none.csv")})
+    EXPECT_EQ(LogsNamed(one).value(), std::vector{one});
+  ASSERT_FALSE(LogsNamed(set).ok());
+  EXPECT_EQ(LogsNamed(set).error().cure, "pip install 'gapscope[parquet]'");
+}
+
 TEST_F(ForeignTest, RefusalsAndFailuresAreErrors) {
   const std::string path = folder_.Write("a.mat", "?");
   Install("printf 'too large\\n%s, q\\n7 rows\\n5\\nsplit it\\n' here; exit 2");

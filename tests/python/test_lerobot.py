@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import gapscope as gs
 import numpy as np
 import pytest
 from conftest import JOINT, experiment_at
+from gapscope._program import program
+from test_converter import converter
 from test_formats import ROWS, U, read
 
 
@@ -119,3 +122,26 @@ def test_commands_take_a_dataset_as_its_episodes(tmp_path: Path, version: str) -
     of_tables = gs.tune(bound, tables[:3], hold_out=tables[3:], **fit)
     assert [Path(log.log).stem for log in parts.held_out] == ["set#3", "set#4"] and len(parts.train) == 3
     assert parts["joint.damping"].value == of_tables["joint.damping"].value
+
+
+def test_the_program_takes_a_dataset_as_its_episodes(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    names = {"target_rad": "action/joint", "position_rad": "observation.state/joint", "time_s": "timestamp"}
+    bound = experiment_at(tmp_path / "experiment.yaml", JOINT, names)
+    tables, dataset = write_lerobot(tmp_path / "set", "v3.0"), tmp_path / "set"
+
+    def run(*words: object, status: int = 0) -> Any:
+        call = [str(program()), *map(str, words), "--json"]
+        done = subprocess.run(call, capture_output=True, text=True, env=converter(tmp_path))
+        assert done.returncode == status, done.stderr
+        return json.loads(done.stdout) if status == 0 else done.stderr
+
+    whole = run("replay", bound, dataset)
+    assert [log["log"] for log in whole["logs"]] == [f"{dataset}#{k}" for k in range(5)]
+    assert whole["error"] == run("replay", bound, *tables)["error"]
+    parts = run("tune", bound, f"{dataset}#0:3", "--hold-out", f"{dataset}#3:5", "--free", "joint.damping")
+    assert [log["log"] for log in parts["train"]] == [f"{dataset}#{k}" for k in range(3)]
+    assert [log["log"] for log in parts["held_out"]] == [f"{dataset}#{k}" for k in (3, 4)]
+    assert [log["time"]["rows"] for log in run("inspect", f"{dataset}#1:3")["logs"]] == [110, 120]
+    assert len(run("convert", dataset, "--out", tmp_path / "tables")["logs"]) == 5
+    assert "no such episode" in run("replay", bound, f"{dataset}#7:9", status=2)

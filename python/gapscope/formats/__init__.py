@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from gapscope._errors import InputError
 from gapscope.formats import _arrow, _hdf5, _lerobot, _mat, _mcap, _pace, _ros
 from gapscope.formats._table import MOST_COLUMNS, Format, Source, Table, named_elements
 
-__all__ = ["FORMATS", "Format", "Source", "Table", "format_of", "read_table", "read_tables"]
+__all__ = ["FORMATS", "Format", "Source", "Table", "episodes_of", "format_of", "read_table", "read_tables"]
 
 # The first that knows a path reads it.
 FORMATS: tuple[Format, ...] = (
@@ -34,6 +36,28 @@ def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tupl
 
     Raises InputError: nothing is there, no known format, its library is not installed, damaged, too large.
     """
+    text, episodes, form = _known(path)
+    with _refusing(text, form):
+        tables = form.read(Path(text), source if episodes is None else source.of_episodes(episodes))
+    for table in tables:
+        if len(table.columns) > MOST_COLUMNS:
+            raise InputError("too many columns", text, str(len(table.columns)), f"at most {MOST_COLUMNS}")
+        if any(len(values) == 0 for values in table.columns.values()):
+            raise InputError("a log without rows", text, cure="was the recording stopped before anything was written?")
+    return tuple(named_elements(table, source.joints) for table in tables) if source.joints else tables
+
+
+def episodes_of(path: str | os.PathLike[str]) -> list[int]:
+    """The numbers of a LeRobot dataset's episodes, or of those that the path asks for. Raises InputError, as above."""
+    text, episodes, form = _known(path)
+    if form is not _lerobot.FORMAT:
+        raise InputError("no dataset of episodes", text, form.name, "a LeRobot dataset")
+    with _refusing(text, form):
+        return _lerobot.episodes(Path(text), episodes or "")
+
+
+def _known(path: str | os.PathLike[str]) -> tuple[str, str | None, Format]:
+    """The path without episodes, the episodes, the format."""
     text, episodes = _without_episodes(os.fspath(path))
     place, form = Path(text), format_of(path)
     if not place.exists():
@@ -42,19 +66,19 @@ def read_tables(path: str | os.PathLike[str], source: Source = Source()) -> tupl
         raise InputError("not a known format", text, place.suffix or "no suffix", ", ".join(f.name for f in FORMATS))
     if episodes is not None and form is not _lerobot.FORMAT:
         raise InputError("episodes of what has none", text, f"#{episodes}", "a LeRobot dataset")
+    return text, episodes, form
+
+
+@contextmanager
+def _refusing(text: str, form: Format) -> Iterator[None]:
+    """Whatever a format's library raises is a refusal."""
     try:
-        tables = form.read(place, source if episodes is None else source.of_episodes(episodes))
+        yield
     except InputError:
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
         raise InputError(f"not a readable {form.name}", text, reason, cure=form.cure) from None
-    for table in tables:
-        if len(table.columns) > MOST_COLUMNS:
-            raise InputError("too many columns", text, str(len(table.columns)), f"at most {MOST_COLUMNS}")
-        if any(len(values) == 0 for values in table.columns.values()):
-            raise InputError("a log without rows", text, cure="was the recording stopped before anything was written?")
-    return tuple(named_elements(table, source.joints) for table in tables) if source.joints else tables
 
 
 def read_table(path: str | os.PathLike[str], source: Source = Source()) -> Table:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from gapscope._errors import InputError
 from gapscope._log import Log
-from gapscope.formats import Source, _joint_states, format_of, read_table, read_tables
+from gapscope.formats import Source, _joint_states, episodes_of, format_of, read_table, read_tables
 from gapscope.formats._cache import through_cache
 from gapscope.formats.apart import load_table
 
@@ -72,7 +72,9 @@ def main() -> int:
     """The status: 0, or 2 where the file is refused."""
     parser = argparse.ArgumentParser(prog="gapscope-convert", description="A log of another tool as one NPZ table.")
     parser.add_argument("file", help="MAT, HDF5, Parquet, Feather, ROS bag, MCAP, PACE, LeRobot dataset#EPISODE")
-    parser.add_argument("--out", required=True, help="the table, .npz; with --all a folder")
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--out", help="the table, .npz; with --all a folder")
+    what.add_argument("--episodes", action="store_true", help="say the numbers of a dataset's episodes, a line each")
     parser.add_argument("--all", action="store_true", help="every recording of the file, 000000.npz and so on")
     parser.add_argument("--to", choices=("npz", "mcap"), default="npz", help="mcap: of a table, joint states in MCAP")
     parser.add_argument("--options", default="{}", help="JSON: topics, msgs, variable ... (docs/reference/formats.md)")
@@ -82,7 +84,9 @@ def main() -> int:
     _limit(resource.RLIMIT_FSIZE, _MOST_BYTES)
     try:
         source = Source.of(_options(given.options), "--options")
-        if given.to == "mcap":
+        if given.episodes:
+            print("\n".join(map(str, episodes_of(given.file))))
+        elif given.to == "mcap":
             _joint_states.write(load_table(Path(given.file)), Path(given.out))
         elif given.all:
             for k, table in enumerate(read_tables(given.file, source)):

@@ -19,12 +19,16 @@ def _knows(path: Path) -> bool:
     return path.suffix.lower() in _PARQUET + _FEATHER
 
 
-def load(path: Path) -> tuple[Any, list[str]]:
-    """The columns of numbers and of lists of them as an Arrow table, and the names of the others, which stay unread."""
+def load(path: Path, wanted: Sequence[str] = ()) -> tuple[Any, list[str]]:
+    """The columns of numbers and of lists of them as an Arrow table, and the names of the others, which stay unread.
+
+    Of a Parquet file only the ``wanted`` ones, if any are named.
+    """
     if path.suffix.lower() in _PARQUET:
         parquet = library("pyarrow.parquet", "Parquet files", _EXTRA)
         with parquet.ParquetFile(path) as file:
             names, skipped = _numbers(file.schema_arrow)
+            names = [name for name in names if name in wanted or not wanted]
             meta = file.metadata
             groups = [meta.row_group(k) for k in range(meta.num_row_groups)]
             held = sum(group.column(k).num_values for group in groups for k in range(group.num_columns))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +58,28 @@ def _files(path: Path, low: int, high: float) -> Iterator[Path]:
             yield file
 
 
+def episodes(path: Path, asked: str) -> list[int]:
+    """Numbers of the episodes that are there of those that are asked for ("", "3", "0:20")."""
+    low, high = _asked(path, asked)
+    found: set[int] = set()
+    for file in _files(path, low, high):
+        table, _ = _arrow.load(file, ("episode_index",))
+        _check(file, table.column_names, "episode_index")
+        found.update(np.unique(_arrow.columns_of(file, table)["episode_index"]).astype(int).tolist())
+    return _some(path, asked, sorted(one for one in found if low <= one < high))
+
+
+def _check(file: Path, there: Iterable[str], *needed: str) -> None:
+    if not set(needed) <= set(there):
+        raise InputError(f"a data file without {' and '.join(needed)}", str(file), ", ".join(there))
+
+
+def _some(path: Path, asked: str, found: list[int]) -> list[int]:
+    if not found:
+        raise InputError("no such episode", str(path), f"#{asked}" if asked else "no data files")
+    return found
+
+
 def _read(path: Path, source: Source) -> tuple[Table, ...]:
     labels = _labels(json.loads((path / "meta" / "info.json").read_text(encoding="utf-8")))
     low, high = _asked(path, source.episodes)
@@ -65,9 +87,7 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
     for file in _files(path, low, high):
         table, _ = _arrow.load(file)
         arrays = _arrow.columns_of(file, table, labels)
-        if "episode_index" not in arrays or "timestamp" not in arrays:
-            there = ", ".join(arrays)
-            raise InputError("a data file without episode_index and timestamp", str(file), there)
+        _check(file, arrays, "episode_index", "timestamp")
         for episode in np.unique(arrays["episode_index"]).astype(int).tolist():
             if not low <= episode < high:
                 continue
@@ -79,9 +99,7 @@ def _read(path: Path, source: Source) -> tuple[Table, ...]:
             name = f"{path.resolve().name}#{episode}"
             units = {"timestamp": "s"}
             tables[episode] = Table(columns, "timestamp", name, units=units, findings=(_STAMPS,), clock=clock)
-    if not tables:
-        raise InputError("no such episode", str(path), f"#{source.episodes}" if source.episodes else "no data files")
-    return tuple(tables[episode] for episode in sorted(tables))
+    return tuple(tables[episode] for episode in _some(path, source.episodes, sorted(tables)))
 
 
 FORMAT = Format("LeRobot dataset", _arrow.FORMAT.extra, _knows, _read)

@@ -139,6 +139,13 @@ Result<ExportedModel> Model::ExportNative(std::span<const double> values,
   mjOption& option = structure.spec->option;
   if (features.time_step_s > 0) option.timestep = features.time_step_s;
   if (!features.runge_kutta && option.integrator == mjINT_RK4) option.integrator = mjINT_IMPLICITFAST;
+  return ExportFrom(structure, values, log_values, {});
+}
+
+// Built anew: what the host does itself during a replay must stand in the exported model.
+Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const double> values,
+                                        const std::map<std::string, double>* log_values,
+                                        const ScaleTable& scales) const {
   std::map<std::string, double> numbers;
   for (const auto& value : experiment().values) numbers[value.name] = value.fallback.value_or(1);
   for (const auto& [name, value] : log_values ? *log_values : std::map<std::string, double>{}) numbers[name] = value;
@@ -147,13 +154,6 @@ Result<ExportedModel> Model::ExportNative(std::span<const double> values,
     const auto value = EvaluateOnce(expression, numbers, "export");
     return value.ok() ? value.value() : kNaN;
   };
-  return ExportFrom(structure, values, log_values, {});
-}
-
-// Built anew: what the host does itself during a replay must stand in the exported model.
-Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const double> values,
-                                        const std::map<std::string, double>* log_values,
-                                        const ScaleTable& scales) const {
   for (const auto& use : effects_) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
   ExportedModel result;

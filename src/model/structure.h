@@ -79,10 +79,10 @@ class Structure {
 
   SpecPtr spec;
   Form form = Form::kReplay;
-  const EffectUse* entering = nullptr;  // whose terms are being added
-  // Of kNative: what the engine has, numbers of expressions, and what became of the effects that added terms.
+  const EffectUse* entering = nullptr;                 // whose terms are being added
+  std::function<double(const std::string&)> value_of;  // of a form that is written: numbers of expressions
+  // Of kNative: what the engine has, and what became of the effects that added terms.
   NativeFeatures features;
-  std::function<double(const std::string&)> value_of;
   std::vector<NativeEffect> told;
   std::map<std::string, double> delays_s;  // by drive, where the engine's own configuration delays
   std::vector<Parameter> parameters;
@@ -106,7 +106,10 @@ class Structure {
   // The plugin instance that the drive's inputs are turned into; its name.
   Result<std::string> ConvertDrive(const std::vector<mjsActuator*>& inputs);
   Status FinishFriction(const std::string& name, Terms terms);
-  void FinishSpring(const std::string& joint, const Terms& terms);
+  std::string Take(const std::string& field, double own);
+  bool TakesSpring(const mjsJoint& joint, const Terms& terms) const;
+  void FinishSpring(const std::string& joint, Terms terms);
+  void AddStop(const std::string& joint, Terms* terms);
   void FinishOwnTorque(const OwnTorque& torque);
   // The same without plugins. Groups of terms, by which Enter and Tell know them:
   static constexpr const char *kMotorTerms = "motor", *kFrictionTerms = "friction", *kSpringTerms = "spring",

@@ -18,6 +18,8 @@ constexpr double kGapTimeConstant_s = 0.004;  // how stiff the flanks of a gap a
 
 std::string NameOf(mjsElement* element) { return mjs_getString(mjs_getName(element)); }
 
+std::string Sum(const std::string& a, const std::string& b) { return a == "0" ? b : a + "+(" + b + ")"; }
+
 void AddText(mjSpec* spec, const std::string& name, const std::string& value) {
   mjsText* text = mjs_addText(spec);
   mjs_setName(text->element, name.c_str());
@@ -232,20 +234,33 @@ void Structure::Stiffen(mjsJoint* joint) {
   joint->solref_friction[1] = -0.9999 / spec->option.timestep;  // at -1/h stops give energy back
 }
 
+// What the experiment or the MJCF says of a field, as an expression; settings no longer have it.
+std::string Structure::Take(const std::string& field, double own) {
+  const auto set = std::ranges::find(settings, field, &FieldSetting::field);
+  if (set == settings.end()) return ExactText(own);
+  std::string expression = set->expressions.front();
+  settings.erase(set);
+  return expression;
+}
+
 Status Structure::FinishFriction(const std::string& name, Terms terms) {
   const std::string joint = MotorSide(name);
   mjsJoint* element = FindJoint(joint);
+  const plugins::ParameterSpec &level = plugins::Friction::kSpecs[plugins::Friction::kFriction],
+                               &drag = plugins::Friction::kSpecs[plugins::Friction::kQuadratic];
+  const std::string of_joint = "joint/" + joint + "/", base = of_joint + level.native;
+  const bool own = std::ranges::all_of(
+      terms, [&](const auto& term) { return *plugins::FindSpec(plugins::Friction::kSpecs, term.first)->native; });
+  if (const auto term = terms.find(drag.key); own && term != terms.end()) {
+    Set(of_joint + drag.native, {Sum(Take(of_joint + drag.native, element->damping[1]), term->second)});
+    terms.erase(term);
+    if (terms.empty()) return Ok();
+  }
   Stiffen(element);
-  const plugins::ParameterSpec& level = plugins::Friction::kSpecs[plugins::Friction::kFriction];
-  const std::string base = "joint/" + joint + "/" + level.native;
-  const auto set =
-      std::find_if(settings.begin(), settings.end(), [&](const FieldSetting& s) { return s.field == base; });
-  const std::string base_level = set != settings.end() ? set->expressions.front() : ExactText(element->frictionloss);
+  const std::string base_level = Take(base, element->frictionloss);
   if (element->frictionloss <= 0) element->frictionloss = kTinyFriction;
-  if (set != settings.end()) settings.erase(set);
-  if (terms.size() == 1 && terms.begin()->first == level.key) {
-    // MuJoCo's own dry friction does it.
-    Set(base, {ExactText(kTinyFriction) + "+" + base_level + "+" + terms.begin()->second});
+  if (own) {
+    Set(base, {ExactText(kTinyFriction) + "+" + base_level + "+" + terms.at(level.key)});
     return Ok();
   }
   Set(base, {ExactText(kTinyFriction)});
@@ -276,29 +291,61 @@ Status Structure::FinishFriction(const std::string& name, Terms terms) {
   return Ok();
 }
 
-void Structure::FinishSpring(const std::string& joint, const Terms& terms) {
-  mjsJoint* element = FindJoint(joint);
-  const auto native = [](const std::string& key) -> std::string {
-    return plugins::FindSpec(plugins::Spring::kSpecs, key)->native;
+// Where no other spring has another rest angle. A spring that does would need a rest angle between the two, which is a
+// quotient, and none exists once one of them hardens.
+bool Structure::TakesSpring(const mjsJoint& joint, const Terms& terms) const {
+  const auto is_set = [&](const char* field) {
+    return std::ranges::find(settings, "joint/" + NameOf(joint.element) + "/" + field, &FieldSetting::field) !=
+           settings.end();
   };
-  const bool own =
-      std::all_of(terms.begin(), terms.end(), [&](const auto& term) { return !native(term.first).empty(); });
-  const bool set = std::any_of(settings.begin(), settings.end(), [&](const FieldSetting& s) {
-    return std::any_of(terms.begin(), terms.end(),
-                       [&](const auto& term) { return s.field == "joint/" + joint + "/" + native(term.first); });
+  if (is_set("springref")) return false;
+  const bool rests = terms.contains(plugins::Spring::kSpecs[plugins::Spring::kRest].key);
+  const bool free = !is_set("stiffness") && !is_set("stiffness_cubic") &&
+                    std::ranges::all_of(joint.stiffness, [](double coefficient) { return coefficient == 0; });
+  return rests ? free : joint.springref == 0;
+}
+
+void Structure::FinishSpring(const std::string& joint, Terms terms) {
+  mjsJoint* element = FindJoint(joint);
+  const std::string of_joint = "joint/" + joint + "/", rest = "springref";
+  const bool takes = TakesSpring(*element, terms);
+  const double stiffness = element->stiffness[0], cubic = element->stiffness[2];
+  std::erase_if(terms, [&](const auto& term) {
+    const std::string native = plugins::FindSpec(plugins::Spring::kSpecs, term.first)->native;
+    if (!takes || native.empty()) return false;
+    if (stiffness == 0) element->stiffness[0] = kTinyFriction;
+    const std::string field = of_joint + native;
+    const std::string base = native == rest ? "0" : Take(field, native == "stiffness" ? stiffness : cubic);
+    Set(field, {Sum(base, term.second)});
+    return true;
   });
-  const bool free = !set && std::all_of(std::begin(element->stiffness), std::end(element->stiffness),
-                                        [](double coefficient) { return coefficient == 0; });
-  if (own && free) {
-    // MuJoCo's own spring does it.
-    element->stiffness[0] = kTinyFriction;
-    for (const auto& [key, expression] : terms) Set("joint/" + joint + "/" + native(key), {expression});
-    return;
-  }
+  if (form == Form::kPlugins) AddStop(joint, &terms);
+  if (terms.empty()) return;
   const std::string instance = joint + ".spring";
   AddInstance(spec.get(), plugins::Spring::kName, instance, {{"joint", joint}});
   HoldPlugin(element, plugins::Spring::kName, instance);
   AddLive(instance, terms);
+}
+
+// A tendon whose spring is slack before the stop. While a fit moves a stop, the plugin has it: the tendon stands on one
+// side of the joint.
+void Structure::AddStop(const std::string& joint, Terms* terms) {
+  const plugins::ParameterSpec &stiffness = plugins::Spring::kSpecs[plugins::Spring::kStop],
+                               &angle = plugins::Spring::kSpecs[plugins::Spring::kStopAngle];
+  if (!terms->contains(stiffness.key)) return;
+  const std::string far = "1e6";  // the other end of the free way
+  const std::string stop = terms->contains(angle.key) ? terms->at(angle.key) : ExactText(angle.neutral);
+  const mjsJoint* element = FindJoint(joint);
+  const std::string name = joint + ".stop", of_tendon = "tendon/" + name + "/";
+  mjsTendon* tendon = mjs_addTendon(spec.get(), nullptr);
+  mjs_setName(tendon->element, name.c_str());
+  mjs_wrapJoint(tendon, joint.c_str(), 1);
+  tendon->stiffness[0] = 1;
+  const bool above = value_of(stop) > 0.5 * (element->range[0] + element->range[1]);
+  Set(of_tendon + "stiffness", {terms->at(stiffness.key)});
+  Set(of_tendon + "springlength", {above ? "-" + far : stop, above ? stop : far});
+  terms->erase(stiffness.key);
+  terms->erase(angle.key);
 }
 
 void Structure::HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance) {

@@ -138,19 +138,11 @@ void Structure::NativeSpring(const std::string& joint, const Terms& terms) {
   passive("gravity_n_m", value("gravity_n_m"), 1, std::numbers::pi - value("gravity_rest_rad"));
   passive("bias_n_m", value("bias_n_m"), 0, 0.5 * std::numbers::pi);
   passive("cogging_n_m", value("cogging_n_m"), value("cogging_periods_per_rev"), value("cogging_phase_rad"));
-  if (const double stiffness = value("stop_n_m_per_rad"); stiffness > 0 && !features.tendons) {
-    tell("stop_n_m_per_rad", Fidelity::kDropped, "no soft stop there");
-  } else if (stiffness > 0) {
-    constexpr double kFar = 1e6;  // the other end of the free way
-    const mjsJoint* element = FindJoint(joint);
-    const double stop = value("stop_rad"), middle = 0.5 * (element->range[0] + element->range[1]);
-    mjsTendon* tendon = mjs_addTendon(spec.get(), nullptr);
-    mjs_setName(tendon->element, (joint + ".stop").c_str());
-    mjs_wrapJoint(tendon, joint.c_str(), 1);
-    tendon->stiffness[0] = stiffness;
-    tendon->springlength[0] = stop > middle ? -kFar : stop;
-    tendon->springlength[1] = stop > middle ? stop : kFar;
-    tell("stop_n_m_per_rad", Fidelity::kExact, "a tendon whose spring is slack before the stop");
+  if (value("stop_n_m_per_rad") > 0) {
+    Terms stop = terms;
+    if (features.tendons) AddStop(joint, &stop);
+    tell("stop_n_m_per_rad", features.tendons ? Fidelity::kExact : Fidelity::kDropped,
+         features.tendons ? "a tendon whose spring is slack before the stop" : "no soft stop there");
   }
 }
 
@@ -196,8 +188,14 @@ Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
   const double positive = value("friction_positive_n_m"), negative = value("friction_negative_n_m");
   const double level = value("friction_n_m") + 0.5 * (positive + negative);
   tell("friction_n_m", Fidelity::kExact, "the joint's own dry friction");
-  if (terms.contains("friction_n_m") || level > 0)
-    GS_RETURN_IF_ERROR(FinishFriction(joint, {{"friction_n_m", ExactText(level)}}));
+  Terms own;
+  if (terms.contains("friction_n_m") || level > 0) own["friction_n_m"] = ExactText(level);
+  if (const auto drag = terms.find("quadratic_n_m_s2_per_rad2"); drag != terms.end()) {
+    if (features.polynomials) own.insert(*drag);
+    tell(drag->first.c_str(), features.polynomials ? Fidelity::kExact : Fidelity::kDropped,
+         features.polynomials ? "the joint's own quadratic damping" : "damping is linear there");
+  }
+  if (!own.empty()) GS_RETURN_IF_ERROR(FinishFriction(joint, own));
   // While it slides, friction by direction is constant friction and a constant torque.
   const bool both = AddPassive(on, -0.5 * (positive - negative), 0, 0.5 * std::numbers::pi) == Fidelity::kExact;
   for (const char* key : {"friction_positive_n_m", "friction_negative_n_m"})
@@ -205,13 +203,6 @@ Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
          both ? "dry friction of the mean, and a constant torque" : "dry friction of the mean");
   tell("breakaway_n_m", Fidelity::kApproximated, "dry friction of its level at speed: it breaks away at that");
   tell("load_coefficient", Fidelity::kDropped, "friction in proportion to a load has no native form");
-  if (terms.contains("quadratic_n_m_s2_per_rad2")) {
-    const std::string field = "joint/" + on + "/damping_quadratic";
-    const double own = ValueOf(field, FindJoint(on)->damping[1]);
-    if (features.polynomials) Put(field, own + value("quadratic_n_m_s2_per_rad2"));
-    tell("quadratic_n_m_s2_per_rad2", features.polynomials ? Fidelity::kExact : Fidelity::kDropped,
-         features.polynomials ? "the joint's own quadratic damping" : "damping is linear there");
-  }
   return Ok();
 }
 

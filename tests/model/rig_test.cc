@@ -144,13 +144,30 @@ TEST_F(RigTest, ASpringIsTheJointsOwnWhereItHasNone) {
   ASSERT_TRUE(structure.AddSpringTerm("rough", "stiffness_n_m_per_rad", "4").ok());
   ASSERT_TRUE(structure.AddSpringTerm("rough", "rest_rad", "0.1").ok());
   ASSERT_TRUE(structure.AddSpringTerm("rough", "cubic_n_m_per_rad3", "5").ok());
+  ASSERT_TRUE(structure.AddSpringTerm("rough", "bias_n_m", "6").ok());
   ASSERT_TRUE(structure.AddSpringTerm("sprung", "stiffness_n_m_per_rad", "4").ok());
+  ASSERT_TRUE(structure.AddSpringTerm("sprung", "rest_rad", "0.1").ok());
   ASSERT_TRUE(structure.Finish().ok());
   EXPECT_EQ(SetTo(structure, "joint/rough/stiffness_cubic"), "5");
   EXPECT_EQ(SetTo(structure, "joint/rough/stiffness"), "4");
   EXPECT_EQ(SetTo(structure, "joint/rough/springref"), "0.1");
+  EXPECT_EQ(SetTo(structure, "numeric/rough.spring.bias_n_m"), "6");
+  EXPECT_EQ(SetTo(structure, "numeric/rough.spring.stiffness_n_m_per_rad"), "");
   EXPECT_EQ(SetTo(structure, "joint/sprung/stiffness"), "");
   EXPECT_EQ(SetTo(structure, "numeric/sprung.spring.stiffness_n_m_per_rad"), "4");
+}
+
+TEST_F(RigTest, OneRestAngleIsOneSpring) {
+  Structure structure(*rig_);
+  ASSERT_TRUE(structure.AddSpringTerm("sprung", "stiffness_n_m_per_rad", "4").ok());
+  ASSERT_TRUE(structure.AddSpringTerm("sprung", "cubic_n_m_per_rad3", "5").ok());
+  ASSERT_TRUE(structure.AddFrictionTerm("sprung", "quadratic_n_m_s2_per_rad2", "6").ok());
+  ASSERT_TRUE(structure.Finish().ok());
+  EXPECT_EQ(SetTo(structure, "joint/sprung/stiffness"), "0.29999999999999999+(4)");
+  EXPECT_EQ(SetTo(structure, "joint/sprung/stiffness_cubic"), "5");
+  EXPECT_EQ(SetTo(structure, "joint/sprung/damping_quadratic"), "6");
+  EXPECT_EQ(SetTo(structure, "numeric/sprung.spring.stiffness_n_m_per_rad"), "");
+  EXPECT_EQ(SetTo(structure, "numeric/sprung.friction.quadratic_n_m_s2_per_rad2"), "");
 }
 
 TEST_F(RigTest, TermsOnWhatIsNotThereNameTheNearest) {

@@ -237,7 +237,8 @@ void Structure::NativeDelay(const std::string& joint, const std::string& key, do
   // MuJoCo's last stage is at the end of a step.
   const bool early = spec->option.integrator == mjINT_RK4 && !features.late_in_stages;
   Tell(kMotorTerms, joint, key, late_feedback || early ? Fidelity::kApproximated : Fidelity::kExact,
-       "the actuator's own delay of " + in_steps + (early ? ", by RK4 up to a step less" : "") + how_late);
+       "the actuator's own delay of " + in_steps + ", full of zeros at a reset" +
+           (early ? ", by RK4 up to a step less" : "") + how_late);
 }
 
 void Structure::Put(const std::string& field, double number) {

@@ -17,6 +17,17 @@ SIZES = {
 }
 
 
+# What MuJoCo has itself: springs beside a stop, and drag.
+NATIVES = {
+    "cable_spring@arm.stiffness_n_m_per_rad": 1.2e-3,
+    "cable_spring@arm.stiffness_cubic_n_m_per_rad3": 1e-3,
+    "coulomb_friction@arm.friction_n_m": 6e-4,
+    "quadratic_drag@arm.drag_n_m_s2_per_rad2": 2e-5,
+    "end_stop@arm.angle_rad": 0.3,
+    "end_stop@arm.stiffness_n_m_per_rad": 0.02,
+}
+
+
 def stock_error(model: Path, log: str, time_step_s: float) -> float:
     """The root mean square over the signals of each one's error over its standard deviation, in one free run."""
     pytest.importorskip("mujoco")
@@ -43,3 +54,16 @@ def test_the_applied_model_keeps_its_promise_in_stock_mujoco(experiment: str, de
     assert step_s == promised.json["time_step_s"] < changed["model_time_step_s"] == 0.002
     assert stock_error(tmp_path / "robot.xml", demo, step_s) == pytest.approx(promised.error, rel=0.01)
     assert stock_error(tmp_path / "nominal.xml", demo, step_s) == pytest.approx(without.error, rel=0.01)
+
+
+def test_what_mujoco_has_itself_needs_no_plugin(experiment: str, demo: str, tmp_path: Path) -> None:
+    effects = list(dict.fromkeys(name.partition(".")[0] for name in NATIVES))
+    promised = gs.replay(experiment, demo, with_=effects, set=NATIVES)
+    step_s = promised.apply(tmp_path / "robot.xml")["time_step_s"]
+    text = (tmp_path / "robot.xml").read_text()
+    assert "plugin" not in text and all(f"gapscope: {name}" in text for name in effects), text
+    assert stock_error(tmp_path / "robot.xml", demo, step_s) == pytest.approx(promised.error, rel=1e-4)
+    for effect in effects:  # each one counts
+        kept = [one for one in effects if one != effect]
+        sizes = {name: value for name, value in NATIVES.items() if not name.startswith(effect)}
+        assert gs.replay(experiment, demo, with_=kept, set=sizes).error != pytest.approx(promised.error, rel=1e-3)

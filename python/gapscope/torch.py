@@ -1,9 +1,10 @@
-"""The laws of the program's plugins over tensors, for simulators that compute in PyTorch. Needs `torch`, 2.0 or newer.
+"""The laws of gapscope's plugins over tensors, for simulators that compute in PyTorch. Needs `torch`, 2.0 or newer.
 
 Every function is pure and acts element by element on tensors of shape (envs, joints), in SI; parameters are numbers or
 tensors on the same device that broadcast to it. Nothing is checked: a parameter out of range gives what the formula
 gives. Each is the law of one stage of gapscope.motor, gapscope.friction or gapscope.spring (src/plugins). `Drive` runs
-a servo's stages in the plugin's order. `import gapscope` does not import this module.
+a servo's stages in the plugin's order. `import gapscope` does not import this module; exports write a copy of it, which
+needs no gapscope.
 """
 
 from __future__ import annotations
@@ -45,6 +46,20 @@ def late_command(history: Tensor, delay_s: Value, step_s: float) -> Tensor:
     newer = history.gather(0, whole.long().clamp(0, last)[None])[0]
     older = history.gather(0, (whole.long() + 1).clamp(0, last)[None])[0]
     return (1 - part) * newer + part * older
+
+
+def late_motion(angles: Tensor, speeds: Tensor, delay_s: Value, step_s: float) -> tuple[Tensor, Tensor]:
+    """The angle and the speed ``delay_s`` ago, shape (envs, joints): a cubic through both, the speed on a line.
+
+    ``angles`` in rad and ``speeds`` in rad/s are of shape (steps, envs, joints), the present first, as `late_command`.
+    """
+    steps = _like(delay_s, angles[0]) / step_s
+    newer = torch.clamp(torch.floor(steps).long(), 0, len(angles) - 2)[None]
+    s = torch.clamp(newer[0] + 1 - steps, 0, 1)  # of the way from the older sample to the newer one
+    r = 1 - s
+    (q0, q1), (w0, w1) = ((of.gather(0, newer + 1)[0], of.gather(0, newer)[0]) for of in (angles, speeds))
+    angle = r * r * (1 + 2 * s) * q0 + s * s * (1 + 2 * r) * q1 + s * r * step_s * (r * w0 - s * w1)
+    return angle, r * w0 + s * w1
 
 
 def lag_output(state: Tensor, request: Tensor, time_constant_s: Value, step_s: float) -> Tensor:
@@ -127,18 +142,25 @@ def dry_level(
     load_n_m: Value = 0.0,
     load_coefficient: Value = 0.0,
     load_quadratic: Value = 0.0,
+    positive_n_m: Value = 0.0,
+    negative_n_m: Value = 0.0,
+    free_speed: Tensor | None = None,
 ) -> Tensor:
     """The level of dry friction that sliding meets and that holds at rest, N m, shape (envs, joints).
 
     A ``breakaway_n_m`` above ``coulomb_n_m`` is a hump that ends at about ``stribeck_speed``, rad/s. ``load_n_m`` is
-    the torque through the gears; of it ``load_coefficient`` and, per N m, ``load_quadratic`` are added.
+    the torque through the gears; of it ``load_coefficient`` and, per N m, ``load_quadratic`` are added. In motion of
+    either sign ``positive_n_m`` or ``negative_n_m`` is too: of ``free_speed``, with which the step would end without dry
+    friction, or of ``speed``.
     """
     coulomb, width = _like(coulomb_n_m, speed), _like(stribeck_speed, speed)
     hump = torch.clamp(_like(breakaway_n_m, speed) - coulomb, min=0)
     ratio = speed.abs() / torch.where(width > 0, width, 1.0)
     share = torch.where(speed == 0, 1.0, torch.where(width > 0, torch.exp(-(ratio**stribeck_exponent)), 0.0))
     load = _like(load_n_m, speed)
-    return coulomb + load_coefficient * load.abs() + load_quadratic * load**2 + hump * share
+    ways = _like(positive_n_m, speed), _like(negative_n_m, speed)
+    way = 0.5 * (ways[0] + ways[1]) + 0.5 * torch.sign(speed if free_speed is None else free_speed) * (ways[0] - ways[1])
+    return coulomb + load_coefficient * load.abs() + load_quadratic * load**2 + hump * share + way
 
 
 def bend(state: Tensor, displacement: Tensor, reach_rad: Value) -> Tensor:
@@ -159,33 +181,52 @@ def spring_torque(
     cogging_n_m: Value = 0.0,
     cogging_periods: Value = 12.0,
     cogging_phase_rad: Value = 0.0,
+    cogging_second_n_m: Value = 0.0,
+    cogging_second_phase_rad: Value = 0.0,
 ) -> Tensor:
     """The torque of a cable, a hanging mass, a bias and cogging at an angle in rad: N m, shape (envs, joints).
 
-    ``stiffness`` in N m/rad and ``cubic`` in N m/rad^3, from ``rest_rad`` on; ``cogging_periods`` a revolution.
+    ``stiffness`` in N m/rad and ``cubic`` in N m/rad^3, from ``rest_rad`` on; ``cogging_periods`` a revolution, the
+    second of them twice as many.
     Hysteresis of N m comes on top: - height * `bend`.
     """
     e = angle - rest_rad
     torque = bias_n_m - (stiffness + cubic * e**2) * e - gravity_n_m * torch.sin(angle - gravity_rest_rad)
-    return torque + cogging_n_m * torch.sin(cogging_periods * angle + cogging_phase_rad)
+    turn = cogging_periods * angle
+    torque = torque + cogging_n_m * torch.sin(turn + cogging_phase_rad)
+    return torque + cogging_second_n_m * torch.sin(2 * turn + cogging_second_phase_rad)
+
+
+def stop_torque(angle: Tensor, stiffness: Value, stop_rad: Value, middle_rad: Value = 0.0) -> Tensor:
+    """A soft stop's torque, N m, shape (envs, joints): above it where it lies above ``middle_rad``, else below."""
+    beyond = angle - stop_rad
+    above = _like(stop_rad, angle) >= middle_rad
+    return -stiffness * torch.where(above, torch.clamp(beyond, min=0), torch.clamp(beyond, max=0))
 
 
 @dataclass
 class Drive:
-    """A position servo as gapscope.motor has it: its parameters, all neutral at their defaults, and its state.
+    """A servo as gapscope.motor has it: its parameters, all neutral at their defaults, and its state.
 
-    Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Its units are N m, rad
-    and s. `step` is called once a time step, under an integrator that evaluates forces once (not RK4). The state is
+    Its torque is ``gain`` command - ``kp`` angle - ``kd`` speed + ``bias_n_m``, before its stages; without ``gain`` that
+    is kp. Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command
+    are in its unit, the others in N m, rad and s. `max_delay_s` bounds both delays together. `step` is called once a time step, under an integrator that evaluates forces once (not RK4). The state is
     made by the first `step`; `reset` takes it from environments.
     """
 
     step_s: float
     kp: Value
     kd: Value = 0.0
+    gain: Value = None
+    bias_n_m: Value = 0.0
     max_delay_s: float = 0.0
     command_delay_s: Value = 0.0
+    torque_delay_s: Value = 0.0
+    command_time_constant_s: Value = 0.0
+    command_dead_zone: Value = 0.0
     command_asymmetry: Value = 0.0
     time_constant_s: Value = 0.0
+    second_time_constant_s: Value = 0.0
     dead_zone: Value = 0.0
     torque_limit_n_m: Value = 0.0
     limit_softness: Value = 0.0
@@ -206,8 +247,8 @@ class Drive:
 
     def __post_init__(self) -> None:
         self._fresh: Tensor = None  # of shape (envs,): the next step is the first one
-        self._history: Tensor = None
-        self._lag: Tensor = None
+        self._past: list[Tensor] = []  # commands, angles and speeds
+        self._lags: dict[str, Tensor] = {}  # states, by the names of their time constants
         self._sag: Tensor = None
 
     def reset(self, envs: Any = slice(None)) -> None:
@@ -231,15 +272,12 @@ class Drive:
 
     def step(self, target: Tensor, angle: Tensor, speed: Tensor) -> Tensor:
         """The joint's torque in this step, N m, of shape (envs, joints): target and angle in rad, speed in rad/s."""
-        self._begin(target)
-        command = by_direction(late_command(self._history, self.command_delay_s, self.step_s), self.command_asymmetry)
-        request = self.kp * (command - angle) - self.kd * speed
+        self._begin(target, angle, speed)
+        request = self._request(angle, speed)
         fresh = self._fresh[:, None]
-        self._lag = torch.where(fresh, request, self._lag)
         self._sag = torch.where(fresh, self._resting_sag(request, speed), self._sag)
+        torque = self._lagged("second_time_constant_s", self._lagged("time_constant_s", request))
         self._fresh = torch.zeros_like(self._fresh)
-        torque = lag_output(self._lag, request, self.time_constant_s, self.step_s)
-        self._lag = lag_next(self._lag, request, self.time_constant_s, self.step_s)
         torque = dead_zone(torque, self.dead_zone)
         limit = self.limit(torque, speed)
         torque = soft_limit(torque, limit * (1 - self.sag_fraction * self._sag), self.limit_softness)
@@ -249,15 +287,33 @@ class Drive:
             by_direction(torque, self.asymmetry), speed, self.efficiency_drive, self.efficiency_backdrive
         )
 
-    def _begin(self, target: Tensor) -> None:
+    def _begin(self, *now: Tensor) -> None:
         if self._fresh is None:
             steps = int(self.max_delay_s / self.step_s + 1e-9) + 2
-            self._history = target.expand(steps, *target.shape).clone()
-            self._lag, self._sag = torch.zeros_like(target), torch.zeros_like(target)
-            self._fresh = torch.ones(len(target), dtype=torch.bool, device=target.device)
-        # Before the first step the command was what it is there.
-        shifted = torch.cat([target[None], self._history[:-1]])
-        self._history = torch.where(self._fresh[None, :, None], target[None], shifted)
+            self._past = [values.expand(steps, *values.shape).clone() for values in now]
+            self._sag = torch.zeros_like(now[0])
+            self._fresh = torch.ones(len(now[0]), dtype=torch.bool, device=now[0].device)
+        # Before the first step the command was what it is there, and the joint moved as fast.
+        ago = self.step_s * torch.arange(len(self._past[0]), dtype=now[0].dtype, device=now[0].device)[:, None, None]
+        for i, before in enumerate((now[0], now[1] - ago * now[2], now[2])):
+            shifted = torch.cat([now[i][None], self._past[i][:-1]])
+            self._past[i] = torch.where(self._fresh[None, :, None], before.expand_as(shifted), shifted)
+
+    def _request(self, angle: Tensor, speed: Tensor) -> Tensor:
+        """What the servo wants before its stages: of a late command, and of a motion that it sees late."""
+        delay = _like(self.command_delay_s, angle) + self.torque_delay_s
+        command = self._lagged("command_time_constant_s", late_command(self._past[0], delay, self.step_s))
+        command = by_direction(dead_zone(command, self.command_dead_zone), self.command_asymmetry)
+        angle, speed = late_motion(self._past[1], self._past[2], self.torque_delay_s, self.step_s)
+        gain = self.kp if self.gain is None else self.gain
+        return gain * command - self.kp * angle - self.kd * speed + self.bias_n_m
+
+    def _lagged(self, name: str, request: Tensor) -> Tensor:
+        """The lag's output in this step; its state goes on."""
+        constant = getattr(self, name)
+        state = torch.where(self._fresh[:, None], request, self._lags.get(name, request))
+        self._lags[name] = lag_next(state, request, constant, self.step_s)
+        return lag_output(state, request, constant, self.step_s)
 
     def _resting_sag(self, request: Tensor, speed: Tensor) -> Tensor:
         return torch.minimum(_load(request, self.limit(request, speed)), 1 / (1 + _like(self.sag_fraction, request)))

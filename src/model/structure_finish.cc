@@ -341,7 +341,7 @@ void Structure::AddStop(const std::string& joint, Terms* terms) {
   mjs_setName(tendon->element, name.c_str());
   mjs_wrapJoint(tendon, joint.c_str(), 1);
   tendon->stiffness[0] = 1;
-  const bool above = value_of(stop) > 0.5 * (element->range[0] + element->range[1]);
+  const bool above = value_of(stop) >= 0.5 * (element->range[0] + element->range[1]);
   Set(of_tendon + "stiffness", {terms->at(stiffness.key)});
   Set(of_tendon + "springlength", {above ? "-" + far : stop, above ? stop : far});
   terms->erase(stiffness.key);

@@ -19,7 +19,9 @@ DRIVE: Values = {
     "kp": [157, 90, 40],
     "kd": [7, 3, 1],
     "command_delay_s": [0.0213, 0.04, 0.0007],
+    "torque_delay_s": [0.0043, 0.006, 0.0005],
     "command_asymmetry": [0.05, -0.1, 0.02],
+    "second_time_constant_s": [0.003, 0.006, 0.0008],
     "time_constant_s": [0.004, 0.0005, 0.02],  # the second below one step
     "dead_zone": [0.5, 0.2, 0.1],
     "torque_limit_n_m": [30, 60, 12],
@@ -39,6 +41,18 @@ DRIVE: Values = {
     "efficiency_drive": [0.9, 0.8, 0.95],
     "efficiency_backdrive": [1.1, 0.7, 1.05],
 }
+# A drive in volts, by the plugin's keys of a native actuator's law.
+VOLTS: Values = {
+    "gain": [40, 25, 15],
+    "bias0": [1, -0.5, 0.2],
+    "bias2": [-4, -3, -1],
+    "command_delay_s": [0.013, 0.002, 0.0311],
+    "torque_delay_s": [0.002, 0.0051, 0],
+    "dead_zone": [0.03, 0.05, 0.02],
+    "command_asymmetry": [0.1, 0.02, -0.05],
+    "time_constant_s": [0.01, 0.004, 0.0005],
+    "second_time_constant_s": [0.005, 0.0007, 0.02],
+}
 SPRING: Values = {
     "stiffness_n_m_per_rad": [20, 10, 4],
     "rest_rad": [0.1, -0.2, 0.3],
@@ -49,6 +63,10 @@ SPRING: Values = {
     "cogging_n_m": [0.3, 0.2, 0.1],
     "cogging_periods_per_rev": [12, 7, 20],
     "cogging_phase_rad": [0.2, 1, 2],
+    "cogging_second_n_m": [0.1, 0.05, 0.2],
+    "cogging_second_phase_rad": [1, 0.3, 0],
+    "stop_n_m_per_rad": [30, 20, 10],
+    "stop_rad": [0.3, -0.2, 0.1],
     "hysteresis_n_m": [0.4, 0.3, 0.2],
     "hysteresis_rad": [0.05, 0.2, 0.01],
 }
@@ -59,6 +77,8 @@ FRICTION: Values = {
     "stribeck_exponent": [2, 1, 2],
     "load_coefficient": [0.05, 0.1, 0.02],
     "load_quadratic": [0.001, 0.002, 0.003],
+    "friction_positive_n_m": [0.2, 0, 0.3],
+    "friction_negative_n_m": [0.05, 0.3, 0.1],
 }
 # As gapscope.torch calls them.
 NAMES = {
@@ -67,6 +87,9 @@ NAMES = {
     "cubic_n_m_per_rad3": "cubic",
     "stribeck_speed_rad_per_s": "stribeck_speed",
     "friction_n_m": "coulomb_n_m",
+    "friction_positive_n_m": "positive_n_m",
+    "friction_negative_n_m": "negative_n_m",
+    "stop_n_m_per_rad": "stiffness",
 }
 SPEEDS, TORQUES = [1.0, 3.0, 8.0], [10.0, 7.0, 1.0]
 WINDING = {"kt": 0.4, "ke": 0.3, "resistance": 5.0, "gear": 2.0}
@@ -78,13 +101,13 @@ def extension(plugin: str, joint: int, values: Values, more: str = "") -> str:
     return f'<plugin plugin="{plugin}"><instance name="{name}{joint}">{keys}{more}</instance></plugin>'
 
 
-def rig() -> mujoco.MjModel:
+def rig(drive: Values, law: str) -> mujoco.MjModel:
     """Three joints that do not touch each other, each with a drive, a spring and friction, every stage in use."""
     gs.load_plugins()
+    lags = sum(name in drive for name in ("time_constant_s", "second_time_constant_s", "sag_time_constant_s"))
     parts: dict[str, list[str]] = {"extension": [], "worldbody": [], "actuator": []}
     for k in range(JOINTS):
-        more = '<config key="law" value="position"/><config key="max_delay_s" value="0.05"/>'
-        parts["extension"].append(extension("gapscope.motor", k, DRIVE, more))
+        parts["extension"].append(extension("gapscope.motor", k, drive, law + config_of({"max_delay_s": 0.05})))
         own = f'<config key="joint" value="j{k}"/>'
         parts["extension"].append(extension("gapscope.spring", k, SPRING, own))
         parts["extension"].append(extension("gapscope.friction", k, FRICTION, own))
@@ -95,16 +118,16 @@ def rig() -> mujoco.MjModel:
             f'<plugin plugin="gapscope.friction" instance="friction{k}"/></body>'
         )
         parts["actuator"].append(
-            f'<plugin joint="j{k}" plugin="gapscope.motor" instance="motor{k}" actdim="2"/>'
+            f'<plugin joint="j{k}" plugin="gapscope.motor" instance="motor{k}" actdim="{lags}"/>'
         )
     text = "".join(f"<{name}>{''.join(lines)}</{name}>" for name, lines in parts.items())
     return mujoco.MjModel.from_xml_string(f'<mujoco><option timestep="{STEP_S}"/>{text}</mujoco>')
 
 
-def moved() -> dict[str, np.ndarray]:
+def moved(drive: Values, law: str) -> dict[str, np.ndarray]:
     """What the plugins did: arrays of (steps, envs, joints)."""
-    model = rig()
-    names = ("target", "angle", "speed", "force", "passive", "level")
+    model = rig(drive, law)
+    names = ("target", "angle", "speed", "force", "passive", "level", "free_speed")
     found = {name: np.empty((STEPS, ENVS, JOINTS)) for name in names}
     for env in range(ENVS):
         rng, data = np.random.default_rng(env), mujoco.MjData(model)
@@ -117,6 +140,7 @@ def moved() -> dict[str, np.ndarray]:
             found["speed"][k, env] = data.qvel
             mujoco.mj_step(model, data)
             found["force"][k, env], found["passive"][k, env] = data.actuator_force, data.qfrc_passive
+            found["free_speed"][k, env] = found["speed"][k, env] + STEP_S * data.qacc_smooth
             found["level"][k, env] = data.efc_frictionloss[data.ne : data.ne + data.nf]
     return found
 
@@ -147,18 +171,31 @@ def forces(config: str, commands: np.ndarray, speeds: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def plugins() -> dict[str, np.ndarray]:
-    return moved()
+    return moved(DRIVE, config_of({"law": "position"}))
 
 
 @pytest.fixture(scope="module")
-def laws(plugins: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+def in_volts() -> dict[str, np.ndarray]:
+    return moved(VOLTS, config_of({"law": "affine", "dead_zone_on": "command"}))
+
+
+@pytest.fixture(scope="module")
+def laws(
+    plugins: dict[str, np.ndarray], in_volts: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, np.ndarray]:
     python, folder = interpreter("torch"), tmp_path_factory.mktemp("laws")
     given: dict[str, object] = {"step_s": STEP_S, "speeds": SPEEDS, "torques": TORQUES, "load": plugins["force"]}
-    given |= {name: plugins[name] for name in ("target", "angle", "speed")}
+    given |= {name: plugins[name] for name in ("target", "angle", "speed", "free_speed")}
+    given |= {f"{name}_in_volts": in_volts[name] for name in ("target", "angle", "speed")}
+    own = {"bias0": "bias_n_m", "dead_zone": "command_dead_zone", "second_time_constant_s": "command_time_constant_s"}
+    given |= {f"volts.{own.get(name, name)}": np.array(numbers) for name, numbers in VOLTS.items() if name != "bias2"}
+    given |= {"volts.kp": np.zeros(JOINTS), "volts.kd": -np.array(VOLTS["bias2"])}
     for prefix, values in (("drive", DRIVE), ("spring", SPRING), ("friction", FRICTION)):
         for name, numbers in values.items():
             whose, _, rest = name.partition("_")
-            key = f"hysteresis.{rest}" if whose == "hysteresis" else f"{prefix}.{NAMES.get(name, name)}"
+            key = f"{prefix}.{NAMES.get(name, name)}"
+            if whose in ("hysteresis", "stop"):
+                key = f"{whose}.{NAMES.get(name, rest if whose == 'hysteresis' else name)}"
             given[key] = np.array(numbers, float)
     given |= {f"winding.{name}": np.array(value) for name, value in WINDING.items()}
     np.savez(folder / "given.npz", **given)
@@ -181,6 +218,18 @@ def test_a_drive_gives_the_plugins_torque(plugins: dict[str, np.ndarray], laws: 
     assert np.abs(plugins["force"]).max(axis=(0, 1)).min() > 5
     for name in DRIVE.keys() - {"kp"}:  # each stage counts: without it the torque is another
         off = np.abs(laws[f"drive.{name}"] - plugins["force"]).max()
+        assert off > 1e6 * ROUNDING, (name, off)
+
+
+def test_a_drive_in_volts_gives_the_plugins_torque(
+    in_volts: dict[str, np.ndarray], laws: dict[str, np.ndarray]
+) -> None:
+    assert np.abs(laws["volts."] - in_volts["force"]).max() < ROUNDING
+    for name in VOLTS.keys() - {"gain", "bias2"}:
+        own = {"bias0": "bias_n_m", "dead_zone": "command_dead_zone"}.get(name, name)
+        if name == "second_time_constant_s":
+            own = "command_time_constant_s"
+        off = np.abs(laws[f"volts.{own}"] - in_volts["force"]).max()
         assert off > 1e6 * ROUNDING, (name, off)
 
 

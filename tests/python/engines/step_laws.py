@@ -23,6 +23,11 @@ parameters = {"step_s": step_s, "max_delay_s": 0.05, **of("drive.")}
 for left_out in ("", *(name for name in of("drive.") if name != "kp")):
     drive = laws.Drive(**{name: value for name, value in parameters.items() if name != left_out})
     out[f"drive.{left_out}"] = pytorch.stack([drive.step(*now) for now in motion]).numpy()
+parameters_in_volts = {"step_s": step_s, "max_delay_s": 0.05, **of("volts.")}
+in_volts = list(zip(*(given[f"{name}_in_volts"] for name in ("target", "angle", "speed")), strict=True))
+for left_out in ("", *of("volts.").keys() - {"gain", "kp", "kd"}):
+    drive = laws.Drive(**{name: value for name, value in parameters_in_volts.items() if name != left_out})
+    out[f"volts.{left_out}"] = pytorch.stack([drive.step(*now) for now in in_volts]).numpy()
 # From rest again, half of the environments alone.
 drive = laws.Drive(**parameters)
 for now in motion[:7]:
@@ -41,9 +46,10 @@ hysteresis, state, springs = of("hysteresis."), pytorch.zeros_like(given["angle"
 for k, angle in enumerate(given["angle"]):
     if k:
         state = laws.bend(state, angle - given["angle"][k - 1], hysteresis["rad"])
-    springs.append(laws.spring_torque(angle, **of("spring.")) - hysteresis["n_m"] * state)
+    torque = laws.spring_torque(angle, **of("spring.")) + laws.stop_torque(angle, **of("stop."))
+    springs.append(torque - hysteresis["n_m"] * state)
 out["spring"] = pytorch.stack(springs).numpy()
-out["friction"] = laws.dry_level(given["speed"], load_n_m=given["load"], **of("friction.")).numpy()
+out["friction"] = laws.dry_level(given["speed"], load_n_m=given["load"], free_speed=given["free_speed"], **of("friction.")).numpy()
 volts = given["target"]
 out["winding"] = laws.winding(volts, given["speed"], **of("winding.")).numpy()
 speeds = pytorch.linspace(-12, 12, 97, dtype=pytorch.float64)[None]

@@ -150,8 +150,8 @@ def dry_level(
 
     A ``breakaway_n_m`` above ``coulomb_n_m`` is a hump that ends at about ``stribeck_speed``, rad/s. ``load_n_m`` is
     the torque through the gears; of it ``load_coefficient`` and, per N m, ``load_quadratic`` are added. In motion of
-    either sign ``positive_n_m`` or ``negative_n_m`` is too: of ``free_speed``, with which the step would end without dry
-    friction, or of ``speed``.
+    either sign ``positive_n_m`` or ``negative_n_m`` is too. The sign is that of ``free_speed``, with which the step
+    would end without dry friction, or of ``speed``.
     """
     coulomb, width = _like(coulomb_n_m, speed), _like(stribeck_speed, speed)
     hump = torch.clamp(_like(breakaway_n_m, speed) - coulomb, min=0)
@@ -159,7 +159,8 @@ def dry_level(
     share = torch.where(speed == 0, 1.0, torch.where(width > 0, torch.exp(-(ratio**stribeck_exponent)), 0.0))
     load = _like(load_n_m, speed)
     ways = _like(positive_n_m, speed), _like(negative_n_m, speed)
-    way = 0.5 * (ways[0] + ways[1]) + 0.5 * torch.sign(speed if free_speed is None else free_speed) * (ways[0] - ways[1])
+    sign = torch.sign(speed if free_speed is None else free_speed)
+    way = 0.5 * (ways[0] + ways[1]) + 0.5 * sign * (ways[0] - ways[1])
     return coulomb + load_coefficient * load.abs() + load_quadratic * load**2 + hump * share + way
 
 
@@ -208,10 +209,11 @@ def stop_torque(angle: Tensor, stiffness: Value, stop_rad: Value, middle_rad: Va
 class Drive:
     """A servo as gapscope.motor has it: its parameters, all neutral at their defaults, and its state.
 
-    Its torque is ``gain`` command - ``kp`` angle - ``kd`` speed + ``bias_n_m``, before its stages; without ``gain`` that
-    is kp. Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command
-    are in its unit, the others in N m, rad and s. `max_delay_s` bounds both delays together. `step` is called once a time step, under an integrator that evaluates forces once (not RK4). The state is
-    made by the first `step`; `reset` takes it from environments.
+    Its torque is ``gain`` command - ``kp`` angle - ``kd`` speed + ``bias_n_m``, before its stages; without ``gain``,
+    kp. Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command
+    are in its unit, the others in N m, rad and s. `max_delay_s` bounds both delays together. `step` is called once a
+    time step, under an integrator that evaluates forces once (not RK4). The state is made by the first `step`; `reset`
+    takes it from environments.
     """
 
     step_s: float

@@ -30,6 +30,14 @@ struct ExportFlags {
   std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
 
+// Whether an effect is of a drive whose law stands beside the MJCF; the plugin stands in for it, as it was stepped
+// beside it (tests/python/test_torch.py).
+bool IsOfLaw(const EffectUse& use, const Model& model, const ExportRun& run) {
+  const EffectPlace place = EffectOf(use, *model.rig()).place;
+  const bool of_drive = place == EffectPlace::kMotor || place == EffectPlace::kServo;
+  return of_drive && (run.laws.contains(use.on) || (use.on == kOnAll && !run.laws.empty()));
+}
+
 Status Measure(const Model& model, const std::vector<double>& values, ExportRun* run, ThreadPool& pool) {
   std::error_code failed;
   for (const std::string& log : run->logs) {
@@ -48,7 +56,7 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
   for (const auto& [drive, steps] : run->delay_steps) file.delays_s[drive] = steps * run->time_step_s;
   for (const NativeEffect& effect : run->effects) {
     const bool beside = mjcf ? effect.fidelity == Fidelity::kHost : effect.fidelity != Fidelity::kDropped;
-    if (beside) file.host.push_back(effect.use);
+    if (beside || IsOfLaw(effect.use, model, *run)) file.host.push_back(effect.use);
   }
   GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
   return Ok();
@@ -97,7 +105,8 @@ Result<int> RunExport(const ExportFlags& flags) {
   features.time_step_s = flags.time_step_s;
   const MakeExport make = [&](std::span<const double> values) {
     if (target.make) return target.make(model, values);
-    return target.plugins ? model.Export(values, nullptr, {}) : model.ExportNative(values, nullptr, features);
+    return target.plugins ? model.Export(values, nullptr, {}, flags.time_step_s)
+                          : model.ExportNative(values, nullptr, features);
   };
   if (flags.draws > 0 && !target.mjcf)
     return Error{.what = target.what + " has no arrays to draw",
@@ -109,7 +118,6 @@ Result<int> RunExport(const ExportFlags& flags) {
     GS_ASSIGN(uncertain, UncertainOf(model, loaded.values, json, flags.source.path));
   }
   GS_ASSIGN(const ExportedModel exported, make(loaded.values));
-  if (target.plugins && flags.time_step_s > 0) exported.spec->option.timestep = flags.time_step_s;
   ExportRun run{.info = {.seed = flags.common.seed},
                 .result = flags.source.path,
                 .target = flags.target,
@@ -117,6 +125,7 @@ Result<int> RunExport(const ExportFlags& flags) {
                 .time_step_s = exported.spec->option.timestep,
                 .effects = exported.native,
                 .delay_steps = exported.delay_steps,
+                .laws = exported.laws,
                 .left_out = exported.left_out,
                 .logs = JudgedBy(json)};
   if (flags.draws > 0) {

@@ -24,9 +24,10 @@ struct Array {
   std::span<const mjtNum> numbers;
 };
 
-std::vector<Array> ArraysOf(const mjModel& model, std::span<const mjtNum> delay_steps) {
+std::vector<Array> ArraysOf(const mjModel& model, std::span<const mjtNum> delay_steps, std::span<const mjtNum> laws) {
   std::vector<Array> arrays = {{"opt.gravity", 1, 3, model.opt.gravity}};
   if (!delay_steps.empty()) arrays.push_back({kDelaySteps, delay_steps.size(), 1, delay_steps});
+  if (!laws.empty()) arrays.push_back({kLaws, laws.size(), 1, laws});
   const auto add = [&]<class T>(const char* name, const T* data, mjtSize rows, mjtSize columns) {
     if constexpr (std::is_same_v<T, mjtNum>) {
       if (rows > 0 && columns > 0)
@@ -87,14 +88,17 @@ double DeviationOf(const UncertainParameters& uncertain, Eigen::Index i) {
 // A compiled model and its arrays.
 struct Compiled {
   ModelPtr model;
-  std::vector<mjtNum> delay_steps;
+  std::vector<mjtNum> delay_steps, laws;
   std::vector<Array> arrays;
 };
 Result<Compiled> CompileWith(const MakeExport& make, std::span<const double> values) {
   GS_ASSIGN(ExportedModel exported, make(values));
   Compiled compiled{.model = std::move(exported.compiled)};
   for (const auto& [drive, steps] : exported.delay_steps) compiled.delay_steps.push_back(steps);
-  compiled.arrays = ArraysOf(*compiled.model, compiled.delay_steps);
+  for (const auto& [drive, law] : exported.laws) {
+    for (const auto& [argument, number] : law) compiled.laws.push_back(number);
+  }
+  compiled.arrays = ArraysOf(*compiled.model, compiled.delay_steps, compiled.laws);
   return compiled;
 }
 

@@ -26,6 +26,8 @@ struct UncertainParameters {
 
 // An array beside mjModel's: ExportedModel::delay_steps, a row per drive in its order.
 inline constexpr char kDelaySteps[] = "delay_steps";
+// Numbers of ExportedModel::laws, in the order of drives and of arguments.
+inline constexpr char kLaws[] = "laws";
 
 // One number of an array of mjModel ("dof_damping", "opt.gravity") at both ends of a parameter's range.
 struct VaryingNumber {

@@ -124,9 +124,10 @@ Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
 }
 
 Result<ExportedModel> Model::Export(std::span<const double> values, const std::map<std::string, double>* log_values,
-                                    const ScaleTable& scales) const {
+                                    const ScaleTable& scales, double time_step_s) const {
   Structure structure(*rig_);
   structure.form = Structure::Form::kPlugins;
+  if (time_step_s > 0) structure.spec->option.timestep = time_step_s;
   return ExportFrom(structure, values, log_values, scales);
 }
 
@@ -140,6 +141,17 @@ Result<ExportedModel> Model::ExportNative(std::span<const double> values,
   if (features.time_step_s > 0) option.timestep = features.time_step_s;
   if (!features.runge_kutta && option.integrator == mjINT_RK4) option.integrator = mjINT_IMPLICITFAST;
   return ExportFrom(structure, values, log_values, {});
+}
+
+// The gains of drives with a law, of a spec with its numbers in it.
+void AddGains(mjSpec* spec, std::map<std::string, DriveLaw>* laws) {
+  for (auto& [drive, law] : *laws) {
+    const mjsActuator* input = mjs_asActuator(mjs_findElement(spec, mjOBJ_ACTUATOR, drive.c_str()));
+    law["gain"] = input->gainprm[0];
+    law["bias_n_m"] = input->biasprm[0];
+    law["kp"] = 0 - input->biasprm[1];
+    law["kd"] = 0 - input->biasprm[2];
+  }
 }
 
 // Built anew: what the host does itself during a replay must stand in the exported model.
@@ -183,6 +195,8 @@ Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const do
       result.origins.push_back({"joint/" + joint + "/armature", Read({split.share}, names)});
   }
   result.native = WhatBecame(*this, structure.told);
+  AddGains(structure.spec.get(), &structure.laws);
+  result.laws = structure.laws;
   for (const auto& [drive, delay_s] : structure.delays_s)
     result.delay_steps[drive] = static_cast<int>(std::lround(delay_s / structure.spec->option.timestep));
   result.spec = std::move(structure.spec);

@@ -45,6 +45,8 @@ struct ExportedModel {
   std::vector<NativeEffect> native;   // what became of each effect
   // Steps that the engine's own configuration delays commands by, by drive: the MJCF does not.
   std::map<std::string, int> delay_steps;
+  // Drives whose torques code beside the MJCF makes, instead of the MJCF's own gains.
+  std::map<std::string, DriveLaw> laws;
 };
 
 class Model {
@@ -94,10 +96,10 @@ class Model {
   // `log_values` of one log.
   Result<std::string> ToXml(std::span<const double> values, const std::map<std::string, double>& log_values,
                             const ScaleTable& scales) const;
-  // What ToXml writes. Without `log_values`, fields that depend on them stay as the rig's MJCF has them. Errors: a
-  // parameter that is not finite; as Build.
+  // What ToXml writes. Without `log_values`, fields that depend on them stay as the rig's MJCF has them. A
+  // `time_step_s` of 0 is the MJCF's own. Errors: a parameter that is not finite; as Build.
   Result<ExportedModel> Export(std::span<const double> values, const std::map<std::string, double>* log_values,
-                               const ScaleTable& scales) const;
+                               const ScaleTable& scales, double time_step_s = 0) const;
   // The same without our plugins, of what an engine has. Errors: the rig's own MJCF has plugins; as Export.
   Result<ExportedModel> ExportNative(std::span<const double> values, const std::map<std::string, double>* log_values,
                                      const NativeFeatures& features) const;

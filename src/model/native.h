@@ -2,6 +2,7 @@
 #ifndef GAPSCOPE_MODEL_NATIVE_H_
 #define GAPSCOPE_MODEL_NATIVE_H_
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -40,8 +41,12 @@ struct NativeFeatures {
   bool lags = true;               // an actuator's activation
   bool runge_kutta = true;        // else the implicitfast integrator in its place
   bool late_in_stages = false;    // all of its stages read what is late at the step's begin; MuJoCo's at their own time
+  bool drive_laws = false;        // its loop takes torques of a law of ours: gapscope.torch's Drive
   double time_step_s = 0;         // 0: the MJCF's own
 };
+
+// The arguments of gapscope.torch's Drive, by name.
+using DriveLaw = std::map<std::string, double>;
 
 }  // namespace gapscope
 

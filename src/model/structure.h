@@ -85,6 +85,7 @@ class Structure {
   NativeFeatures features;
   std::vector<NativeEffect> told;
   std::map<std::string, double> delays_s;  // by drive, where the engine's own configuration delays
+  std::map<std::string, DriveLaw> laws;    // by drive, where code of ours makes its torque; without the gains
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
   std::map<std::string, std::string> command_delay;  // drive -> parameter
@@ -129,6 +130,10 @@ class Structure {
   void NativeDelay(const std::string& joint, const std::string& key, double delay_s,
                    const std::vector<mjsActuator*>& inputs);
   void NativeMotor(const std::string& joint, const Terms& terms);
+  // Of joints whose drives have terms that MuJoCo lacks: whether gapscope.torch can stand for each of these drives.
+  bool NeedsLaw(const Terms& terms) const;
+  bool TakesLaw(const std::string& joint) const;
+  void NativeLaw(const std::string& joint, const Terms& terms);
   // A number in the place of what the experiment or the MJCF says of a field.
   void Put(const std::string& field, double number);
   void MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs);

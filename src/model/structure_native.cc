@@ -82,7 +82,15 @@ Status Structure::FinishNative() {
     splits.clear();
   }
   for (const Split& split : splits) FinishSplit(split);
-  for (const auto& [joint, terms] : motor_) NativeMotor(joint, terms);
+  const bool by_law = features.drive_laws && std::ranges::all_of(motor_, [&](const auto& of) {
+                        return !NeedsLaw(of.second) || TakesLaw(of.first);
+                      });
+  for (const auto& [joint, terms] : motor_) {
+    if (by_law && NeedsLaw(terms))
+      NativeLaw(joint, terms);
+    else
+      NativeMotor(joint, terms);
+  }
   for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(NativeFriction(joint, terms));
   for (const auto& [joint, terms] : spring_) NativeSpring(joint, terms);
   for (const OwnTorque& torque : own_torques_)
@@ -258,6 +266,46 @@ void Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const
     inertia += 0.5 * kp * delay_s * delay_s - kv * delay_s;
   }
   Put("joint/" + joint + "/armature", std::max(0.0, inertia));
+}
+
+// Late commands are the engine's own, where nothing else is there.
+bool Structure::NeedsLaw(const Terms& terms) const {
+  return std::ranges::any_of(terms, [](const auto& term) { return term.first != "command_delay_s"; });
+}
+
+// A plain servo or motor, whose limit is the same both ways. Plain motors beside it (feed-forward) get no command
+// there.
+bool Structure::TakesLaw(const std::string& joint) const {
+  const std::vector<mjsActuator*> inputs = ActuatorsOn(joint);
+  const auto limited = [](int flag, const double* range) {
+    return flag == mjLIMITED_TRUE || (flag == mjLIMITED_AUTO && range[0] < range[1]);
+  };
+  const bool plain = std::ranges::all_of(inputs, [&](const mjsActuator* input) {
+    const bool affine = input->biastype == mjBIAS_AFFINE && input == inputs.front();
+    return !input->plugin.active && input->gaintype == mjGAIN_FIXED && input->dyntype == mjDYN_NONE &&
+           (affine || input->biastype == mjBIAS_NONE) && input->gear[0] == 1;
+  });
+  const mjsActuator& drive = *inputs.front();
+  return plain && !limited(drive.ctrllimited, drive.ctrlrange) &&
+         (!limited(drive.forcelimited, drive.forcerange) || drive.forcerange[0] == -drive.forcerange[1]);
+}
+
+void Structure::NativeLaw(const std::string& joint, const Terms& terms) {
+  const mjsActuator& input = *ActuatorsOn(joint).front();
+  const std::string drive = mjs_getString(mjs_getName(input.element));
+  DriveLaw& law = laws[drive];
+  const bool volts = IsElectric(rig_.KindOfCommand(drive)), servo = input.biastype == mjBIAS_AFFINE && input.biasprm[1];
+  for (const auto& [key, expression] : terms) {
+    std::string argument = key;
+    if (volts && key == "dead_zone") argument = "command_dead_zone";
+    if (!servo && key == "second_time_constant_s") argument = "command_time_constant_s";  // an amplifier's
+    law[argument] = value_of(expression);
+    Tell(kMotorTerms, joint, key, Fidelity::kExact, "the drive's law in PyTorch, beside the MJCF");
+  }
+  if (const double most = input.forcerange[1]; most > 0) {
+    double& limit = law["torque_limit_n_m"];
+    limit = limit > 0 ? std::min(limit, most) : most;
+  }
 }
 
 void Structure::NativeMotor(const std::string& joint, const Terms& terms) {

@@ -20,6 +20,7 @@ struct ExportRun {
   double time_step_s = 0;
   std::vector<NativeEffect> effects;
   std::map<std::string, int> delay_steps;  // of ExportedModel
+  std::map<std::string, DriveLaw> laws;    // of ExportedModel
   std::vector<std::string> files;          // beside the MJCF
   std::vector<std::string> left_out;       // fields that each log sets anew
   std::vector<std::string> logs;           // that the errors are of; empty: none could be read

@@ -66,7 +66,7 @@ TEST_P(NativeFormTest, MovesAsItsFidelitySays) {
   ExportedFile file{.path = scratch.Path("model.xml"), .host = {}, .delays_s = {}};
   for (const auto& [drive, steps] : exported.value().delay_steps)
     file.delays_s[drive] = steps * exported.value().spec->option.timestep;
-  if (fidelity == Fidelity::kHost) file.host = uses.value();
+  if (fidelity == Fidelity::kHost || !exported.value().laws.empty()) file.host = uses.value();
   const auto xml = SpecToXml(*exported.value().spec, "model.xml");
   ASSERT_TRUE(xml.ok() && WriteFile(file.path, xml.value()).ok());
   EXPECT_EQ(xml.value().find("plugin"), std::string::npos);
@@ -151,7 +151,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"qube", "gravity_offset@arm", {{"torque_n_m", 0.004}, {"rest_rad", 1}}, kExact, 0.004, kMjlab, 2e-4},
         Case{"joint", "command_delay@motor", {{"delay_s", 0.02}}, kExact, 0.006, kMjlab, 2e-4},
         Case{"joint", "command_delay@motor", {{"delay_s", 0.0213}}, kNearly, 0.006, kMjlab, 2e-4},
-        Case{"joint", "torque_delay@motor", {{"delay_s", 0.008}}, kNearly, 0.15, kMjlab, 2e-4},
+        Case{"joint", "torque_delay@motor", {{"delay_s", 0.008}}, kExact, 0.006, kMjlab, 2e-4},
+        Case{"qube", "actuator_lag@motor", {{"time_constant_s", 0.02}}, kExact, 0.0015, kMjlab, 5e-5},
         Case{"joint",
              "cable_spring@joint",
              {{"stiffness_n_m_per_rad", 60}, {"rest_rad", 0.4}},

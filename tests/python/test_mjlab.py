@@ -5,16 +5,19 @@ Torch, warp and the GPU are pretended (mjlab/pretend.py): mjlab's entities and c
 
 import json
 import math
+import os
 import subprocess
 from pathlib import Path
 
 import gapscope as gs
+import mujoco
 import numpy as np
 import pytest
-from conftest import ROOT, changed_joint
+from conftest import ROOT, changed_joint, interpreter
 from scipy.integrate import solve_ivp
 
 STEP_S = 2e-4
+TORCH = Path(gs.__file__).with_name("torch.py")
 # The servo's equation (models/joint/README.md), and what is added to it.
 KP, KD, INERTIA, DAMPING = 157.1451, 7.0729, 0.159221308, 0.5
 SPRING, REST, CUBIC, HANG, HANG_REST, BIAS, DRAG, DELAY = 60.0, 0.2, 300.0, 20.0, 0.3, 8.0, 3.0, 0.0213
@@ -49,10 +52,10 @@ def joint(tmp_path: Path) -> tuple[str, str]:
     return str(ROOT / "models" / "joint" / "experiment.yaml"), str(log)
 
 
-def run(mjlab: Path, script: str, *arguments: str | Path) -> None:
-    done = subprocess.run(
-        [mjlab, ROOT / "tests" / "python" / "mjlab" / script, *arguments], capture_output=True, text=True
-    )
+def run(mjlab: Path, script: str, *arguments: str | Path, beside: Path | None = None) -> None:
+    call = [mjlab, ROOT / "tests" / "python" / "mjlab" / script, *arguments]
+    environment = {**os.environ, **({"PYTHONPATH": str(beside)} if beside else {})}
+    done = subprocess.run(call, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
 
 
@@ -106,6 +109,55 @@ def test_what_mjlab_builds_moves_as_the_equation(joint: tuple[str, str], mjlab: 
     assert off < nothing_lost
     for other in others:
         assert np.sqrt(np.mean((other - expected) ** 2)) > 10 * nothing_lost
+
+
+# Each one a law of the drive that MuJoCo has not, and what it is without the effect.
+LAWS = {
+    "command_delay@motor.delay_s": 0.0071,
+    "torque_delay@motor.delay_s": 0.0043,
+    "torque_limit@motor.limit_n_m": 8,
+    "torque_limit@motor.softness": 0.2,
+    "actuator_lag@motor.time_constant_s": 0.004,
+    "direction_asymmetry@motor.asymmetry": 0.2,
+    "dead_zone@motor.half_width_n_m": 0.5,
+    "torque_constant_droop@motor.loss_at_peak": 0.4,
+}
+
+
+def test_laws_that_mujoco_lacks_are_pytorchs(joint: tuple[str, str], mjlab: Path, tmp_path: Path) -> None:
+    """Beside the plugins in stock MuJoCo, by the same integrator and step."""
+    packages = next(Path(interpreter("torch")).parents[1].glob("lib/python*/site-packages"))
+    effects = list(dict.fromkeys(name.partition(".")[0] for name in LAWS))
+    sent, moved = np.loadtxt(joint[1], delimiter=",", skiprows=1), gs.replay(*joint, with_=effects, set=LAWS).traces[0]
+    log = {"time_s": sent[:, 0], "target_rad": sent[:, 1], "position_rad": moved["position_rad"].predicted}
+    result = gs.replay(joint[0], gs.Log(log), with_=effects, set=LAWS)
+    lost = result.export("mjlab", tmp_path / "to", timestep=STEP_S)
+    assert {e.form for e in lost.effects} == {"exact"} and len(lost.effects) == len(effects)
+    assert (tmp_path / "to" / "gapscope_torch.py").read_text().strip() == TORCH.read_text().strip()
+    errors = lost.held_out_error  # but for the integrator
+    assert errors.model < 0.001 and errors.exported < 0.01 < 0.1 < errors.nominal
+    times = STEP_S * np.arange(8000)
+    np.save(tmp_path / "commands.npy", commands := np.array([target(t) for t in times]))
+    run(mjlab, "law.py", tmp_path / "to", tmp_path / "commands.npy", tmp_path / "moved.npy", beside=packages)
+    first, again = np.load(tmp_path / "moved.npy")
+    assert np.array_equal(first, again)
+    for left_out in (None, *effects):
+        kept = [effect for effect in effects if effect != left_out]
+        sizes = {name: value for name, value in LAWS.items() if name.partition(".")[0] != left_out}
+        model = gs.replay(*joint, with_=kept, set=sizes).export("mujoco", tmp_path / "own", timestep=STEP_S).model
+        off = np.abs(stock(Path(model), commands) - first).max()
+        assert off < 1e-6 if left_out is None else off > 1e-4, (left_out, off)
+
+
+def stock(path: Path, commands: np.ndarray) -> np.ndarray:
+    gs.load_plugins()
+    model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data, angles = mujoco.MjData(model), np.empty(len(commands))
+    for k, sent in enumerate(commands):
+        angles[k], data.ctrl[0] = data.qpos[0], sent
+        mujoco.mj_step(model, data)
+    return angles
 
 
 def test_a_draw_is_one_row_of_all_that_varies(demo: str, experiment: str, mjlab: Path, tmp_path: Path) -> None:

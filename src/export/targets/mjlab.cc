@@ -11,6 +11,7 @@
 
 #include "src/export/python_text.h"
 #include "src/export/target.h"
+#include "src/export/torch_file.h"
 #include "src/model/element_names.h"
 
 namespace gapscope {
@@ -85,9 +86,15 @@ class MjlabWriter {
   std::string Ranges() const;
   std::string Drawn(std::set<std::string>* fields) const;
   std::string DrawnLags() const;
+  std::string DrawnLaws() const;
+  std::string Laws() const;
+  double MostDelay_s(const std::string& drive) const;
   std::string Draws() const;
   const std::vector<ParameterRange>& ranges() const { return input_.randomization->ranges; }
   int DelayRow(const std::string& drive) const;
+  std::size_t LawRow(const std::string& drive) const;
+  const DriveLaw* LawOf(const std::string& drive) const;
+  const DrawnField* DrawnOf(const char* field) const;
 
   const TargetInput& input_;
   const mjModel& compiled_;
@@ -152,6 +159,92 @@ int MjlabWriter::DelayRow(const std::string& drive) const {
   return steps.contains(drive) ? static_cast<int>(std::distance(steps.begin(), steps.find(drive))) : -1;
 }
 
+const DriveLaw* MjlabWriter::LawOf(const std::string& drive) const {
+  const auto found = input_.exported.laws.find(drive);
+  return found == input_.exported.laws.end() ? nullptr : &found->second;
+}
+
+// Of its first number in kLaws.
+std::size_t MjlabWriter::LawRow(const std::string& drive) const {
+  std::size_t row = 0;
+  for (const auto& [name, law] : input_.exported.laws) {
+    if (name == drive) break;
+    row += law.size();
+  }
+  return row;
+}
+
+const DrawnField* MjlabWriter::DrawnOf(const char* field) const {
+  if (!input_.randomization) return nullptr;
+  const auto found = std::ranges::find(input_.randomization->fields, field, &DrawnField::name);
+  return found == input_.randomization->fields.end() ? nullptr : &*found;
+}
+
+// The longest that both delays of a law together may be, in any draw.
+double MjlabWriter::MostDelay_s(const std::string& drive) const {
+  const DriveLaw& law = *LawOf(drive);
+  const DrawnField* drawn = DrawnOf(kLaws);
+  double most = 0;
+  for (std::size_t draw = 0; draw <= (drawn ? drawn->shape[0] : 0); ++draw) {
+    double sum = 0;
+    std::size_t row = LawRow(drive);
+    for (const auto& [argument, number] : law) {
+      const bool late = argument == "command_delay_s" || argument == "torque_delay_s";
+      if (late) sum += draw == 0 ? number : drawn->values[(draw - 1) * drawn->shape[1] + row];
+      ++row;
+    }
+    most = std::max(most, sum);
+  }
+  return most;
+}
+
+// Drives whose torque is made beside the MJCF; empty: there are none.
+std::string MjlabWriter::Laws() const {
+  if (input_.exported.laws.empty()) return "";
+  std::string laws;
+  for (const auto& [drive, law] : input_.exported.laws) {
+    laws += fmt::format("  {}: {{\n", PyText(drive));
+    for (const auto& [argument, number] : law) laws += fmt::format("    \"{}\": {},\n", argument, PyNumber(number));
+    laws += fmt::format("    \"max_delay_s\": {},\n  }},\n", PyNumber(MostDelay_s(drive)));
+  }
+  return "# Arguments of gapscope_torch.Drive, instead of the MJCF's own gains.\nLAWS = {\n" + laws + R"(}
+
+
+@dataclass(kw_only=True)
+class LawCfg(XmlActuatorCfg):
+  law: dict
+
+  def build(self, entity, target_ids, target_names):
+    return LawActuator(self, entity, target_ids, target_names)
+
+
+class LawActuator(XmlActuator):
+  def edit_spec(self, spec, target_names):
+    super().edit_spec(spec, target_names)
+    for actuator in self._mjs_actuators:
+      actuator.set_to_motor()
+
+  def initialize(self, mj_model, model, data, device):
+    super().initialize(mj_model, model, data, device)
+    self.drive = Drive(mj_model.opt.timestep, **self.cfg.law)
+
+  def compute(self, cmd):
+    return self.drive.step(super().compute(cmd), cmd.pos, cmd.vel)
+
+  def reset(self, env_ids=None):
+    super().reset(env_ids)
+    self.drive.reset(slice(None) if env_ids is None else env_ids)
+
+  def set_law(self, argument, values, env_ids, num_envs):
+    of_all = torch.as_tensor(getattr(self.drive, argument), dtype=torch.float32, device=values.device)
+    of_all = of_all.expand(num_envs, 1).clone()
+    of_all[env_ids, 0] = values
+    setattr(self.drive, argument, of_all)
+
+
+)";
+}
+
 // How late commands are, by what `robot` is asked for.
 std::string MjlabWriter::Lags(const Drive& drive) const {
   const int row = DelayRow(drive.name);
@@ -174,8 +267,9 @@ std::string MjlabWriter::Lags(const Drive& drive) const {
 std::string MjlabWriter::Actuators() const {
   std::string lags, drives;
   for (const Drive& drive : drives_) {
-    drives += fmt::format("    XmlActuatorCfg(\n      target_names_expr=({},),\n      command_field=\"{}\",\n",
-                          PyPattern(drive.joint), drive.field);
+    drives += fmt::format("    {}(\n      target_names_expr=({},),\n      command_field=\"{}\",\n",
+                          LawOf(drive.name) ? "LawCfg" : "XmlActuatorCfg", PyPattern(drive.joint), drive.field);
+    if (LawOf(drive.name)) drives += fmt::format("      law=LAWS[{}],\n", PyText(drive.name));
     if (DelayRow(drive.name) >= 0) {
       drives += fmt::format("      **LAGS[{}][randomize],\n", PyText(drive.name));
       lags += fmt::format("  {}: {},\n", PyText(drive.name), Lags(drive));
@@ -257,12 +351,13 @@ std::string MjlabWriter::Drawn(std::set<std::string>* fields) const {
   for (const ParameterRange& range : ranges()) {
     for (const VaryingNumber& number : range.numbers) {
       const RowKind* kind = KindOf(number.field);
-      if (number.field == kDelaySteps) continue;
+      if (number.field == kDelaySteps || number.field == kLaws) continue;
       const std::string name = kind ? NameOfRow(compiled_, *kind, number.row) : "";
       if (name.empty()) {
         stay.insert(number.field);
         continue;
       }
+      if (LawOf(name) && (number.field == "actuator_gainprm" || number.field == "actuator_biasprm")) continue;
       const bool matrix = std::ranges::any_of(input_.randomization->fields, [&](const DrawnField& field) {
         return field.name == number.field && field.shape.size() == 3;
       });
@@ -293,10 +388,33 @@ std::string MjlabWriter::DrawnLags() const {
   return lags;
 }
 
-// The joint draws and the lags.
+// Of what varies.
+std::string MjlabWriter::DrawnLaws() const {
+  std::set<std::size_t> vary;
+  for (const ParameterRange& range : ranges()) {
+    for (const VaryingNumber& number : range.numbers) {
+      if (number.field == kLaws) vary.insert(number.row);
+    }
+  }
+  std::string text;
+  for (std::size_t d = 0; d < drives_.size(); ++d) {
+    const DriveLaw* law = LawOf(drives_[d].name);
+    std::size_t row = LawRow(drives_[d].name);
+    for (const auto& [argument, number] : law ? *law : DriveLaw()) {
+      if (vary.contains(row))
+        text += fmt::format(
+            "  values = torch.as_tensor(drawn[\"{}\"][row, {}], dtype=torch.float32, device=env.device)\n"
+            "  asset.actuators[{}].set_law(\"{}\", values, env_ids, env.num_envs)\n",
+            kLaws, row, d, argument);
+      ++row;
+    }
+  }
+  return text;
+}
+
+// The joint draws, the lags and the laws.
 std::string MjlabWriter::Draws() const {
-  const bool late = std::ranges::any_of(input_.randomization->fields,
-                                        [](const DrawnField& field) { return field.name == kDelaySteps; });
+  const bool late = DrawnOf(kDelaySteps) != nullptr;
   std::set<std::string> fields;
   const std::string drawn = Drawn(&fields);
   return drawn + fmt::format(R"(
@@ -333,27 +451,29 @@ def draws(entity="robot"):
   return {{"gapscope": EventTermCfg(mode="{}", func=draw, params={{"entity": entity}})}}
 )",
                              fields.empty() ? "" : fmt::format("{}, ", fmt::join(fields, ", ")),
-                             late ? DrawnLags() : "", late ? "reset" : "startup");
+                             (late ? DrawnLags() : "") + DrawnLaws(), late ? "reset" : "startup");
 }
 
 std::string MjlabWriter::Text() const {
-  const bool random = input_.randomization != nullptr;
+  const bool random = input_.randomization != nullptr, laws = !input_.exported.laws.empty();
   std::string text = fmt::format(
       "\"\"\"A mechanism for mjlab 1.6, written by gapscope.\n\n"
       "from gapscope_mjlab import SIMULATION, robot{}\n"
       "SceneCfg(entities={{\"robot\": robot({})}}) and SIMULATION go into the environment's "
-      "configuration{}.\n\"\"\"\n\n"
-      "from pathlib import Path\n\nimport mujoco\n{}"
-      "from mjlab.actuator import XmlActuatorCfg\n"
+      "configuration{}.\n\"\"\"\n\n{}"
+      "from pathlib import Path\n\nimport mujoco\n{}{}"
+      "from mjlab.actuator import {}XmlActuatorCfg\n"
       "from mjlab.entity import EntityArticulationInfoCfg, EntityCfg\n{}"
       "from mjlab.sim import MujocoCfg, SimulationCfg\n\nHERE = Path(__file__).parent\n\n",
       random ? ", draws" : "", random ? "\"draws\"" : "", random ? ", as events draws()" : "",
-      random ? "import numpy as np\nimport torch\n" : "",
+      laws ? "from dataclasses import dataclass\n" : "", random ? "import numpy as np\n" : "",
+      std::string(random || laws ? "import torch\n" : "") + (laws ? "from gapscope_torch import Drive\n" : ""),
+      laws ? "XmlActuator, " : "",
       random ? "from mjlab.envs.mdp import dr\n"
                "from mjlab.managers.event_manager import EventTermCfg, RecomputeLevel, requires_model_fields\n"
                "from mjlab.managers.scene_entity_config import SceneEntityCfg\n"
              : "");
-  text += Simulation() + "\n" + Actuators() + "\n\n" + Robot();
+  text += Simulation() + "\n" + Laws() + Actuators() + "\n\n" + Robot();
   if (random) text += "\n\n" + Ranges() + "\n\n" + Draws();
   return text;
 }
@@ -361,18 +481,22 @@ std::string MjlabWriter::Text() const {
 Result<std::vector<TargetFile>> WriteMjlab(const TargetInput& input) {
   const MjlabWriter writer(input);
   GS_RETURN_IF_ERROR(writer.Check());
-  return std::vector<TargetFile>{{"gapscope_mjlab.py", writer.Text()}};
+  std::vector<TargetFile> files = {{"gapscope_mjlab.py", writer.Text()}};
+  if (!input.exported.laws.empty()) files.push_back({"gapscope_torch.py", assets::kTorch});
+  return files;
 }
 
 }  // namespace
 
 ExportTarget Target_mjlab() {
-  return {
-      .name = "mjlab",
-      .what = "mjlab 1.6",
-      .has = {.passive_motors = PassiveMotors::kIdleInput, .delays = CommandDelays::kWholeSteps, .runge_kutta = false},
-      .mujoco_3_11 = true,
-      .files = WriteMjlab};
+  return {.name = "mjlab",
+          .what = "mjlab 1.6",
+          .has = {.passive_motors = PassiveMotors::kIdleInput,
+                  .delays = CommandDelays::kWholeSteps,
+                  .runge_kutta = false,
+                  .drive_laws = true},
+          .mujoco_3_11 = true,
+          .files = WriteMjlab};
 }
 
 }  // namespace gapscope

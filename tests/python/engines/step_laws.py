@@ -49,7 +49,8 @@ for k, angle in enumerate(given["angle"]):
     torque = laws.spring_torque(angle, **of("spring.")) + laws.stop_torque(angle, **of("stop."))
     springs.append(torque - hysteresis["n_m"] * state)
 out["spring"] = pytorch.stack(springs).numpy()
-out["friction"] = laws.dry_level(given["speed"], load_n_m=given["load"], free_speed=given["free_speed"], **of("friction.")).numpy()
+moved = {"load_n_m": given["load"], "free_speed": given["free_speed"]}
+out["friction"] = laws.dry_level(given["speed"], **moved, **of("friction.")).numpy()
 volts = given["target"]
 out["winding"] = laws.winding(volts, given["speed"], **of("winding.")).numpy()
 speeds = pytorch.linspace(-12, 12, 97, dtype=pytorch.float64)[None]

@@ -1,7 +1,7 @@
-# cmake -DOUTPUT=FILE.cc "-DASSETS=NAME=FILE[+FILE]|NAME=FILE..." -P embed.cmake: files as C++ strings. Bytes are taken
-# as they are.
+# cmake -DOUTPUT=FILE.cc -DHEADER=FILE.h "-DASSETS=NAME=FILE[+FILE]|NAME=FILE..." -P embed.cmake: files as C++ strings,
+# declared in the header. Bytes are taken as they are.
 string(REPLACE "|" ";" assets "${ASSETS}")
-set(code "#include \"src/report/html_assets.h\"\n\nnamespace gapscope::assets {\n")
+set(code "#include \"${HEADER}\"\n\nnamespace gapscope::assets {\n")
 foreach(asset ${assets})
   string(REGEX MATCH "^([^=]+)=(.+)$" _ "${asset}")
   set(name ${CMAKE_MATCH_1})

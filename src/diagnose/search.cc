@@ -72,8 +72,7 @@ class Searcher {
     SplitTrainCost(bench_, result_.base);
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
-    const std::vector<std::size_t> counts{kPolicy.singles, kPolicy.pairs, kPolicy.triples};
-    RefitSets(*result_.base, result_.columns, counts);
+    RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
     for (const Hint& hint : hints) {
       if (hint.effects.empty()) continue;
       say_("refitting " + NameOfSet(hint.effects));
@@ -81,7 +80,6 @@ class Searcher {
     }
     // However little may be done, the first sets are looked at.
     until_ = kPolicy.until_grown;
-    RefitFromNominal(counts);
     Grow(Leaders());
     Lead();
     Settle();
@@ -102,15 +100,6 @@ class Searcher {
     const auto other = [&](const ProbeTorque& torque) { return torque.joint != torques.front().joint; };
     if (std::none_of(torques.begin(), torques.end(), other)) return;
     *bench_.coupling = Coupling::Measure(*at.problem, at.point, torques, bench_.work.get());
-  }
-
-  // A base model that was refitted without an effect may have gone to where it imitates that, and no way leads on from
-  // there. So sets are begun from the model as it is given, too.
-  void RefitFromNominal(const std::vector<std::size_t>& counts) {
-    if (Late(until_, "sets of effects")) return;
-    SplitTrainCost(bench_, result_.nominal.get());
-    const ColumnTable table = MakeColumns(bench_, *result_.nominal, result_.uses, {});
-    if (table.valid) RefitSets(*result_.nominal, table, counts);
   }
 
   // Members are taken out and others tried in their places, until neither changes the set. What is known of members

@@ -92,9 +92,13 @@ struct Reader {
   }
   Status operator()(std::vector<std::string>* value) const {
     for (const auto& word : given) GS_RETURN_IF_ERROR(OneOf(option.flag, option.words, word));
-    std::vector<std::string> meant = option.stands_for ? std::vector<std::string>() : given;
-    for (std::size_t i = 0; option.stands_for && i < given.size(); ++i) {
-      GS_ASSIGN(const auto words, option.stands_for(given[i]));
+    if (!option.stands_for) {
+      *value = given;
+      return Ok();
+    }
+    std::vector<std::string> meant;
+    for (const auto& word : given) {
+      GS_ASSIGN(const auto words, option.stands_for(word));
       meant.insert(meant.end(), words.begin(), words.end());
     }
     *value = std::move(meant);

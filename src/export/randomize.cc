@@ -211,6 +211,11 @@ Result<Randomization> Randomize(const Model& model, std::span<const double> valu
   return result;
 }
 
+const DrawnField* FieldOf(const Randomization& randomization, const std::string& name) {
+  const auto found = std::ranges::find(randomization.fields, name, &DrawnField::name);
+  return found == randomization.fields.end() ? nullptr : &*found;
+}
+
 bool MayBeDrawnAlone(const ParameterRange& range, const std::vector<ParameterRange>& all) {
   if (range.conditional || range.numbers.size() != 1) return false;
   const VaryingNumber& mine = range.numbers.front();

@@ -54,6 +54,9 @@ struct Randomization {
   std::vector<double> drawn;  // draws x parameters, in the order of `ranges`
 };
 
+// Null: nothing of it varies.
+const DrawnField* FieldOf(const Randomization& randomization, const std::string& name);
+
 // Whether a parameter may be drawn without the others: it goes together with none, and makes one number that no other
 // makes.
 bool MayBeDrawnAlone(const ParameterRange& range, const std::vector<ParameterRange>& all);

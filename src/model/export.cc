@@ -105,6 +105,17 @@ std::vector<NativeEffect> WhatBecame(const Model& model, const std::vector<Nativ
   });
 }
 
+// The gains of drives with a law, of a spec with its numbers in it.
+void AddGains(mjSpec* spec, std::map<std::string, DriveLaw>* laws) {
+  for (auto& [drive, law] : *laws) {
+    const mjsActuator* input = mjs_asActuator(mjs_findElement(spec, mjOBJ_ACTUATOR, drive.c_str()));
+    law["gain"] = input->gainprm[0];
+    law["bias_n_m"] = input->biasprm[0];
+    law["kp"] = 0 - input->biasprm[1];
+    law["kd"] = 0 - input->biasprm[2];
+  }
+}
+
 }  // namespace
 
 Result<std::string> SpecToXml(const mjSpec& spec, const std::string& where) {
@@ -141,17 +152,6 @@ Result<ExportedModel> Model::ExportNative(std::span<const double> values,
   if (features.time_step_s > 0) option.timestep = features.time_step_s;
   if (!features.runge_kutta && option.integrator == mjINT_RK4) option.integrator = mjINT_IMPLICITFAST;
   return ExportFrom(structure, values, log_values, {});
-}
-
-// The gains of drives with a law, of a spec with its numbers in it.
-void AddGains(mjSpec* spec, std::map<std::string, DriveLaw>* laws) {
-  for (auto& [drive, law] : *laws) {
-    const mjsActuator* input = mjs_asActuator(mjs_findElement(spec, mjOBJ_ACTUATOR, drive.c_str()));
-    law["gain"] = input->gainprm[0];
-    law["bias_n_m"] = input->biasprm[0];
-    law["kp"] = 0 - input->biasprm[1];
-    law["kd"] = 0 - input->biasprm[2];
-  }
 }
 
 // Built anew: what the host does itself during a replay must stand in the exported model.

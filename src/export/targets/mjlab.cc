@@ -9,6 +9,8 @@
 #include <map>
 #include <set>
 
+#include "src/core/collect.h"
+#include "src/export/mjlab_laws.h"
 #include "src/export/python_text.h"
 #include "src/export/target.h"
 #include "src/export/torch_file.h"
@@ -86,15 +88,10 @@ class MjlabWriter {
   std::string Ranges() const;
   std::string Drawn(std::set<std::string>* fields) const;
   std::string DrawnLags() const;
-  std::string DrawnLaws() const;
-  std::string Laws() const;
-  double MostDelay_s(const std::string& drive) const;
   std::string Draws() const;
   const std::vector<ParameterRange>& ranges() const { return input_.randomization->ranges; }
   int DelayRow(const std::string& drive) const;
-  std::size_t LawRow(const std::string& drive) const;
-  const DriveLaw* LawOf(const std::string& drive) const;
-  const DrawnField* DrawnOf(const char* field) const;
+  bool HasLaw(const std::string& drive) const { return input_.exported.laws.contains(drive); }
 
   const TargetInput& input_;
   const mjModel& compiled_;
@@ -159,92 +156,6 @@ int MjlabWriter::DelayRow(const std::string& drive) const {
   return steps.contains(drive) ? static_cast<int>(std::distance(steps.begin(), steps.find(drive))) : -1;
 }
 
-const DriveLaw* MjlabWriter::LawOf(const std::string& drive) const {
-  const auto found = input_.exported.laws.find(drive);
-  return found == input_.exported.laws.end() ? nullptr : &found->second;
-}
-
-// Of its first number in kLaws.
-std::size_t MjlabWriter::LawRow(const std::string& drive) const {
-  std::size_t row = 0;
-  for (const auto& [name, law] : input_.exported.laws) {
-    if (name == drive) break;
-    row += law.size();
-  }
-  return row;
-}
-
-const DrawnField* MjlabWriter::DrawnOf(const char* field) const {
-  if (!input_.randomization) return nullptr;
-  const auto found = std::ranges::find(input_.randomization->fields, field, &DrawnField::name);
-  return found == input_.randomization->fields.end() ? nullptr : &*found;
-}
-
-// The longest that both delays of a law together may be, in any draw.
-double MjlabWriter::MostDelay_s(const std::string& drive) const {
-  const DriveLaw& law = *LawOf(drive);
-  const DrawnField* drawn = DrawnOf(kLaws);
-  double most = 0;
-  for (std::size_t draw = 0; draw <= (drawn ? drawn->shape[0] : 0); ++draw) {
-    double sum = 0;
-    std::size_t row = LawRow(drive);
-    for (const auto& [argument, number] : law) {
-      const bool late = argument == "command_delay_s" || argument == "torque_delay_s";
-      if (late) sum += draw == 0 ? number : drawn->values[(draw - 1) * drawn->shape[1] + row];
-      ++row;
-    }
-    most = std::max(most, sum);
-  }
-  return most;
-}
-
-// Drives whose torque is made beside the MJCF; empty: there are none.
-std::string MjlabWriter::Laws() const {
-  if (input_.exported.laws.empty()) return "";
-  std::string laws;
-  for (const auto& [drive, law] : input_.exported.laws) {
-    laws += fmt::format("  {}: {{\n", PyText(drive));
-    for (const auto& [argument, number] : law) laws += fmt::format("    \"{}\": {},\n", argument, PyNumber(number));
-    laws += fmt::format("    \"max_delay_s\": {},\n  }},\n", PyNumber(MostDelay_s(drive)));
-  }
-  return "# Arguments of gapscope_torch.Drive, instead of the MJCF's own gains.\nLAWS = {\n" + laws + R"(}
-
-
-@dataclass(kw_only=True)
-class LawCfg(XmlActuatorCfg):
-  law: dict
-
-  def build(self, entity, target_ids, target_names):
-    return LawActuator(self, entity, target_ids, target_names)
-
-
-class LawActuator(XmlActuator):
-  def edit_spec(self, spec, target_names):
-    super().edit_spec(spec, target_names)
-    for actuator in self._mjs_actuators:
-      actuator.set_to_motor()
-
-  def initialize(self, mj_model, model, data, device):
-    super().initialize(mj_model, model, data, device)
-    self.drive = Drive(mj_model.opt.timestep, **self.cfg.law)
-
-  def compute(self, cmd):
-    return self.drive.step(super().compute(cmd), cmd.pos, cmd.vel)
-
-  def reset(self, env_ids=None):
-    super().reset(env_ids)
-    self.drive.reset(slice(None) if env_ids is None else env_ids)
-
-  def set_law(self, argument, values, env_ids, num_envs):
-    of_all = torch.as_tensor(getattr(self.drive, argument), dtype=torch.float32, device=values.device)
-    of_all = of_all.expand(num_envs, 1).clone()
-    of_all[env_ids, 0] = values
-    setattr(self.drive, argument, of_all)
-
-
-)";
-}
-
 // How late commands are, by what `robot` is asked for.
 std::string MjlabWriter::Lags(const Drive& drive) const {
   const int row = DelayRow(drive.name);
@@ -253,12 +164,9 @@ std::string MjlabWriter::Lags(const Drive& drive) const {
   if (!input_.randomization) return "{" + cases + "}";
   const auto [low, high] = RangeOfDelay(*input_.randomization, static_cast<std::size_t>(row), nominal);
   double least = nominal, most = nominal;
-  for (const DrawnField& field : input_.randomization->fields) {
-    if (field.name != kDelaySteps) continue;
-    const std::size_t drives = input_.exported.delay_steps.size();
-    for (auto i = static_cast<std::size_t>(row); i < field.values.size(); i += drives) {
-      least = std::min(least, field.values[i]), most = std::max(most, field.values[i]);
-    }
+  if (const DrawnField* drawn = FieldOf(*input_.randomization, kDelaySteps)) {
+    for (auto i = static_cast<std::size_t>(row); i < drawn->values.size(); i += input_.exported.delay_steps.size())
+      least = std::min(least, drawn->values[i]), most = std::max(most, drawn->values[i]);
   }
   return fmt::format("{{{}, \"ranges\": _lag({:.0f}, {:.0f}, 0.0), \"draws\": _lag({:.0f}, {:.0f}, 1.0)}}", cases, low,
                      high, least, most);
@@ -268,8 +176,8 @@ std::string MjlabWriter::Actuators() const {
   std::string lags, drives;
   for (const Drive& drive : drives_) {
     drives += fmt::format("    {}(\n      target_names_expr=({},),\n      command_field=\"{}\",\n",
-                          LawOf(drive.name) ? "LawCfg" : "XmlActuatorCfg", PyPattern(drive.joint), drive.field);
-    if (LawOf(drive.name)) drives += fmt::format("      law=LAWS[{}],\n", PyText(drive.name));
+                          HasLaw(drive.name) ? "LawCfg" : "XmlActuatorCfg", PyPattern(drive.joint), drive.field);
+    if (HasLaw(drive.name)) drives += fmt::format("      law=LAWS[{}],\n", PyText(drive.name));
     if (DelayRow(drive.name) >= 0) {
       drives += fmt::format("      **LAGS[{}][randomize],\n", PyText(drive.name));
       lags += fmt::format("  {}: {},\n", PyText(drive.name), Lags(drive));
@@ -357,7 +265,7 @@ std::string MjlabWriter::Drawn(std::set<std::string>* fields) const {
         stay.insert(number.field);
         continue;
       }
-      if (LawOf(name) && (number.field == "actuator_gainprm" || number.field == "actuator_biasprm")) continue;
+      if (HasLaw(name) && (number.field == "actuator_gainprm" || number.field == "actuator_biasprm")) continue;
       const bool matrix = std::ranges::any_of(input_.randomization->fields, [&](const DrawnField& field) {
         return field.name == number.field && field.shape.size() == 3;
       });
@@ -388,35 +296,12 @@ std::string MjlabWriter::DrawnLags() const {
   return lags;
 }
 
-// Of what varies.
-std::string MjlabWriter::DrawnLaws() const {
-  std::set<std::size_t> vary;
-  for (const ParameterRange& range : ranges()) {
-    for (const VaryingNumber& number : range.numbers) {
-      if (number.field == kLaws) vary.insert(number.row);
-    }
-  }
-  std::string text;
-  for (std::size_t d = 0; d < drives_.size(); ++d) {
-    const DriveLaw* law = LawOf(drives_[d].name);
-    std::size_t row = LawRow(drives_[d].name);
-    for (const auto& [argument, number] : law ? *law : DriveLaw()) {
-      if (vary.contains(row))
-        text += fmt::format(
-            "  values = torch.as_tensor(drawn[\"{}\"][row, {}], dtype=torch.float32, device=env.device)\n"
-            "  asset.actuators[{}].set_law(\"{}\", values, env_ids, env.num_envs)\n",
-            kLaws, row, d, argument);
-      ++row;
-    }
-  }
-  return text;
-}
-
 // The joint draws, the lags and the laws.
 std::string MjlabWriter::Draws() const {
-  const bool late = DrawnOf(kDelaySteps) != nullptr;
+  const bool late = FieldOf(*input_.randomization, kDelaySteps) != nullptr;
   std::set<std::string> fields;
   const std::string drawn = Drawn(&fields);
+  const std::vector<std::string> names = Collect(drives_, &Drive::name);
   return drawn + fmt::format(R"(
 
 def _index(asset, kind, name):
@@ -451,7 +336,7 @@ def draws(entity="robot"):
   return {{"gapscope": EventTermCfg(mode="{}", func=draw, params={{"entity": entity}})}}
 )",
                              fields.empty() ? "" : fmt::format("{}, ", fmt::join(fields, ", ")),
-                             (late ? DrawnLags() : "") + DrawnLaws(), late ? "reset" : "startup");
+                             (late ? DrawnLags() : "") + DrawnMjlabLaws(input_, names), late ? "reset" : "startup");
 }
 
 std::string MjlabWriter::Text() const {
@@ -473,7 +358,7 @@ std::string MjlabWriter::Text() const {
                "from mjlab.managers.event_manager import EventTermCfg, RecomputeLevel, requires_model_fields\n"
                "from mjlab.managers.scene_entity_config import SceneEntityCfg\n"
              : "");
-  text += Simulation() + "\n" + Laws() + Actuators() + "\n\n" + Robot();
+  text += Simulation() + "\n" + MjlabLaws(input_) + Actuators() + "\n\n" + Robot();
   if (random) text += "\n\n" + Ranges() + "\n\n" + Draws();
   return text;
 }

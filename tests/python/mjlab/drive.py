@@ -7,19 +7,14 @@ first drive, one a step.
 import sys
 from pathlib import Path
 
-import pretend
+from entity import build
 
-pretend.install()
 folder, commands_path, out = sys.argv[1:4]
-sys.path.insert(0, folder)
+_, entity, model = build(folder)
 
-import gapscope_mjlab as exported  # noqa: E402
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 
-entity = exported.robot().build()
-model = entity.spec.compile()
-exported.SIMULATION.mujoco.apply(model)
 drive = entity.actuators[0]
 commands, lag = np.load(commands_path), drive.cfg.delay_min_lag
 assert lag == drive.cfg.delay_max_lag

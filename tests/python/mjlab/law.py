@@ -8,21 +8,17 @@ import sys
 from types import SimpleNamespace
 
 import pretend
+from entity import build
 
 pretend.ABSENT.discard("torch")
-pretend.install()
 folder, commands_path, out = sys.argv[1:4]
-sys.path.insert(0, folder)
+_, entity, model = build(folder)
 
-import gapscope_mjlab as exported  # noqa: E402
 import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 import torch  # noqa: E402
 from mjlab.actuator.actuator import ActuatorCmd  # noqa: E402
 
-entity = exported.robot().build()
-model = entity.spec.compile()
-exported.SIMULATION.mujoco.apply(model)
 law = entity.actuators[0]
 law.entity = SimpleNamespace(indexing=SimpleNamespace(ctrl_ids=torch.arange(model.nu)))
 law.initialize(model, None, SimpleNamespace(nworld=1), "cpu")

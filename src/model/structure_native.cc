@@ -294,7 +294,8 @@ void Structure::NativeLaw(const std::string& joint, const Terms& terms) {
   const mjsActuator& input = *ActuatorsOn(joint).front();
   const std::string drive = mjs_getString(mjs_getName(input.element));
   DriveLaw& law = laws[drive];
-  const bool volts = IsElectric(rig_.KindOfCommand(drive)), servo = input.biastype == mjBIAS_AFFINE && input.biasprm[1];
+  const bool volts = IsElectric(rig_.KindOfCommand(drive)),
+             servo = input.biastype == mjBIAS_AFFINE && input.biasprm[1] != 0;
   for (const auto& [key, expression] : terms) {
     std::string argument = key;
     if (volts && key == "dead_zone") argument = "command_dead_zone";

@@ -98,6 +98,19 @@ struct SwingFit {
   double rmse = INFINITY;
 };
 
+// Dry friction that would go below zero stands still: the others' step must not count on it.
+void HoldDryAtZero(const SwingFit& fit, Eigen::MatrixXd* normal, Eigen::VectorXd* right) {
+  const auto at = std::ranges::find(fit.free, static_cast<int>(kDry));
+  if (at == fit.free.end() || fit.parameters[kDry] > 0) return;
+  const Eigen::Index c = at - fit.free.begin();
+  if ((*right)[c] >= 0) return;
+  const double scale = (*normal)(c, c);
+  normal->row(c).setZero();
+  normal->col(c).setZero();
+  (*normal)(c, c) = scale;
+  (*right)[c] = 0;
+}
+
 SwingFit Fit(const Swing& swing, Parameters start, std::vector<int> free) {
   const Eigen::Index rows = static_cast<Eigen::Index>(swing.time_s.size()),
                      columns = static_cast<Eigen::Index>(free.size());
@@ -118,8 +131,9 @@ SwingFit Fit(const Swing& swing, Parameters start, std::vector<int> free) {
       Integrate(swing, other, &moved);
       fit.jacobian.col(c) = (moved - predicted) / step[index];
     }
-    const Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
-    const Eigen::VectorXd right = fit.jacobian.transpose() * fit.residual;
+    Eigen::MatrixXd normal = fit.jacobian.transpose() * fit.jacobian;
+    Eigen::VectorXd right = fit.jacobian.transpose() * fit.residual;
+    HoldDryAtZero(fit, &normal, &right);
     bool better = false;
     double gain = 0;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {

@@ -5,12 +5,16 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "src/cli/commands.h"
+#include "src/cli/html.h"
 #include "src/cli/print.h"
 #include "src/cli/result_model.h"
 #include "src/cli/session.h"
+#include "src/compare/noise.h"
 #include "src/core/change_point.h"
+#include "src/core/collect.h"
 #include "src/log/foreign.h"
 #include "src/report/json.h"
 #include "src/report/read_diagnosis.h"
@@ -33,6 +37,7 @@ struct MonitorFlags {
 // What one log says of the result's model.
 struct LogFindings {
   double error = kNaN;                // of the result's model as it is
+  double misfit = kNaN, left = kNaN;  // over the sensors' noise: of that, and with the parameters fitted to this log
   std::vector<SeriesValue> sizes;     // refitted; a value of NaN: this log does not know it
   std::vector<std::string> problems;  // why it could not be refitted
 };
@@ -46,10 +51,21 @@ struct MonitorRun {
   std::vector<std::string> before, now;  // logs
   double error_before = kNaN, error_now = kNaN;
   std::vector<Moved> parameters;  // the least likely to be chance first
+  // Over the sensors' noise: of the result's model as it is, and with its parameters fitted to each log alone.
+  std::optional<ChangePoint> misfit, left;
   std::vector<std::string> problems;
+  std::string diagnosis;  // the command that names what the result lacks
 
   double Ratio() const { return error_now / error_before; }
-  bool Changed() const { return !parameters.empty() && parameters.front().step.chance <= kFalseChange; }
+  bool AParameterChanged() const { return !parameters.empty() && parameters.front().step.chance <= kFalseChange; }
+  bool MisfitGrew() const { return Grew(misfit); }
+  bool MoreIsLeft() const { return Grew(left); }
+  bool Changed() const { return AParameterChanged() || MisfitGrew() || MoreIsLeft(); }
+
+ private:
+  static bool Grew(const std::optional<ChangePoint>& step) {
+    return step && step->after > step->before && step->chance <= kFalseChange;
+  }
 };
 
 // The logs that a result was made of, and of these the ones it was judged by.
@@ -83,18 +99,38 @@ Result<ResultLogs> LogsOf(const ordered_json& json, const std::string& where) {
   return logs;
 }
 
+// Root mean square of residual over noise, all scored signals alike.
+double OverNoise(const LogReplay& log) {
+  double sum = 0;
+  int signals = 0;
+  for (const SignalTrace& signal : log.signals) {
+    if (!signal.scored) continue;
+    double squares = 0, rows = 0;
+    for (std::size_t k = 0; k < signal.measured.size(); ++k) {
+      const double off = signal.measured[k] - signal.predicted[k];
+      if (std::isfinite(off)) squares += off * off, ++rows;
+    }
+    const double noise = SensorNoise(log.time_s, signal.measured, signal.resolution);
+    if (rows > 0 && noise > 0) sum += squares / rows / (noise * noise), ++signals;
+  }
+  return signals > 0 ? std::sqrt(sum / signals) : kNaN;
+}
+
 LogFindings Look(const ResultModel& result, Recording recording, const CommonFlags& common, ThreadPool& pool) {
   const ReplayDefaults& replay = result.model->rig()->experiment().replay;
   const TuneOptions options = DefaultTuneOptions(replay, 1, common.seed);
   LogFindings found{.sizes = std::vector<SeriesValue>(result.model->parameters().size(), {.value = kNaN})};
   std::vector<Recording> one;
   one.push_back(std::move(recording));
-  found.error = ReplayError(Evaluate(*result.model, one, {result.values, std::nullopt}, replay.mode, options, pool));
+  const auto as_it_is = Evaluate(*result.model, one, {result.values, std::nullopt}, replay.mode, options, pool);
+  found.error = ReplayError(as_it_is);
+  found.misfit = OverNoise(as_it_is.front());
   const auto tuned = Tune(*result.model, SplitData(std::move(one), {}), result.values, options, pool);
   if (!tuned.ok()) {
     found.problems.push_back(tuned.error().Text());
     return found;
   }
+  found.left = OverNoise(tuned.value().train.front());
   for (const TunedParameter& p : tuned.value().tuned) {
     if (p.identifiable)
       found.sizes[static_cast<std::size_t>(p.index)] = {p.value, (p.high - p.low) / (2 * kNormalQuantile)};
@@ -102,26 +138,54 @@ LogFindings Look(const ResultModel& result, Recording recording, const CommonFla
   return found;
 }
 
-// The parameters that both sides know, each step's chance over all of them.
+// The series of a number over all logs, those before first; none where one side does not know it.
+std::optional<ChangePoint> StepOf(const std::vector<SeriesValue>& before, const std::vector<SeriesValue>& now) {
+  std::vector<SeriesValue> series;
+  const auto add = [&](const SeriesValue& value) {
+    if (std::isfinite(value.value)) series.push_back(value);
+  };
+  for (const auto& value : before) add(value);
+  const std::size_t first = series.size();
+  for (const auto& value : now) add(value);
+  if (first == 0 || first == series.size()) return std::nullopt;
+  // Of two values nothing but their own errors says how much they may differ.
+  if (series.size() == 2 && !(series[0].error > 0 && series[1].error > 0)) return std::nullopt;
+  return StepAt(series, first);
+}
+
+// A misfit changes by a factor: its logarithm is what varies alike at any size.
+std::optional<ChangePoint> StepOfMisfit(double LogFindings::* misfit, const std::vector<LogFindings>& before,
+                                        const std::vector<LogFindings>& now) {
+  const auto logs = [&](const std::vector<LogFindings>& side) {
+    return Collect(side, [&](const LogFindings& log) { return SeriesValue{.value = std::log(log.*misfit)}; });
+  };
+  std::optional<ChangePoint> step = StepOf(logs(before), logs(now));
+  if (step) step->before = std::exp(step->before), step->after = std::exp(step->after);
+  return step;
+}
+
+// The parameters that both sides know.
 std::vector<Moved> Compared(const Model& model, const std::vector<LogFindings>& before,
                             const std::vector<LogFindings>& now) {
   std::vector<Moved> all;
   for (std::size_t p = 0; p < model.parameters().size(); ++p) {
-    std::vector<SeriesValue> series;
-    const auto add = [&](const LogFindings& log) {
-      if (std::isfinite(log.sizes[p].value)) series.push_back(log.sizes[p]);
+    const auto sizes = [&](const std::vector<LogFindings>& side) {
+      return Collect(side, [&](const LogFindings& log) { return log.sizes[p]; });
     };
-    for (const auto& log : before) add(log);
-    const std::size_t first = series.size();
-    for (const auto& log : now) add(log);
-    if (first == 0 || first == series.size()) continue;
-    if (series.size() == 2 && !(series[0].error > 0 && series[1].error > 0)) continue;
-    all.push_back({model.parameters()[p].name, model.parameters()[p].unit, StepAt(series, first)});
+    if (const auto step = StepOf(sizes(before), sizes(now)))
+      all.push_back({model.parameters()[p].name, model.parameters()[p].unit, *step});
   }
-  for (Moved& one : all) one.step.chance = std::min(1.0, one.step.chance * static_cast<double>(all.size()));
   std::stable_sort(all.begin(), all.end(),
                    [](const Moved& a, const Moved& b) { return a.step.chance < b.step.chance; });
   return all;
+}
+
+// With the result's effects at its values, on the new logs.
+std::string DiagnosisOfWhatIsLeft(const Experiment& experiment, const Model& model, const MonitorFlags& flags) {
+  std::string command = "gapscope diagnose " + ShellQuoted(experiment.path);
+  for (const auto& log : flags.logs) command += " " + ShellQuoted(log);
+  for (const auto& use : model.effects()) command += " --with " + use.Text();
+  return command + " --params " + ShellQuoted(flags.source.path);
 }
 
 Result<MonitorRun> Monitor(const MonitorFlags& flags) {
@@ -154,17 +218,34 @@ Result<MonitorRun> Monitor(const MonitorFlags& flags) {
   run.error_before = Median(errors_before);
   run.error_now = Median(errors_now);
   run.parameters = Compared(*result.model, before, now);
+  run.misfit = StepOfMisfit(&LogFindings::misfit, before, now);
+  run.left = StepOfMisfit(&LogFindings::left, before, now);
+  // Any of these numbers may step by chance.
+  const auto numbers = static_cast<double>(run.parameters.size() + (run.misfit ? 1 : 0) + (run.left ? 1 : 0));
+  const auto over_all = [&](ChangePoint& step) { step.chance = std::min(1.0, numbers * step.chance); };
+  for (Moved& one : run.parameters) over_all(one.step);
+  if (run.misfit) over_all(*run.misfit);
+  if (run.left) over_all(*run.left);
+  run.diagnosis = DiagnosisOfWhatIsLeft(experiment, *result.model, flags);
   return run;
+}
+
+ordered_json StepJson(const std::optional<ChangePoint>& step) {
+  if (!step) return nullptr;
+  return {{"before", JsonNumber(step->before)}, {"now", JsonNumber(step->after)}, {"chance", JsonNumber(step->chance)}};
 }
 
 ordered_json ToJson(const MonitorRun& run) {
   ordered_json json = {{"schema", "gapscope.monitor/1"},
                        {"changed", run.Changed()},
                        {"error", {{"before", JsonNumber(run.error_before)}, {"now", JsonNumber(run.error_now)}}},
+                       {"misfit", StepJson(run.misfit)},
+                       {"left", StepJson(run.left)},
                        {"parameters", ordered_json::array()},
                        {"logs", {{"before", run.before}, {"now", run.now}}},
                        {"problems", run.problems},
                        {"versions", JsonVersions()}};
+  if (run.MoreIsLeft()) json["left"]["diagnosis"] = run.diagnosis;
   for (const auto& [name, unit, step] : run.parameters)
     json["parameters"].push_back({{"name", name},
                                   {"unit", unit},
@@ -178,12 +259,24 @@ std::string ToTable(const MonitorRun& run) {
   std::string table =
       fmt::format("error: {:.4g} now, {:.4g} before: {:.3g} times\n", run.error_now, run.error_before, run.Ratio());
   for (const auto& problem : run.problems) table += "not refitted: " + problem + "\n";
-  if (!run.Changed()) return table + "the same as before: no parameter moved by more than its intervals allow\n";
+  if (!run.Changed())
+    return table + fmt::format("the same as before, as far as {} logs of the result and {} new ones can tell\n",
+                               run.before.size(), run.now.size());
+  if (run.MisfitGrew())
+    table += fmt::format(
+        "changed: the result's model misses by {:.3g} times the sensors' noise, {:.3g} before (chance "
+        "{:.1g})\n",
+        run.misfit->after, run.misfit->before, run.misfit->chance);
   for (const auto& [name, unit, step] : run.parameters) {
     if (step.chance <= kFalseChange)
       table += fmt::format("changed: {} from {:.4g} to {:.4g} {} (chance {:.1g})\n", name, step.before, step.after,
                            unit, step.chance);
   }
+  if (run.MoreIsLeft())
+    table += fmt::format(
+        "changed: what no parameter of it follows, {:.3g} times the noise, {:.3g} before (chance "
+        "{:.1g}): the logs may hold an effect that it lacks\n  {}\n",
+        run.left->after, run.left->before, run.left->chance, run.diagnosis);
   return table;
 }
 
@@ -221,13 +314,13 @@ Command MonitorCommand() {
        .help = "Exit status 1 where the error is more than this many times the result's on its held-out logs"},
       {.flag = "--fail-on-change",
        .value = &flags->fail_on_change,
-       .help = "Exit status 1 where a parameter has changed",
+       .help = "Exit status 1 where a parameter has changed, or the misfit has grown",
        .more =
-           fmt::format("Changed: the step between the result's logs and the new ones would be chance, in any of the "
-                       "parameters, in at most {} of 1",
+           fmt::format("Changed: the step between the result's logs and the new ones would be chance, in any of these "
+                       "numbers, in at most {} of 1",
                        kFalseChange)}};
   return {.name = "monitor",
-          .what = "A new log against a finished result: the same as before, or which parameter changed",
+          .what = "A new log against a finished result: the same as before, or what changed",
           .options = Join({own, CommonOptions(flags->common)}),
           .example = "gapscope monitor diagnosis today.csv --fail-above 1.5",
           .run = [flags] { return RunMonitor(*flags); }};

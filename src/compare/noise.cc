@@ -252,6 +252,11 @@ NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double>
   return floor;
 }
 
+double SensorNoise(std::span<const double> time_s, std::span<const double> values, double resolution) {
+  const double total = EstimateNoise(time_s, values, {.resolution = resolution}).total_std;
+  return std::max(std::isfinite(total) ? total : resolution, 1e-3 * MomentsOf(values).deviation);
+}
+
 double CorrelationTime(std::span<const double> residual, double dt_s) {
   GS_CHECK(dt_s > 0);
   const auto finite = std::count_if(residual.begin(), residual.end(), [](double v) { return std::isfinite(v); });

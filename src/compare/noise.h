@@ -43,6 +43,10 @@ struct NoiseFloor {
 NoiseFloor EstimateNoise(std::span<const double> time_s, std::span<const double> values,
                          const NoiseOptions& options = {});
 
+// What one sample of a measured signal is known by, in its unit: the noise's total, or the resolution where the signal
+// is too short to tell; not below a thousandth of its standard deviation.
+double SensorNoise(std::span<const double> time_s, std::span<const double> values, double resolution);
+
 // Integrated correlation time, s: dt (1 + 2 sum of the autocorrelations), the sum ended by Geyer's initial positive
 // monotone sequence (Practical Markov chain Monte Carlo, Statistical Science 7, 1992). The mean of a residual of length
 // T is known as well as from T / CorrelationTime independent samples; an AR(1) of coefficient rho has

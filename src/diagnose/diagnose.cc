@@ -27,13 +27,8 @@ std::vector<double> SignalNoise(const Experiment& experiment, const DataSplit& d
   std::vector<std::vector<double>> found(experiment.measured.size());
   for (const auto* part : {&data.train, &data.held_out}) {
     for (const auto& recording : *part) {
-      for (const auto& measured : recording.measured) {
-        const NoiseFloor floor =
-            EstimateNoise(recording.time_s, measured.values, {.resolution = measured.spec.resolution});
-        const double least = 1e-3 * MomentsOf(measured.values).deviation;
-        const double total = std::isfinite(floor.total_std) ? floor.total_std : measured.spec.resolution;
-        found[measured.index].push_back(std::max(total, least));
-      }
+      for (const auto& measured : recording.measured)
+        found[measured.index].push_back(SensorNoise(recording.time_s, measured.values, measured.spec.resolution));
     }
   }
   std::vector<double> noise(found.size(), 1.0);

@@ -72,7 +72,8 @@ class Searcher {
     SplitTrainCost(bench_, result_.base);
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
-    RefitSets(*result_.base, result_.columns, {kPolicy.singles, kPolicy.pairs, kPolicy.triples});
+    const std::vector<std::size_t> counts{kPolicy.singles, kPolicy.pairs, kPolicy.triples};
+    RefitSets(*result_.base, result_.columns, counts);
     for (const Hint& hint : hints) {
       if (hint.effects.empty()) continue;
       say_("refitting " + NameOfSet(hint.effects));
@@ -85,13 +86,35 @@ class Searcher {
     Settle();
     // What leads after an exchange has other gaps than what growth ended on.
     until_ = kPolicy.until_exchanged;
+    GrowToTheEnd();
+    if (RefitFromNominal(counts)) {
+      Lead();
+      Settle();
+      GrowToTheEnd();
+    }
+  }
+
+ private:
+  void GrowToTheEnd() {
     while (GrowFurther()) {
       Lead();
       Settle();
     }
   }
 
- private:
+  // A base model that was refitted without an effect may have gone to where it imitates that, and no small step leads
+  // on from there. So with the work that is left sets are begun from the model as it is given, too. Whether another set
+  // leads then.
+  bool RefitFromNominal(const std::vector<std::size_t>& counts) {
+    if (AtNoise(*result_.chosen) || Late(until_, "sets from the given model")) return false;
+    const Candidate* leader = Leaders().front();
+    SplitTrainCost(bench_, result_.nominal.get());
+    const ColumnTable table = MakeColumns(bench_, *result_.nominal, result_.uses, {});
+    if (!table.valid) return false;
+    RefitSets(*result_.nominal, table, counts);
+    return Leaders().front() != leader;
+  }
+
   // Few joints, or one drive's, all touch.
   void FindCoupling(Candidate& at) {
     constexpr std::size_t kFew = 2;

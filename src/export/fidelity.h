@@ -14,8 +14,8 @@
 
 namespace gapscope {
 
-// Normalised errors (ReplayError) in windows, nuisances fitted; how late the stamps are is the model's for all. NaN: not
-// measured.
+// Normalised errors (ReplayError) in windows, nuisances fitted; how late the stamps are is the model's for all. NaN:
+// not measured.
 struct FidelityErrors {
   double nominal = kNaN, model = kNaN, exported = kNaN;
   // Share of what the model closes of the gap that the exported MJCF lets open again.

@@ -374,7 +374,8 @@ def test_what_the_host_sends_goes_beside_an_actuator_with_a_state(
     experiment: str, demo: str, tmp_path: Path
 ) -> None:
     values = {"dead_zone@motor.half_width_v": 0.3, "actuator_lag@motor.time_constant_s": 0.01}
-    result = gs.replay(experiment, short_log(demo, "short"), with_=["dead_zone@motor", "actuator_lag@motor"], set=values)
+    log = short_log(demo, "short")
+    result = gs.replay(experiment, log, with_=["dead_zone@motor", "actuator_lag@motor"], set=values)
     lost = result.export("mujoco_native", tmp_path / "native")
     assert [(e.name, e.form) for e in lost.effects] == [("dead_zone", "host"), ("actuator_lag", "approximated")]
     assert lost.unmeasured == "" and lost.held_out_error.exported == pytest.approx(lost.held_out_error.model, rel=0.1)

@@ -177,6 +177,8 @@ VOLTS = {
     "dead_zone@motor.half_width_v": 0.5,
     "actuator_lag@motor.time_constant_s": 0.01,
     "torque_bias@arm.torque_n_m": 0.001,
+    "end_stop@arm.stiffness_n_m_per_rad": 0.02,
+    "end_stop@arm.angle_rad": 0.1,
 }
 STEP_S = 5e-4
 

@@ -19,17 +19,18 @@ import pretend  # noqa: E402
 
 folder, given_path, out = sys.argv[1:4]
 sys.path.insert(0, folder)
-pretend.ABSENT = {"warp", "toml", "trimesh", "yaml", "omni", "pxr", "carb", "isaacsim"}
+pretend.ABSENT = {"warp", "toml", "trimesh", "yaml", "omni", "pxr", "carb", "isaacsim", "prettytable"}
 pretend.install()
 
 
 def stand_in(name: str, **members: Any) -> None:
-    """For what needs Isaac Sim, in 2.3 at least."""
+    """For what needs Isaac Sim, or much else."""
     sys.modules[name] = ModuleType(name)
     vars(sys.modules[name]).update(members)
 
 
-stand_in("isaaclab.sim", SimulationCfg=SimpleNamespace)
+if "Isaac Lab 2.3" in Path(folder, "gapscope_isaaclab.py").read_text():
+    stand_in("isaaclab.sim", SimulationCfg=SimpleNamespace)
 stand_in("isaaclab.envs", mdp=SimpleNamespace(randomize_joint_parameters=None))
 stand_in("isaaclab.managers", EventTermCfg=SimpleNamespace, SceneEntityCfg=lambda name: SimpleNamespace(name=name))
 import gapscope_isaaclab as exported  # noqa: E402

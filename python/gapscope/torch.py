@@ -211,9 +211,10 @@ class Drive:
 
     Its torque is ``gain`` command - ``kp`` angle - ``kd`` speed + ``bias_n_m``, before its stages; without ``gain``,
     kp. Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command
-    are in its unit, the others in N m, rad and s. `max_delay_s` bounds both delays together. `step` is called once a
-    time step, under an integrator that evaluates forces once (not RK4). The state is made by the first `step`; `reset`
-    takes it from environments.
+    are in its unit, the others in N m, rad and s. `max_delay_s` bounds both delays together. `spring` and `stop` are
+    arguments of `spring_torque` and `stop_torque`, whose torques come on top. `step` is called once a time step, under
+    an integrator that evaluates forces once (not RK4). The state is made by the first `step`; `reset` takes it from
+    environments.
     """
 
     step_s: float
@@ -246,10 +247,13 @@ class Drive:
     asymmetry: Value = 0.0
     efficiency_drive: Value = 1.0
     efficiency_backdrive: Value = 1.0
+    spring: dict[str, Value] | None = None
+    stop: dict[str, Value] | None = None
 
     def __post_init__(self) -> None:
+        self.spring, self.stop = dict(self.spring or {}), dict(self.stop or {})
         self._fresh: Tensor = None  # of shape (envs,): the next step is the first one
-        self._past: list[Tensor] = []  # commands, angles and speeds
+        self._past: list[Tensor] = []  # commands, angles, speeds and feed-forward torques
         self._lags: dict[str, Tensor] = {}  # states, by the names of their time constants
         self._sag: Tensor = None
 
@@ -257,6 +261,18 @@ class Drive:
         """The next `step` is the first one of these environments (indices, a mask or a slice): all is at rest."""
         if self._fresh is not None:
             self._fresh[envs] = True
+
+    def vary(self, name: str, values: Tensor, envs: Any, count: int) -> None:
+        """Gives environments (indices, a mask or a slice) a number of their own, of ``count`` environments in all.
+
+        ``values`` are of shape (environments,), in the unit of the parameter ``name``, the same for all joints. Before,
+        it was one number for all, or varied so. "spring.stiffness" is that of `spring`.
+        """
+        group, _, key = name.rpartition(".")
+        owner = getattr(self, group) if group else vars(self)
+        of_all = torch.as_tensor(owner[key], dtype=values.dtype, device=values.device).expand(count, 1).clone()
+        of_all[envs, 0] = values
+        owner[key] = of_all
 
     def limit(self, torque: Tensor, speed: Tensor) -> Tensor:
         """The limit on a torque's size in its direction, before sag: N m, shape (envs, joints). ``speed``: rad/s."""
@@ -272,9 +288,12 @@ class Drive:
         )
         return torch.minimum(torch.minimum(bounds[0], bounds[1]), bounds[2])
 
-    def step(self, target: Tensor, angle: Tensor, speed: Tensor) -> Tensor:
-        """The joint's torque in this step, N m, of shape (envs, joints): target and angle in rad, speed in rad/s."""
-        self._begin(target, angle, speed)
+    def step(self, target: Tensor, angle: Tensor, speed: Tensor, feed_forward: Tensor | None = None) -> Tensor:
+        """The joint's torque in this step, N m, of shape (envs, joints): target and angle in rad, speed in rad/s.
+
+        ``feed_forward``, N m, is added to what the servo wants, as late as the target.
+        """
+        self._begin(target, angle, speed, torch.zeros_like(angle) if feed_forward is None else feed_forward)
         request = self._request(angle, speed)
         fresh = self._fresh[:, None]
         self._sag = torch.where(fresh, self._resting_sag(request, speed), self._sag)
@@ -285,9 +304,11 @@ class Drive:
         torque = soft_limit(torque, limit * (1 - self.sag_fraction * self._sag), self.limit_softness)
         self._sag = lag_next(self._sag, _load(torque, limit), self.sag_time_constant_s, self.step_s)
         torque = droop(torque, self.droop_at_peak, self.droop_reference_n_m, self.droop_exponent)
-        return efficiency(
+        torque = efficiency(
             by_direction(torque, self.asymmetry), speed, self.efficiency_drive, self.efficiency_backdrive
         )
+        torque = torque + spring_torque(angle, **self.spring) if self.spring else torque
+        return torque + stop_torque(angle, **self.stop) if self.stop else torque
 
     def _begin(self, *now: Tensor) -> None:
         if self._fresh is None:
@@ -297,7 +318,7 @@ class Drive:
             self._fresh = torch.ones(len(now[0]), dtype=torch.bool, device=now[0].device)
         # Before the first step the command was what it is there, and the joint moved as fast.
         ago = self.step_s * torch.arange(len(self._past[0]), dtype=now[0].dtype, device=now[0].device)[:, None, None]
-        for i, before in enumerate((now[0], now[1] - ago * now[2], now[2])):
+        for i, before in enumerate((now[0], now[1] - ago * now[2], now[2], now[3])):
             shifted = torch.cat([now[i][None], self._past[i][:-1]])
             self._past[i] = torch.where(self._fresh[None, :, None], before.expand_as(shifted), shifted)
 
@@ -308,7 +329,8 @@ class Drive:
         command = by_direction(dead_zone(command, self.command_dead_zone), self.command_asymmetry)
         angle, speed = late_motion(self._past[1], self._past[2], self.torque_delay_s, self.step_s)
         gain = self.kp if self.gain is None else self.gain
-        return gain * command - self.kp * angle - self.kd * speed + self.bias_n_m
+        torque = gain * command - self.kp * angle - self.kd * speed + self.bias_n_m
+        return torque + late_command(self._past[3], delay, self.step_s)
 
     def _lagged(self, name: str, request: Tensor) -> Tensor:
         """The lag's output in this step; its state goes on."""

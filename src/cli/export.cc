@@ -30,14 +30,6 @@ struct ExportFlags {
   std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
 
-// Whether an effect is of a drive whose law stands beside the MJCF; the plugin stands in for it, as it was stepped
-// beside it (tests/python/test_torch.py).
-bool IsOfLaw(const EffectUse& use, const Model& model, const ExportRun& run) {
-  const EffectPlace place = EffectOf(use, *model.rig()).place;
-  const bool of_drive = place == EffectPlace::kMotor || place == EffectPlace::kServo;
-  return of_drive && (run.laws.contains(use.on) || (use.on == kOnAll && !run.laws.empty()));
-}
-
 Status Measure(const Model& model, const std::vector<double>& values, ExportRun* run, ThreadPool& pool) {
   std::error_code failed;
   for (const std::string& log : run->logs) {
@@ -52,11 +44,14 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
   }
   GS_ASSIGN(const auto recordings, LoadRecordings(model.experiment(), run->logs, pool));
   const bool mjcf = TargetOf(run->target).mjcf;
-  ExportedFile file{.path = mjcf ? run->out : "", .host = {}, .delays_s = {}};
+  ExportedFile file{.path = mjcf ? run->out : "", .host = {}, .delays_s = {}, .sent = run->sent};
   for (const auto& [drive, steps] : run->delay_steps) file.delays_s[drive] = steps * run->time_step_s;
   for (const NativeEffect& effect : run->effects) {
     const bool beside = mjcf ? effect.fidelity == Fidelity::kHost : effect.fidelity != Fidelity::kDropped;
-    if (beside || IsOfLaw(effect.use, model, *run)) file.host.push_back(effect.use);
+    // The plugin stands in for a law beside the MJCF, as it was stepped beside it (tests/python/test_torch.py).
+    if ((beside && !effect.by_sender) || effect.by_law) file.host.push_back(effect.use);
+    // All drives' commands are late by it, also of those that the engine itself would delay.
+    if (effect.by_law && effect.use == EffectUse{"command_delay", kOnAll}) file.delays_s.clear();
   }
   GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
   return Ok();
@@ -125,7 +120,7 @@ Result<int> RunExport(const ExportFlags& flags) {
                 .time_step_s = exported.spec->option.timestep,
                 .effects = exported.native,
                 .delay_steps = exported.delay_steps,
-                .laws = exported.laws,
+                .sent = exported.sent,
                 .left_out = exported.left_out,
                 .logs = JudgedBy(json)};
   if (flags.draws > 0) {

@@ -8,11 +8,10 @@
 namespace gapscope {
 namespace {
 
-double ErrorOf(const Model& model, const std::vector<double>& values, const std::vector<Recording>& logs,
-               ThreadPool& pool) {
-  const double window_s = model.experiment().replay.window_s;
-  const TuneOptions fit{.window_s = window_s};
-  return ReplayError(Evaluate(model, logs, {values, std::nullopt}, ReplayMode::kWindows, fit, pool));
+double ErrorOf(const Model& model, const FixedParameters& fixed, const std::vector<Recording>& logs, ThreadPool& pool,
+               StampShift* stamps = nullptr) {
+  const TuneOptions fit{.window_s = model.experiment().replay.window_s};
+  return ReplayError(Evaluate(model, logs, fixed, ReplayMode::kWindows, fit, pool, stamps));
 }
 
 // The experiment on a file that holds its own values: what each log sets anew is set, and nothing else.
@@ -29,6 +28,17 @@ Experiment Bare(const Experiment& experiment, const std::string& mjcf) {
     });
   });
   return bare;
+}
+
+// The same logs with what is sent for their commands.
+std::vector<Recording> Sent(std::vector<Recording> logs, const std::map<std::string, SentCommand>& sent) {
+  for (Recording& log : logs) {
+    for (Recording::Command& command : log.commands) {
+      if (const auto of = sent.find(command.actuator); of != sent.end())
+        std::ranges::transform(command.values, command.values.begin(), [&](double u) { return of->second.Of(u); });
+    }
+  }
+  return logs;
 }
 
 }  // namespace
@@ -60,9 +70,12 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
     else if (const int same = model.IndexOf(name); same >= 0)
       of_exported[i] = values[static_cast<std::size_t>(same)];
   }
-  errors.nominal = ErrorOf(*nominal, nominal->Nominal(), logs, pool);
-  errors.model = ErrorOf(model, {values.begin(), values.end()}, logs, pool);
-  errors.exported = ErrorOf(*exported, of_exported, logs, pool);
+  StampShift stamps;
+  errors.model = ErrorOf(model, {{values.begin(), values.end()}, std::nullopt}, logs, pool, &stamps);
+  // How late a log's stamps are is the log's: found anew it would make up for delays that are rounded or not there, and
+  // for half of an integrator's step.
+  errors.nominal = ErrorOf(*nominal, {nominal->Nominal(), stamps}, logs, pool);
+  errors.exported = ErrorOf(*exported, {of_exported, stamps}, file.sent.empty() ? logs : Sent(logs, file.sent), pool);
   return errors;
 }
 

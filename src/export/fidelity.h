@@ -14,18 +14,21 @@
 
 namespace gapscope {
 
-// Normalised errors (ReplayError) in windows, nuisances fitted; NaN: not measured.
+// Normalised errors (ReplayError) in windows, nuisances fitted; how late the stamps are is the model's for all. NaN:
+// not measured.
 struct FidelityErrors {
   double nominal = kNaN, model = kNaN, exported = kNaN;
   // Share of what the model closes of the gap that the exported MJCF lets open again.
   double Lost() const;
 };
 
-// An exported file, and what is done beside it: effects by the host, late commands by the engine's configuration.
+// An exported file, and what is done beside it: effects by the host, late commands by the engine's configuration, and
+// commands that whoever sends them changes.
 struct ExportedFile {
   std::string path;  // empty: the rig's own model, with the effects of `host`
   std::vector<EffectUse> host;
-  std::map<std::string, double> delays_s;  // by drive
+  std::map<std::string, double> delays_s;        // by drive
+  std::map<std::string, SentCommand> sent = {};  // by drive, what is sent for the log's commands
 };
 
 // The file is read back as any program would, and driven by the experiment's commands. Errors: it does not load; a

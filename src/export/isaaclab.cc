@@ -9,6 +9,8 @@
 #include <optional>
 
 #include "src/core/statistics.h"
+#include "src/export/drive_laws.h"
+#include "src/export/isaaclab_laws.h"
 #include "src/export/python_text.h"
 #include "src/model/element_names.h"
 
@@ -17,7 +19,7 @@ namespace {
 
 // A joint and what drives it; of a passive joint the drive is its own spring.
 struct JointDrive {
-  std::string name, joint, note;
+  std::string name, joint, note, law_command;  // law_command: of a drive with a law, which target is its command
   double stiffness = 0, damping = 0, limit = kInfinity;
   std::optional<DelayRange> delay_steps;  // none: commands are not late
 };
@@ -26,6 +28,13 @@ struct JointDrive {
 struct ScaleRange {
   double low = 0, high = 0;
 };
+
+// The member of ArticulationActions that a drive with a law takes for its command.
+std::string TargetOfCommand(const JointDrive& drive) {
+  return drive.law_command == "position"   ? "joint_positions"
+         : drive.law_command == "velocity" ? "joint_velocities"
+                                           : "joint_efforts";
+}
 
 class IsaacLabWriter {
  public:
@@ -77,12 +86,15 @@ Status IsaacLabWriter::SetGains(int actuator, JointDrive* drive) const {
                   "a stateless fixed gain, an affine bias without a constant, gear 1");
   drive->stiffness = affine ? 0 - bias[1] : 0;
   drive->damping = affine ? 0 - bias[2] : 0;
-  if (drive->stiffness == 0)
+  const bool by_law = input_.exported.laws.contains(drive->name);
+  if (by_law)
+    drive->law_command = CommandField(compiled_, actuator);
+  else if (drive->stiffness == 0)
     drive->note = fmt::format("effort target: {:.6g} N m for each unit of the command", gain[0]);
   else if (gain[0] != drive->stiffness)
     drive->note = fmt::format("position target: {:.6g} times the command", gain[0] / drive->stiffness);
   const int joint = compiled_.actuator_trnid[2 * actuator];
-  if (compiled_.actuator_forcelimited[actuator])
+  if (compiled_.actuator_forcelimited[actuator] && !by_law)
     GS_RETURN_IF_ERROR(LimitBy(compiled_.actuator_forcerange + 2 * actuator, drive));
   if (compiled_.jnt_actfrclimited[joint]) GS_RETURN_IF_ERROR(LimitBy(compiled_.jnt_actfrcrange + 2 * joint, drive));
   const auto& late = input_.exported.delay_steps;
@@ -133,14 +145,19 @@ Status IsaacLabWriter::FindDrives() {
 }
 
 std::string IsaacLabWriter::Configuration(int joint, const JointDrive& drive) const {
-  const bool late = drive.delay_steps.has_value();
+  const bool late = drive.delay_steps.has_value(), by_law = !drive.law_command.empty();
   const int dof = compiled_.jnt_dofadr[joint];
   const std::string friction = PyNumber(compiled_.dof_frictionloss[dof]);
   std::string text = fmt::format(
       "  {}: {}(\n    joint_names_expr=[{}],\n    stiffness={},\n    "
       "damping={},\n",
-      PyText(drive.name), late ? "DelayedPDActuatorCfg" : "ImplicitActuatorCfg", PyPattern(drive.joint),
-      PyNumber(drive.stiffness), PyNumber(drive.damping));
+      PyText(drive.name),
+      by_law ? "LawCfg"
+      : late ? "DelayedPDActuatorCfg"
+             : "ImplicitActuatorCfg",
+      PyPattern(drive.joint), PyNumber(drive.stiffness), PyNumber(drive.damping));
+  if (by_law)
+    text += fmt::format("    law=LAWS[{}],\n    command=\"{}\",\n", PyText(drive.name), TargetOfCommand(drive));
   if (!drive.note.empty()) text = fmt::format("  # {}\n{}", drive.note, text);
   if (std::isfinite(drive.limit))
     text += fmt::format("    {}={},\n", late ? names_.explicit_limit : names_.implicit_limit, PyNumber(drive.limit));
@@ -202,21 +219,25 @@ std::string IsaacLabWriter::Text() const {
       std::ranges::any_of(drives_, [](const auto& drive) { return drive.second.delay_steps.has_value(); });
   std::string events;
   for (const auto& [joint, drive] : drives_) events += Event(joint, drive.name);
+  events += IsaacLabLawEvents(input_);
+  const bool laws = !input_.exported.laws.empty();
   std::string text = fmt::format(
       "\"\"\"Actuators for Isaac Lab {}, written by gapscope: friction in N m, "
       "so Isaac Sim 5 or later.\n\n"
       "from gapscope_isaaclab import ACTUATORS, {}SIMULATION\n"
       "ArticulationCfg(spawn=..., actuators=ACTUATORS), of a USD made of "
-      "{}.\n{}\"\"\"\n\n"
-      "from isaaclab.actuators import {}ImplicitActuatorCfg\n",
+      "{}.\n{}\"\"\"\n\n{}"
+      "from isaaclab.actuators import {}{}ImplicitActuatorCfg\n",
       names_.version, events.empty() ? "" : "EVENTS, ", input_.mjcf,
       events.empty() ? "" : "The environment's events = EVENTS, where the articulation is the scene's \"robot\".\n",
-      late ? "DelayedPDActuatorCfg, " : "");
+      IsaacLabLawImports(input_), late ? "DelayedPDActuatorCfg, " : "",
+      laws ? "IdealPDActuator, IdealPDActuatorCfg, " : "");
   if (!events.empty())
     text += "from isaaclab.envs import mdp\nfrom isaaclab.managers import EventTermCfg, SceneEntityCfg\n";
-  text += fmt::format("from isaaclab.sim import SimulationCfg\n\nSIMULATION = SimulationCfg(dt={}, gravity={})\n\n",
-                      PyNumber(option.timestep), PyNumbers(option.gravity));
-  text += "ACTUATORS = {\n";
+  text += fmt::format("from isaaclab.sim import SimulationCfg\n{}\nSIMULATION = SimulationCfg(dt={}, gravity={}{})\n\n",
+                      laws ? "from isaaclab.utils import configclass\n" : "", PyNumber(option.timestep),
+                      PyNumbers(option.gravity), laws ? names_.python_actuators : "");
+  text += IsaacLabLaws(input_) + "ACTUATORS = {\n";
   for (const auto& [joint, drive] : drives_) text += Configuration(joint, drive);
   text += "}\n";
   if (!events.empty()) text += "\n# Each environment's own, times what ACTUATORS says.\nEVENTS = {\n" + events + "}\n";
@@ -232,13 +253,16 @@ NativeFeatures IsaacLabFeatures() {
           .springs_on_drives = false,
           .tendons = false,
           .lags = false,
-          .runge_kutta = false};
+          .runge_kutta = false,
+          .drive_laws = true};
 }
 
 Result<std::vector<TargetFile>> WriteIsaacLab(const TargetInput& input, const IsaacLabNames& names) {
   IsaacLabWriter writer(input, names);
   GS_RETURN_IF_ERROR(writer.FindDrives());
-  return std::vector<TargetFile>{{"gapscope_isaaclab.py", writer.Text()}};
+  std::vector<TargetFile> files = LawFiles(input);
+  files.insert(files.begin(), {"gapscope_isaaclab.py", writer.Text()});
+  return files;
 }
 
 }  // namespace gapscope

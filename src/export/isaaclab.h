@@ -10,9 +10,9 @@
 namespace gapscope {
 
 // Names of ActuatorBaseCfg's members: what limits the torque of a drive that Isaac Lab computes, and of one that the
-// physics engine computes.
+// physics engine computes. python_actuators: arguments without which SimulationCfg takes no actuator in Python.
 struct IsaacLabNames {
-  std::string version, explicit_limit, implicit_limit;
+  std::string version, explicit_limit, implicit_limit, python_actuators;
 };
 
 // What its joints have, and its actuators.

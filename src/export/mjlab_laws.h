@@ -1,4 +1,4 @@
-// Laws of drives that MuJoCo lacks, in what is written for mjlab: gapscope.torch's Drive makes their torques.
+// Drives with laws (drive_laws.h) in what is written for mjlab.
 #ifndef GAPSCOPE_EXPORT_MJLAB_LAWS_H_
 #define GAPSCOPE_EXPORT_MJLAB_LAWS_H_
 
@@ -9,7 +9,7 @@
 
 namespace gapscope {
 
-// The arguments of each drive, and mjlab's actuator that has them; empty: no drive has a law.
+// LAWS, and mjlab's actuator that has them; empty: no drive has a law.
 std::string MjlabLaws(const TargetInput& input);
 // Of an event: lines that give environments the arguments that vary. `drives`: the entity's actuators, in their order.
 std::string DrawnMjlabLaws(const TargetInput& input, const std::vector<std::string>& drives);

@@ -197,6 +197,7 @@ Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const do
   result.native = WhatBecame(*this, structure.told);
   AddGains(structure.spec.get(), &structure.laws);
   result.laws = structure.laws;
+  result.sent = structure.sent;
   for (const auto& [drive, delay_s] : structure.delays_s)
     result.delay_steps[drive] = static_cast<int>(std::lround(delay_s / structure.spec->option.timestep));
   result.spec = std::move(structure.spec);

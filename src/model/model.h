@@ -45,6 +45,8 @@ struct ExportedModel {
   std::vector<NativeEffect> native;   // what became of each effect
   // Steps that the engine's own configuration delays commands by, by drive: the MJCF does not.
   std::map<std::string, int> delay_steps;
+  // What is to be sent for commands, by drive.
+  std::map<std::string, SentCommand> sent;
   // Drives whose torques code beside the MJCF makes, instead of the MJCF's own gains.
   std::map<std::string, DriveLaw> laws;
 };

@@ -22,11 +22,13 @@ std::string FidelityName(Fidelity fidelity);
 struct NativeEffect {
   EffectUse use;
   Fidelity fidelity = Fidelity::kExact;
-  std::string how = "";  // what stands for it, or why nothing does
+  std::string how = "";    // what stands for it, or why nothing does
+  bool by_law = false;     // what stands for it is code beside the MJCF (ExportedModel::laws)
+  bool by_sender = false;  // whoever sends commands changes them (ExportedModel::sent)
 };
 
 // Torques that an angle or nothing makes, by a motor: with `input="none"`, or with an input that nobody drives. Else a
-// host may send them with the drive's own.
+// drive's law has them with its own (drive_laws), or a host may send them so.
 enum class PassiveMotors { kNone, kHost, kIdleInput, kNoInput };
 // An actuator's `delay`; or whole steps, in the engine's own configuration (ExportedModel::delay_steps).
 enum class CommandDelays { kNone, kWholeSteps, kExact };
@@ -45,7 +47,13 @@ struct NativeFeatures {
   double time_step_s = 0;         // 0: the MJCF's own
 };
 
-// The arguments of gapscope.torch's Drive, by name.
+// What whoever sends a drive's command u takes off it first, and then its factor 1 + asymmetry sign u.
+struct SentCommand {
+  double dead_zone = 0, asymmetry = 0;
+  double Of(double command) const;
+};
+
+// The arguments of gapscope.torch's Drive, by name; with "spring." or "stop." before it, of its parameter of that name.
 using DriveLaw = std::map<std::string, double>;
 
 }  // namespace gapscope

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -84,8 +85,9 @@ class Structure {
   // Of kNative: what the engine has, and what became of the effects that added terms.
   NativeFeatures features;
   std::vector<NativeEffect> told;
-  std::map<std::string, double> delays_s;  // by drive, where the engine's own configuration delays
-  std::map<std::string, DriveLaw> laws;    // by drive, where code of ours makes its torque; without the gains
+  std::map<std::string, double> delays_s;   // by drive, where the engine's own configuration delays
+  std::map<std::string, SentCommand> sent;  // by drive, where whoever sends commands changes them
+  std::map<std::string, DriveLaw> laws;     // by drive, where code of ours makes its torque; without the gains
   std::vector<Parameter> parameters;
   std::vector<FieldSetting> settings;
   std::map<std::string, std::string> command_delay;  // drive -> parameter
@@ -121,8 +123,10 @@ class Structure {
   double ValueOf(const std::string& field, double own) const;
   void Enter(const std::string& group, const std::string& place, const std::string& key);
   void Tell(const std::string& group, const std::string& place, const std::string& key, Fidelity fidelity,
-            const std::string& how);
-  void TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how);
+            const std::string& how, bool by_law = false);
+  void TellOf(const NativeEffect& effect);
+  // The effects that have a term; none: it is the rig's own.
+  std::vector<EffectUse> OwnersOf(const std::string& group, const std::string& place, const std::string& key) const;
   Fidelity AddPassive(const std::string& joint, double amplitude, double per_rad, double phase);
   void NativeSpring(const std::string& joint, const Terms& terms);
   void NativeElastic(const std::string& joint, const Terms& terms);
@@ -130,10 +134,13 @@ class Structure {
   void NativeDelay(const std::string& joint, const std::string& key, double delay_s,
                    const std::vector<mjsActuator*>& inputs);
   void NativeMotor(const std::string& joint, const Terms& terms);
-  // Of joints whose drives have terms that MuJoCo lacks: whether gapscope.torch can stand for each of these drives.
-  bool NeedsLaw(const Terms& terms) const;
+  void NativeSent(const std::string& joint, const Terms& terms, const std::vector<mjsActuator*>& inputs);
+  // Joints whose drives have terms that the engine lacks; none, where gapscope.torch cannot stand for each of them.
+  std::set<std::string> LawJoints() const;
+  bool SpringsByLaw() const { return features.drive_laws && features.passive_motors == PassiveMotors::kHost; }
   bool TakesLaw(const std::string& joint) const;
-  void NativeLaw(const std::string& joint, const Terms& terms);
+  void NativeLaw(const std::string& joint);
+  void TellLaw(const std::string& group, const std::string& joint, const std::string& key);
   // A number in the place of what the experiment or the MJCF says of a field.
   void Put(const std::string& field, double number);
   void MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs);

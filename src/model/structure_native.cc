@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "src/experiment/expression.h"
@@ -15,6 +16,17 @@ namespace {
 bool FeedsBack(const std::vector<mjsActuator*>& inputs) {
   return std::any_of(inputs.begin(), inputs.end(),
                      [](const mjsActuator* input) { return input->biasprm[1] != 0 || input->biasprm[2] != 0; });
+}
+
+// What gapscope.torch calls a term of a joint's springs.
+std::string SpringArgument(const std::string& key) {
+  static const std::map<std::string, std::string> kOthers = {{"stiffness_n_m_per_rad", "spring.stiffness"},
+                                                             {"cubic_n_m_per_rad3", "spring.cubic"},
+                                                             {"cogging_periods_per_rev", "spring.cogging_periods"},
+                                                             {"stop_n_m_per_rad", "stop.stiffness"},
+                                                             {"stop_rad", "stop.stop_rad"}};
+  const auto other = kOthers.find(key);
+  return other == kOthers.end() ? "spring." + key : other->second;
 }
 
 std::string Term(const std::string& group, const std::string& place, const std::string& key) {
@@ -37,6 +49,11 @@ std::string FidelityName(Fidelity fidelity) {
   return "";
 }
 
+double SentCommand::Of(double command) const {
+  const double live = std::copysign(std::max(std::abs(command) - dead_zone, 0.0), command);
+  return live * (1 + (live > 0 ? asymmetry : -asymmetry));
+}
+
 double Structure::ValueIn(const Terms& terms, const std::string& key) const {
   const auto term = terms.find(key);
   return term == terms.end() ? 0 : value_of(term->second);
@@ -53,20 +70,29 @@ void Structure::Enter(const std::string& group, const std::string& place, const 
 
 // The worst of what becomes of an effect's terms is what becomes of it.
 void Structure::Tell(const std::string& group, const std::string& place, const std::string& key, Fidelity fidelity,
-                     const std::string& how) {
+                     const std::string& how, bool by_law) {
+  for (const EffectUse& use : OwnersOf(group, place, key)) TellOf({use, fidelity, how, by_law});
+}
+
+std::vector<EffectUse> Structure::OwnersOf(const std::string& group, const std::string& place,
+                                           const std::string& key) const {
   std::string entered = place;  // before its joint was split
   for (const auto& [joint, motor] : motor_joint) {
     if (motor == place) entered = joint;
   }
   const auto owners = owners_.find(Term(group, entered, key));
-  if (owners == owners_.end()) return;  // no effect has this term
-  for (const EffectUse& use : owners->second) TellOf(use, fidelity, how);
+  return owners == owners_.end() ? std::vector<EffectUse>{} : owners->second;
 }
 
-void Structure::TellOf(const EffectUse& use, Fidelity fidelity, const std::string& how) {
-  auto of = std::find_if(told.begin(), told.end(), [&](const NativeEffect& effect) { return effect.use == use; });
-  if (of == told.end()) of = told.insert(told.end(), NativeEffect{.use = use});
-  if (of->how.empty() || fidelity > of->fidelity) *of = {use, fidelity, how};
+void Structure::TellOf(const NativeEffect& effect) {
+  const auto of = std::ranges::find(told, effect.use, &NativeEffect::use);
+  if (of == told.end()) {
+    told.push_back(effect);
+    return;
+  }
+  const bool by_law = of->by_law || effect.by_law;  // of one on all drives, of which some have a law
+  if (effect.fidelity > of->fidelity) *of = effect;
+  of->by_law = by_law;
 }
 
 Status Structure::FinishNative() {
@@ -82,19 +108,17 @@ Status Structure::FinishNative() {
     splits.clear();
   }
   for (const Split& split : splits) FinishSplit(split);
-  const bool by_law = features.drive_laws && std::ranges::all_of(motor_, [&](const auto& of) {
-                        return !NeedsLaw(of.second) || TakesLaw(of.first);
-                      });
+  const std::set<std::string> by_law = LawJoints();
+  for (const std::string& joint : by_law) NativeLaw(joint);
   for (const auto& [joint, terms] : motor_) {
-    if (by_law && NeedsLaw(terms))
-      NativeLaw(joint, terms);
-    else
-      NativeMotor(joint, terms);
+    if (!by_law.contains(joint)) NativeMotor(joint, terms);
   }
   for (const auto& [joint, terms] : friction_) GS_RETURN_IF_ERROR(NativeFriction(joint, terms));
-  for (const auto& [joint, terms] : spring_) NativeSpring(joint, terms);
+  for (const auto& [joint, terms] : spring_) {
+    if (!(SpringsByLaw() && by_law.contains(joint))) NativeSpring(joint, terms);
+  }
   for (const OwnTorque& torque : own_torques_)
-    TellOf({torque.name, torque.joint}, Fidelity::kDropped, "a formula of the experiment's own has no native form");
+    TellOf({{torque.name, torque.joint}, Fidelity::kDropped, "a formula of the experiment's own has no native form"});
   return Ok();
 }
 
@@ -268,9 +292,21 @@ void Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const
   Put("joint/" + joint + "/armature", std::max(0.0, inertia));
 }
 
-// Late commands are the engine's own, where nothing else is there.
-bool Structure::NeedsLaw(const Terms& terms) const {
-  return std::ranges::any_of(terms, [](const auto& term) { return term.first != "command_delay_s"; });
+// Late commands are the engine's own, where nothing else is there; so is a limit where the engine has the drive's gains
+// itself, by the implicit integrator that a law in their place would do without.
+std::set<std::string> Structure::LawJoints() const {
+  std::set<std::string> joints;
+  if (!features.drive_laws) return joints;
+  std::set<std::string> own = {"command_delay_s"};
+  if (SpringsByLaw()) own.insert({"torque_limit_n_m", "limit_softness"});
+  for (const auto& [joint, terms] : motor_) {
+    if (std::ranges::any_of(terms, [&](const auto& term) { return !own.contains(term.first); })) joints.insert(joint);
+  }
+  for (const auto& [joint, terms] : spring_) {
+    if (SpringsByLaw() && !ActuatorsOn(joint).empty()) joints.insert(joint);
+  }
+  const bool all = std::ranges::all_of(joints, [&](const std::string& joint) { return TakesLaw(joint); });
+  return all ? joints : std::set<std::string>{};
 }
 
 // A plain servo or motor, whose limit is the same both ways. Plain motors beside it (feed-forward) get no command
@@ -290,23 +326,37 @@ bool Structure::TakesLaw(const std::string& joint) const {
          (!limited(drive.forcelimited, drive.forcerange) || drive.forcerange[0] == -drive.forcerange[1]);
 }
 
-void Structure::NativeLaw(const std::string& joint, const Terms& terms) {
+void Structure::TellLaw(const std::string& group, const std::string& joint, const std::string& key) {
+  Tell(group, joint, key, Fidelity::kExact, "the drive's law in PyTorch, beside the MJCF", true);
+}
+
+void Structure::NativeLaw(const std::string& joint) {
   const mjsActuator& input = *ActuatorsOn(joint).front();
   const std::string drive = mjs_getString(mjs_getName(input.element));
   DriveLaw& law = laws[drive];
   const bool volts = IsElectric(rig_.KindOfCommand(drive)),
              servo = input.biastype == mjBIAS_AFFINE && input.biasprm[1] != 0;
-  for (const auto& [key, expression] : terms) {
-    std::string argument = key;
-    if (volts && key == "dead_zone") argument = "command_dead_zone";
-    if (!servo && key == "second_time_constant_s") argument = "command_time_constant_s";  // an amplifier's
-    law[argument] = value_of(expression);
-    Tell(kMotorTerms, joint, key, Fidelity::kExact, "the drive's law in PyTorch, beside the MJCF");
+  if (const auto motor = motor_.find(joint); motor != motor_.end()) {
+    for (const auto& [key, expression] : motor->second) {
+      std::string argument = key;
+      if (volts && key == "dead_zone") argument = "command_dead_zone";
+      if (!servo && key == "second_time_constant_s") argument = "command_time_constant_s";  // an amplifier's
+      law[argument] = value_of(expression);
+      TellLaw(kMotorTerms, joint, key);
+    }
   }
   if (const double most = input.forcerange[1]; most > 0) {
     double& limit = law["torque_limit_n_m"];
     limit = limit > 0 ? std::min(limit, most) : most;
   }
+  const auto spring = spring_.find(joint);
+  if (!SpringsByLaw() || spring == spring_.end()) return;
+  for (const auto& [key, expression] : spring->second) {
+    law[SpringArgument(key)] = value_of(expression);
+    TellLaw(kSpringTerms, joint, key);
+  }
+  if (const mjsJoint* element = FindJoint(joint); law.contains("stop.stop_rad"))
+    law["stop.middle_rad"] = 0.5 * (element->range[0] + element->range[1]);
 }
 
 void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
@@ -343,16 +393,41 @@ void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
     tell("time_constant_s", exact ? Fidelity::kExact : Fidelity::kApproximated,
          exact ? "an activation of one pole" : "one pole of the command: feedback does not pass it");
   }
-  tell("dead_zone", Fidelity::kHost,
-       fmt::format("take {:.4g} off the command's size, down to zero, before it is sent", value("dead_zone")));
-  const double of_command = value("command_asymmetry"), of_torque = value("asymmetry");
-  const bool by_host = !feeds_back || of_torque == 0;
-  const double share = feeds_back ? of_command : of_command + of_torque;
-  for (const char* key : {"command_asymmetry", "asymmetry"})
-    tell(key, by_host ? Fidelity::kHost : Fidelity::kDropped,
-         by_host ? fmt::format("send commands (1 + {0:.4g} sign u) u", share) : "gain by the torque's sign: no form");
+  NativeSent(joint, terms, inputs);
   for (const char* key : {"droop_at_peak", "sag_fraction", "power_w"})
     tell(key, Fidelity::kDropped, "the drive's law has no native form");
+}
+
+// Of a torque that nothing is fed back to, and of any command, it is the command's.
+void Structure::NativeSent(const std::string& joint, const Terms& terms, const std::vector<mjsActuator*>& inputs) {
+  const std::string drive = mjs_getString(mjs_getName(inputs.front()->element));
+  const bool feeds_back = FeedsBack(inputs);
+  const auto by_sender = [&](const char* key, const std::string& how) {
+    for (const EffectUse& use : OwnersOf(kMotorTerms, joint, key))
+      TellOf({.use = use, .fidelity = Fidelity::kHost, .how = how, .by_sender = true});
+  };
+  SentCommand command;
+  if (const double width = ValueIn(terms, "dead_zone"); terms.contains("dead_zone")) {
+    const bool of_command = IsElectric(rig_.KindOfCommand(drive));
+    if (of_command || !feeds_back) {
+      const double gain = ValueOf("actuator/" + drive + "/gain", inputs.front()->gainprm[0]);
+      command.dead_zone = of_command ? width : width / std::abs(gain);
+      by_sender("dead_zone",
+                fmt::format("take {:.4g} off the command's size, down to zero, before it is sent", command.dead_zone));
+    } else {
+      Tell(kMotorTerms, joint, "dead_zone", Fidelity::kDropped, "no torque of a servo near zero: no form");
+    }
+  }
+  const double of_torque = ValueIn(terms, "asymmetry");
+  const bool has_form = !feeds_back || of_torque == 0;
+  if (has_form) command.asymmetry = ValueIn(terms, "command_asymmetry") + of_torque;
+  for (const char* key : {"command_asymmetry", "asymmetry"}) {
+    if (has_form)
+      by_sender(key, fmt::format("send commands (1 + {0:.4g} sign u) u", command.asymmetry));
+    else
+      Tell(kMotorTerms, joint, key, Fidelity::kDropped, "gain by the torque's sign: no form");
+  }
+  if (command.dead_zone != 0 || command.asymmetry != 0) sent[drive] = command;
 }
 
 }  // namespace gapscope

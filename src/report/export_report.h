@@ -19,12 +19,12 @@ struct ExportRun {
   std::string result, target, what, out;  // what: the target in words; out: the written MJCF
   double time_step_s = 0;
   std::vector<NativeEffect> effects;
-  std::map<std::string, int> delay_steps;  // of ExportedModel
-  std::map<std::string, DriveLaw> laws;    // of ExportedModel
-  std::vector<std::string> files;          // beside the MJCF
-  std::vector<std::string> left_out;       // fields that each log sets anew
-  std::vector<std::string> logs;           // that the errors are of; empty: none could be read
-  std::string unmeasured;                  // why there are no errors; empty: there are
+  std::map<std::string, int> delay_steps;   // of ExportedModel
+  std::map<std::string, SentCommand> sent;  // of ExportedModel
+  std::vector<std::string> files;           // beside the MJCF
+  std::vector<std::string> left_out;        // fields that each log sets anew
+  std::vector<std::string> logs;            // that the errors are of; empty: none could be read
+  std::string unmeasured;                   // why there are no errors; empty: there are
   FidelityErrors errors;
   std::size_t draws = 0;  // 0: no randomisation was asked for
   Randomization randomization;

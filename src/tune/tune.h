@@ -65,7 +65,7 @@ struct FixedParameters {
 };
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
                                 const FixedParameters& fixed, ReplayMode mode, const TuneOptions& options,
-                                ThreadPool& pool);
+                                ThreadPool& pool, StampShift* stamps = nullptr);
 
 }  // namespace gapscope
 

@@ -1,5 +1,6 @@
 """Paths of the checkout; its own program and package."""
 
+import json
 import os
 import shutil
 import signal
@@ -11,13 +12,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 if TYPE_CHECKING:
     import gapscope as gs
 
-# scripts/wheel and scripts/bench_python run the first two, test_mjlab.py and test_engines.py what is in the folders.
-collect_ignore = ["try_wheel.py", "bench.py", "mjlab", "engines"]
+# scripts/wheel and scripts/bench_python run the first two, the tests of engines what is in the folders.
+collect_ignore = ["try_wheel.py", "bench.py", "mjlab", "isaaclab", "engines"]
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 
@@ -99,6 +101,44 @@ def interpreter(engine: str) -> str:
     if made.returncode:
         pytest.skip(f"scripts/engine_env {engine} was not run")
     return made.stdout.strip()
+
+
+def knowing(fitted: "gs.Tune", best: dict[str, float], deviations: dict[str, float]) -> "gs.Tune":
+    """As if the fit had ended at `best`, had known these parameters so well, each alone, and the others not at all."""
+    result = fitted.json
+    result["model"]["values"] |= best
+    result["correlated"], result["spread"]["logarithmic"] = [], [False for _ in result["parameters"]]
+    known = [deviations.get(p["name"], 0) for p in result["parameters"]]
+    for p, deviation in zip(result["parameters"], known, strict=True):
+        p["identifiable"] = deviation > 0
+    result["spread"]["covariance"] = [[a**2 * (i == j) for j in range(len(known))] for i, a in enumerate(known)]
+    (fitted.out / "result.json").write_text(json.dumps(result))
+    return fitted
+
+
+def packages(engine: str) -> Path:
+    """Of an environment as `interpreter` finds it: what another one reads as its own with PYTHONPATH."""
+    return next(Path(interpreter(engine)).parents[1].glob("lib/python*/site-packages"))
+
+
+def stock_motion(path: Path, commands: np.ndarray, beside: np.ndarray | None = None) -> np.ndarray:
+    """The first joint's angles in stock MuJoCo, by the integrator of exports.
+
+    ``commands`` of the first actuator, one a step, and those ``beside`` them of the second.
+    """
+    import gapscope as gs
+    import mujoco
+
+    gs.load_plugins()
+    model = mujoco.MjModel.from_xml_path(str(path))
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data, angles = mujoco.MjData(model), np.empty(len(commands))
+    for k, sent in enumerate(commands):
+        angles[k], data.ctrl[0] = data.qpos[0], sent
+        if beside is not None:
+            data.ctrl[1] = beside[k]
+        mujoco.mj_step(model, data)
+    return angles
 
 
 def interrupt_when(ready: Callable[[], bool]) -> None:

@@ -370,6 +370,17 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
     assert plain.nplugin == 0 and plain.dof_frictionloss[0] == pytest.approx(0.0006, rel=1e-4)
 
 
+def test_what_the_host_sends_goes_beside_an_actuator_with_a_state(
+    experiment: str, demo: str, tmp_path: Path
+) -> None:
+    values = {"dead_zone@motor.half_width_v": 0.3, "actuator_lag@motor.time_constant_s": 0.01}
+    log = short_log(demo, "short")
+    result = gs.replay(experiment, log, with_=["dead_zone@motor", "actuator_lag@motor"], set=values)
+    lost = result.export("mujoco_native", tmp_path / "native")
+    assert [(e.name, e.form) for e in lost.effects] == [("dead_zone", "host"), ("actuator_lag", "approximated")]
+    assert lost.unmeasured == "" and lost.held_out_error.exported == pytest.approx(lost.held_out_error.model, rel=0.1)
+
+
 def test_a_tune_is_drawn_from(tuned: gs.Tune, tmp_path: Path) -> None:
     """What stock MuJoCo makes of a draw is the draw: the arrays are named and shaped as its own."""
     out = Path(tuned.export("mujoco_native", tmp_path / "native", draws=20, seed=4).model).parent

@@ -1,20 +1,23 @@
 """What is exported for Isaac Lab, read by Python; its configurations are stood in for by the names that they have.
 
-Sources: isaac-sim/IsaacLab, source/isaaclab/isaaclab/actuators, actuator_base_cfg.py and actuator_pd_cfg.py;
-managers/manager_term_cfg.py, managers/scene_entity_cfg.py, and randomize_joint_parameters of envs/mdp/events.py; 2.3 as
-of e579469, 3.0 as of develop in 2026. Its own packages need Isaac Sim.
+Sources: the wheels isaaclab 2.3.2.post1 and 3.0.0, actuators/actuator_base_cfg.py, actuator_pd_cfg.py and
+actuator_pd.py; sim/simulation_cfg.py; managers/manager_term_cfg.py, managers/scene_entity_cfg.py, and
+randomize_joint_parameters of envs/mdp/events.py. Their simulations need Isaac Sim or a GPU; their actuators run where
+`scripts/engine_env isaaclab` and `isaaclab23` were run.
 """
 
-import json
+import os
 import runpy
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import gapscope as gs
+import numpy as np
 import pytest
-from conftest import ROOT, changed_joint, servo_log
+from conftest import ROOT, changed_joint, interpreter, knowing, packages, servo_log, stock_motion
 
 OF_JOINT = {"joint_names_expr", "stiffness", "damping", "armature", "friction", "dynamic_friction", "viscous_friction"}
 LIMITS = {
@@ -26,17 +29,24 @@ EXPLICIT = {"isaaclab": "actuator_effort_limit", "isaaclab23": "effort_limit"}
 IMPLICIT = {"isaaclab": "joint_effort_limit", "isaaclab23": "effort_limit_sim"}
 
 
+# Of SimulationCfg, beside dt and gravity, what takes actuators in Python.
+IN_PYTHON = {"isaaclab": {"use_newton_actuators": False}, "isaaclab23": {}}
+
 # Of randomize_joint_parameters, what may be in EventTermCfg's params.
 EVENT = {"func", "mode", "params"}
-PARAMS = {"asset_cfg", "operation", "distribution"} | {
+PARAMS = {"asset_cfg", "operation", "distribution", "drive", "argument", "limits"} | {
     f"{name}_distribution_params" for name in ("friction", "armature", "lower_limit", "upper_limit")
 }
 
 
+class Made(dict[str, Any]):
+    __getattr__ = dict.__getitem__
+
+
 def configuration(kind: str, allowed: set[str]) -> Any:
-    def make(**members: Any) -> dict[str, Any]:
+    def make(**members: Any) -> Made:
         assert set(members) <= allowed, members
-        return {"kind": kind, **members}
+        return Made(kind=kind, **members)
 
     return make
 
@@ -48,12 +58,20 @@ def read(monkeypatch: pytest.MonkeyPatch, target: str, folder: Path) -> dict[str
     actuators.DelayedPDActuatorCfg = configuration(  # type: ignore[attr-defined]
         "delayed", members | {"min_delay", "max_delay"}
     )
-    sim.SimulationCfg = configuration("simulation", {"dt", "gravity"})  # type: ignore[attr-defined]
+    actuators.IdealPDActuator = actuators.IdealPDActuatorCfg = object  # type: ignore[attr-defined]
+    utils, laws, torch = ModuleType("isaaclab.utils"), ModuleType("gapscope_torch"), ModuleType("torch")
+    utils.configclass = lambda made: configuration(  # type: ignore[attr-defined]
+        "law", members | {name for name in vars(made) if not name.startswith("_")} | {"law", "command"}
+    )
+    laws.Drive = object  # type: ignore[attr-defined]
+    sim.SimulationCfg = configuration(  # type: ignore[attr-defined]
+        "simulation", {"dt", "gravity", *IN_PYTHON[target]}
+    )
     envs, managers = ModuleType("isaaclab.envs"), ModuleType("isaaclab.managers")
     envs.mdp = SimpleNamespace(randomize_joint_parameters="randomize_joint_parameters")  # type: ignore[attr-defined]
     managers.EventTermCfg = configuration("event", EVENT)  # type: ignore[attr-defined]
-    managers.SceneEntityCfg = lambda name, joint_names: (name, joint_names)  # type: ignore[attr-defined]
-    for module in (ModuleType("isaaclab"), actuators, sim, envs, managers):
+    managers.SceneEntityCfg = lambda name, joint_names=None: (name, joint_names)  # type: ignore[attr-defined]
+    for module in (ModuleType("isaaclab"), actuators, sim, envs, managers, utils, laws, torch):
         monkeypatch.setitem(sys.modules, module.__name__, module)
     return runpy.run_path(str(folder / "gapscope_isaaclab.py"))
 
@@ -71,7 +89,6 @@ def test_a_servo(
     values = {
         "coulomb_friction@joint.friction_n_m": 3.0,
         "torque_limit@motor.limit_n_m": 40.0,
-        "gravity_offset@joint.torque_n_m": 5.0,
         "backlash@joint.gap_rad": 0.02,
         **({"command_delay@motor.delay_s": 0.0052} if late else {}),
     }
@@ -80,12 +97,8 @@ def test_a_servo(
     lost = result.export(target, tmp_path / "to", timestep=0.001)
     forms = {e.name: e.form for e in lost.effects}
     assert forms.pop("command_delay", "approximated") == "approximated"
-    assert forms == {
-        "coulomb_friction": "exact",
-        "torque_limit": "exact",
-        "gravity_offset": "host",
-        "backlash": "dropped",
-    }
+    assert forms == {"coulomb_friction": "exact", "torque_limit": "exact", "backlash": "dropped"}
+    assert not (tmp_path / "to" / "gapscope_torch.py").exists()
     made = read(monkeypatch, target, tmp_path / "to")
     assert made["SIMULATION"]["dt"] == 0.001 and made["SIMULATION"]["gravity"] == (0, 0, -9.81)
     drive = made["ACTUATORS"]["motor"]
@@ -113,19 +126,7 @@ def test_a_voltage_drive_and_a_joint_without_one(
 
 
 FRICTION, DAMPING = "coulomb_friction@joint.friction_n_m", "joint.damping"
-
-
-def knowing(fitted: gs.Tune, deviations: dict[str, float]) -> gs.Tune:
-    """As if the fit had ended at 2 N m and 0.5 N m s/rad, and known them so well."""
-    result = fitted.json
-    result["model"]["values"] |= {FRICTION: 2.0, DAMPING: 0.5}
-    result["correlated"], result["spread"]["logarithmic"] = [], [False for _ in result["parameters"]]
-    known = [deviations.get(p["name"], 0) for p in result["parameters"]]
-    for p, deviation in zip(result["parameters"], known):
-        p["identifiable"] = deviation > 0
-    result["spread"]["covariance"] = [[a**2 * (i == j) for j in range(len(known))] for i, a in enumerate(known)]
-    (fitted.out / "result.json").write_text(json.dumps(result))
-    return fitted
+BEST = {FRICTION: 2.0, DAMPING: 0.5}
 
 
 @pytest.mark.parametrize("target", list(LIMITS))
@@ -134,7 +135,7 @@ def test_events_draw_friction_by_factors(
 ) -> None:
     freeze = ["motor.kp", "motor.kd", "joint.inertia"]
     fitted = gs.tune(*joint, with_="coulomb_friction@joint", freeze=freeze, starts=1, out=tmp_path / "fit")
-    knowing(fitted, {FRICTION: 0.2}).export(target, tmp_path / "to", draws=3)
+    knowing(fitted, BEST, {FRICTION: 0.2}).export(target, tmp_path / "to", draws=3)
     made = read(monkeypatch, target, tmp_path / "to")
     (event,) = made["EVENTS"].values()
     assert (event["func"], event["mode"]) == ("randomize_joint_parameters", "startup")
@@ -144,11 +145,121 @@ def test_events_draw_friction_by_factors(
     assert params["friction_distribution_params"] == pytest.approx((1 - 0.196, 1 + 0.196), abs=1e-3)
     assert made["ACTUATORS"]["motor"]["friction"] == pytest.approx(2)
     # Damping of 0.5 is known to 5 %, which is less: one range for both.
-    knowing(fitted, {FRICTION: 0.2, DAMPING: 0.025}).export(target, tmp_path / "to", draws=3)
+    knowing(fitted, BEST, {FRICTION: 0.2, DAMPING: 0.025}).export(target, tmp_path / "to", draws=3)
     (event,) = read(monkeypatch, target, tmp_path / "to")["EVENTS"].values()
     assert event["params"]["friction_distribution_params"] == pytest.approx((1 - 0.098, 1 + 0.098), abs=1e-3)
     fitted.export(target, tmp_path / "to")
     assert "EVENTS" not in read(monkeypatch, target, tmp_path / "to")
+
+
+# Each one a law of the drive that Isaac Lab has not.
+LAWS = {
+    "command_delay@motor.delay_s": 0.0071,
+    "torque_delay@motor.delay_s": 0.0043,
+    "torque_limit@motor.limit_n_m": 30,
+    "torque_limit@motor.softness": 0.2,
+    "actuator_lag@motor.time_constant_s": 0.004,
+    "torque_speed_curve@motor.power_w": 25,
+    "direction_asymmetry@motor.asymmetry": 0.2,
+    "dead_zone@motor.half_width_n_m": 0.5,
+    "torque_constant_droop@motor.loss_at_peak": 0.4,
+    "cable_spring@joint.stiffness_n_m_per_rad": 20,
+    "cable_spring@joint.stiffness_cubic_n_m_per_rad3": 60,
+    "cable_spring@joint.rest_rad": 0.1,
+    "gravity_offset@joint.torque_n_m": 4,
+    "gravity_offset@joint.rest_rad": 0.3,
+    "torque_bias@joint.torque_n_m": 2,
+    "cogging@joint.amplitude_n_m": 1,
+    "cogging@joint.phase_rad": 0.7,
+}
+VOLTS = {
+    "command_delay@motor.delay_s": 0.0071,
+    "dead_zone@motor.half_width_v": 0.5,
+    "actuator_lag@motor.time_constant_s": 0.01,
+    "torque_bias@arm.torque_n_m": 0.001,
+    "end_stop@arm.stiffness_n_m_per_rad": 0.02,
+    "end_stop@arm.angle_rad": 0.1,
+}
+STEP_S = 5e-4
+
+
+def with_effects(experiment: str, log: gs.Log | str, values: dict[str, float]) -> gs.Replay:
+    effects = list(dict.fromkeys(name.partition(".")[0] for name in values))
+    return gs.replay(experiment, log, with_=effects, set=values)
+
+
+@pytest.mark.parametrize("target", list(LIMITS))
+def test_laws_of_a_drive_are_told_as_they_are(
+    joint: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, target: str
+) -> None:
+    sent, moved = np.loadtxt(joint[1], delimiter=",", skiprows=1), with_effects(*joint, LAWS).traces[0]
+    log = {"time_s": sent[:, 0], "target_rad": sent[:, 1], "position_rad": moved["position_rad"].predicted}
+    lost = with_effects(joint[0], gs.Log(log), LAWS).export(target, tmp_path / "to", timestep=STEP_S)
+    assert {e.form for e in lost.effects} == {"exact"} and len(lost.effects) == 12
+    errors = lost.held_out_error  # of the plugins, but for the integrator
+    assert errors.model < 0.001 and errors.exported < 0.01 < 0.1 < errors.nominal
+    own = Path(gs.__file__).with_name("torch.py").read_text()
+    assert (tmp_path / "to" / "gapscope_torch.py").read_text().strip() == own.strip()
+    made = read(monkeypatch, target, tmp_path / "to")
+    assert made["SIMULATION"].items() >= IN_PYTHON[target].items()
+    drive, law = made["ACTUATORS"]["motor"], made["LAWS"]["motor"]
+    assert (drive["kind"], drive["command"], drive["law"]) == ("law", "joint_positions", law)
+    assert law["spring"]["cogging_n_m"] == 1 and law["droop_at_peak"] == 0.4
+    assert law["max_delay_s"] == pytest.approx(0.0114)
+
+
+@pytest.mark.parametrize("target", list(LIMITS))
+@pytest.mark.parametrize("rig", ["joint", "qube"])
+def test_isaac_labs_own_actuator_moves_as_the_plugins(
+    joint: tuple[str, str], demo: str, experiment: str, tmp_path: Path, target: str, rig: str
+) -> None:
+    """Step by step beside the plugins in stock MuJoCo, by the same integrator; both environments, reset alone."""
+    values = LAWS if rig == "joint" else VOLTS
+    run = joint if rig == "joint" else (experiment, demo)
+    with_effects(*run, values).export(target, tmp_path / "to", timestep=STEP_S)
+    times = STEP_S * np.arange(1500)
+    commands = (0.5 if rig == "joint" else 5) * np.stack([np.sin(9 * times), np.cos(20 * times)], axis=1)
+    beside = 3 * np.stack([np.cos(15 * times), np.sin(4 * times)], axis=1) * (rig == "joint")
+    angles = drive(target, tmp_path, commands, beside)["angles"]
+    assert np.array_equal(angles[0, :, 0], angles[1, :, 0])  # the other one went on
+    for left_out in (None, *dict.fromkeys(name.partition(".")[0] for name in values)):
+        kept = {name: value for name, value in values.items() if name.partition(".")[0] != left_out}
+        model = Path(with_effects(*run, kept).export("mujoco", tmp_path / "own", timestep=STEP_S).model)
+        for env in range(2):
+            moved = stock_motion(model, commands[:, env], beside[:, env] if rig == "joint" else None)
+            off = np.abs(moved - angles[0, :, env]).max()
+            assert off < 1e-6 if left_out is None else off > 1e-4, (left_out, off)
+
+
+def drive(target: str, folder: Path, commands: np.ndarray, beside: np.ndarray) -> dict[str, np.ndarray]:
+    np.savez(folder / "commands.npz", commands=commands, beside=beside)
+    script = ROOT / "tests" / "python" / "isaaclab" / "law.py"
+    done = subprocess.run(
+        [interpreter(target), script, folder / "to", folder / "commands.npz", folder / "out.npz"],
+        capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": str(packages("torch"))},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return dict(np.load(folder / "out.npz"))
+
+
+WIDTH, LAG = "dead_zone@motor.half_width_n_m", "actuator_lag@motor.time_constant_s"
+
+
+@pytest.mark.parametrize("target", list(LIMITS))
+def test_each_environment_has_a_law_of_its_own(joint: tuple[str, str], tmp_path: Path, target: str) -> None:
+    freeze = ["motor.kp", "motor.kd", "joint.inertia", DAMPING]
+    effects = [WIDTH.partition(".")[0], LAG.partition(".")[0]]
+    fitted = gs.tune(*joint, with_=effects, freeze=freeze, starts=1, out=tmp_path / "fit")
+    best = {WIDTH: 2.0, LAG: 0.02}
+    knowing(fitted, best, {WIDTH: 0.5, LAG: 0.004}).export(target, tmp_path / "to", draws=3, timestep=STEP_S)
+    commands = np.repeat(0.5 * np.sin(9 * STEP_S * np.arange(1500))[:, None], 3, axis=1)
+    done = drive(target, tmp_path, commands, np.zeros_like(commands))
+    for name, low, high in (("dead_zone", 1.02, 2.98), ("time_constant_s", 0.0122, 0.0279)):
+        assert len(set(done[name])) == 3 and low < done[name].min() < done[name].max() < high
+    for env in range(3):
+        own = {WIDTH: float(done["dead_zone"][env]), LAG: float(done["time_constant_s"][env])}
+        model = with_effects(*joint, own).export("mujoco", tmp_path / "own", timestep=STEP_S).model
+        assert np.abs(stock_motion(Path(model), commands[:, env]) - done["angles"][0, :, env]).max() < 1e-6
 
 
 def test_a_spring_beside_a_drive_is_refused(joint: tuple[str, str], tmp_path: Path) -> None:

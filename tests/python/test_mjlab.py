@@ -10,10 +10,9 @@ import subprocess
 from pathlib import Path
 
 import gapscope as gs
-import mujoco
 import numpy as np
 import pytest
-from conftest import ROOT, changed_joint, interpreter
+from conftest import ROOT, changed_joint, knowing, packages, stock_motion
 from scipy.integrate import solve_ivp
 
 STEP_S = 2e-4
@@ -126,7 +125,7 @@ LAWS = {
 
 def test_laws_that_mujoco_lacks_are_pytorchs(joint: tuple[str, str], mjlab: Path, tmp_path: Path) -> None:
     """Beside the plugins in stock MuJoCo, by the same integrator and step."""
-    packages = next(Path(interpreter("torch")).parents[1].glob("lib/python*/site-packages"))
+    torch = packages("torch")
     effects = list(dict.fromkeys(name.partition(".")[0] for name in LAWS))
     sent, moved = np.loadtxt(joint[1], delimiter=",", skiprows=1), gs.replay(*joint, with_=effects, set=LAWS).traces[0]
     log = {"time_s": sent[:, 0], "target_rad": sent[:, 1], "position_rad": moved["position_rad"].predicted}
@@ -138,26 +137,49 @@ def test_laws_that_mujoco_lacks_are_pytorchs(joint: tuple[str, str], mjlab: Path
     assert errors.model < 0.001 and errors.exported < 0.01 < 0.1 < errors.nominal
     times = STEP_S * np.arange(8000)
     np.save(tmp_path / "commands.npy", commands := np.array([target(t) for t in times]))
-    run(mjlab, "law.py", tmp_path / "to", tmp_path / "commands.npy", tmp_path / "moved.npy", beside=packages)
-    first, again = np.load(tmp_path / "moved.npy")
+    run(mjlab, "law.py", tmp_path / "to", tmp_path / "commands.npy", tmp_path / "moved.npz", beside=torch)
+    first, again = np.load(tmp_path / "moved.npz")["angles"][..., 0]
     assert np.array_equal(first, again)
     for left_out in (None, *effects):
         kept = [effect for effect in effects if effect != left_out]
         sizes = {name: value for name, value in LAWS.items() if name.partition(".")[0] != left_out}
         model = gs.replay(*joint, with_=kept, set=sizes).export("mujoco", tmp_path / "own", timestep=STEP_S).model
-        off = np.abs(stock(Path(model), commands) - first).max()
+        off = np.abs(stock_motion(Path(model), commands) - first).max()
         assert off < 1e-6 if left_out is None else off > 1e-4, (left_out, off)
 
 
-def stock(path: Path, commands: np.ndarray) -> np.ndarray:
-    gs.load_plugins()
-    model = mujoco.MjModel.from_xml_path(str(path))
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    data, angles = mujoco.MjData(model), np.empty(len(commands))
-    for k, sent in enumerate(commands):
-        angles[k], data.ctrl[0] = data.qpos[0], sent
-        mujoco.mj_step(model, data)
-    return angles
+# Of a law's numbers, what varies: the plugin's own terms, a delay, and the gain that the law has of the servo.
+BEST = {
+    "dead_zone@motor.half_width_n_m": 2.0,
+    "actuator_lag@motor.time_constant_s": 0.02,
+    "command_delay@motor.delay_s": 0.01,
+    "motor.kp": KP,
+}
+ARGUMENTS = ("dead_zone", "time_constant_s", "command_delay_s", "kp")
+
+
+def test_each_environment_has_a_law_of_its_own(joint: tuple[str, str], mjlab: Path, tmp_path: Path) -> None:
+    """A row of the draws each; it moves as the plugins do with that row."""
+    effects = [name.partition(".")[0] for name in BEST if "@" in name]
+    freeze = ["motor.kd", "joint.inertia", "joint.damping"]
+    fitted = gs.tune(*joint, with_=effects, freeze=freeze, starts=1, out=tmp_path / "fit")
+    known = knowing(fitted, BEST, {name: 0.1 * value for name, value in BEST.items()})
+    to = Path(known.export("mjlab", tmp_path / "to", draws=30, seed=4, timestep=STEP_S).model).parent
+    np.save(tmp_path / "commands.npy", commands := np.array([target(t) for t in STEP_S * np.arange(3000)]))
+    run(mjlab, "law.py", to, tmp_path / "commands.npy", tmp_path / "moved.npz", beside=packages("torch"))
+    moved = dict(np.load(tmp_path / "moved.npz"))
+    drawn = np.load(to / "randomization.npz")["parameters"]
+    names = [p["name"] for p in json.loads((to / "randomization.json").read_text())["parameters"]]
+    assert set(names) == set(BEST)
+    rows = drawn[:, [names.index(name) for name in BEST]]
+    for env in range(3):
+        own = np.array([moved[argument][env] for argument in ARGUMENTS])
+        row = rows[np.argmin(np.abs(rows / own - 1).max(axis=1))]
+        assert own == pytest.approx(row, rel=1e-5) and moved["gain"][env] == pytest.approx(own[-1])
+        sizes = dict(zip(BEST, own.tolist(), strict=True))
+        model = gs.replay(*joint, with_=effects, set=sizes).export("mujoco", tmp_path / "own", timestep=STEP_S).model
+        assert np.abs(stock_motion(Path(model), commands) - moved["angles"][0, :, env]).max() < 1e-5
+    assert len(set(moved["kp"])) == 3
 
 
 def test_a_draw_is_one_row_of_all_that_varies(demo: str, experiment: str, mjlab: Path, tmp_path: Path) -> None:

@@ -242,6 +242,12 @@ def test_parameters_may_be_numbers(plugins: dict[str, np.ndarray], laws: dict[st
     assert np.abs(laws["numbers.32"] - first).max() < 2e-3  # measured: 1.3e-4
 
 
+def test_environments_have_numbers_of_their_own(laws: dict[str, np.ndarray]) -> None:
+    for env in range(ENVS):
+        assert np.abs(laws["varied"][:, env] - laws[f"alone.{env}"]).max() < DIGITS
+    assert np.abs(laws["varied"][:, 1] - laws["varied"][:, 0]).max() > 1
+
+
 def test_environments_are_reset_alone(plugins: dict[str, np.ndarray], laws: dict[str, np.ndarray]) -> None:
     off = np.abs(laws["reset"] - plugins["force"]).max(axis=(0, 2))
     assert off[0] < ROUNDING and off[1] > 1e6 * ROUNDING

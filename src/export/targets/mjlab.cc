@@ -10,10 +10,10 @@
 #include <set>
 
 #include "src/core/collect.h"
+#include "src/export/drive_laws.h"
 #include "src/export/mjlab_laws.h"
 #include "src/export/python_text.h"
 #include "src/export/target.h"
-#include "src/export/torch_file.h"
 #include "src/model/element_names.h"
 
 namespace gapscope {
@@ -62,15 +62,6 @@ std::string NameOfRow(const mjModel& model, const RowKind& kind, std::size_t row
 struct Drive {
   std::string name, joint, field;  // field: of mjlab's command
 };
-
-// As mjlab itself detects it; of what it does not know, feedback of the angle is a servo's.
-std::string CommandField(const mjModel& model, int actuator) {
-  const mjtNum* gain = model.actuator_gainprm + actuator * mjNGAIN;
-  const mjtNum* bias = model.actuator_biasprm + actuator * mjNBIAS;
-  if (model.actuator_biastype[actuator] != mjBIAS_AFFINE) return "effort";
-  if (bias[1] != 0 || gain[0] == 0) return "position";
-  return gain[0] == -bias[2] ? "velocity" : "effort";
-}
 
 class MjlabWriter {
  public:
@@ -366,8 +357,8 @@ std::string MjlabWriter::Text() const {
 Result<std::vector<TargetFile>> WriteMjlab(const TargetInput& input) {
   const MjlabWriter writer(input);
   GS_RETURN_IF_ERROR(writer.Check());
-  std::vector<TargetFile> files = {{"gapscope_mjlab.py", writer.Text()}};
-  if (!input.exported.laws.empty()) files.push_back({"gapscope_torch.py", assets::kTorch});
+  std::vector<TargetFile> files = LawFiles(input);
+  files.insert(files.begin(), {"gapscope_mjlab.py", writer.Text()});
   return files;
 }
 

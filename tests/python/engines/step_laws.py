@@ -41,6 +41,21 @@ for kind in (pytorch.float64, pytorch.float32):
     torques = [drive.step(*(values[:, :1].to(kind) for values in now)) for now in motion]
     assert all(torque.dtype == kind for torque in torques)
     out[f"numbers.{str(kind)[-2:]}"] = pytorch.stack(torques).numpy()
+# One joint whose second environment has a time constant and a spring of its own, beside drives with these alone.
+springs_of = {"spring": {"stiffness": 3.0, "rest_rad": 0.1}, "stop": {"stiffness": 20.0, "stop_rad": 0.2}}
+one_joint = [[values[..., :1] for values in now] for now in motion]
+drive = laws.Drive(**numbers, **springs_of)
+changed = {"time_constant_s": 0.03, "spring.stiffness": 5.0}
+for name, value in changed.items():
+    drive.vary(name, pytorch.tensor([value], dtype=pytorch.float64), [1], 2)
+out["varied"] = pytorch.stack([drive.step(*now) for now in one_joint]).numpy()[..., 0]
+for env, (stiffness, constant) in enumerate([(3.0, numbers["time_constant_s"]), (5.0, 0.03)]):
+    drive = laws.Drive(**{**numbers, "time_constant_s": constant})
+    torques = [drive.step(*(values[env : env + 1] for values in now)) for now in one_joint]
+    for now, torque in zip(one_joint, torques, strict=True):
+        angle = now[1][env : env + 1]
+        torque += laws.spring_torque(angle, stiffness, 0.1) + laws.stop_torque(angle, **springs_of["stop"])
+    out[f"alone.{env}"] = pytorch.stack(torques).numpy()[:, 0, 0]
 
 hysteresis, state, springs = of("hysteresis."), pytorch.zeros_like(given["angle"][0]), []
 for k, angle in enumerate(given["angle"]):

@@ -175,6 +175,7 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
     LogReplay& log = result.logs[jobs[i].log];
     ++log.windows;
     result.steps += runs[i].steps;
+    result.contacts = result.contacts || runs[i].contacts;
     if (runs[i].outcome == Outcome::kDiverged) {
       if (log.diverged_windows++ == 0) log.diverged_at_s = runs[i].diverged_at_s;
       log.outcome = Outcome::kDiverged;
@@ -206,7 +207,7 @@ TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& record
     // What diverges at a slow log's samples may be sound at the model's own step.
     const bool diverges = !std::isfinite(finer) && !std::isfinite(error);
     if (diverges && chosen.step_s <= own) break;
-    if (!diverges && chosen.error_change < kTimeStep.error_share * finer) break;
+    if (!diverges && chosen.error_change < options.step_error_share * finer) break;
     if (chosen.step_s <= finest * 1.001) break;
     chosen.step_s /= 2;
     error = finer;

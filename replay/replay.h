@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "replay/policy.h"
 #include "replay/scales.h"
 #include "replay/simulator.h"
 #include "src/core/thread_pool.h"
@@ -13,10 +14,11 @@ namespace gapscope {
 
 struct ReplayOptions {
   ReplayMode mode = ReplayMode::kFreeRun;
-  double window_s = 1.0;       // kWindows: length; windows follow each other without overlap
-  double time_step_s = 0;      // 0: chosen (see ChooseTimeStep)
-  std::vector<double> values;  // parameters, as model.Nominal(); empty: nominal
-  bool keep_poses = false;     // fill LogReplay::qpos
+  double window_s = 1.0;   // kWindows: length; windows follow each other without overlap
+  double time_step_s = 0;  // 0: chosen (see ChooseTimeStep)
+  double step_error_share = TimeStepPolicy{}.error_share;  // by which that is done
+  std::vector<double> values;                              // parameters, as model.Nominal(); empty: nominal
+  bool keep_poses = false;                                 // fill LogReplay::qpos
 };
 
 // Measured and predicted on the recording's stamps.
@@ -49,6 +51,7 @@ struct ReplayResult {
   std::vector<LogReplay> logs;
   double wall_s = 0, simulated_s = 0;
   std::size_t steps = 0;
+  bool contacts = false;  // bodies touched
 };
 
 // The windows of a recording: one for a free run; else windows of `window_s`, the last one at least half as long.
@@ -58,7 +61,7 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
                     ThreadPool& pool);
 
 // The largest step, of the log's own sample time halved again and again (down to a 32nd of the model's time step),
-// whose halving changes the combined error by less than 1 % of it.
+// whose halving changes the combined error by less than `step_error_share` of it, 1 % where nothing else is asked.
 struct TimeStep {
   double step_s = 0;
   double error_change = 0;  // of the combined error

@@ -98,7 +98,7 @@ Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<Effect
   Candidate candidate{.effects = effects};
   std::vector<EffectUse> all = bench.known;
   all.insert(all.end(), effects.begin(), effects.end());
-  GS_ASSIGN(candidate.model, Model::Build(bench.rig, all, bench.scales));
+  GS_ASSIGN(candidate.model, Model::Build(bench.rig, all, bench.scales, bench.contacts));
   candidate.values = bench.Nominal(*candidate.model);
   candidate.problem = std::make_unique<FitProblem>(*candidate.model, bench.data->train,
                                                    bench.Options(*candidate.model, true), candidate.values, bench.pool);

@@ -72,6 +72,7 @@ struct Workbench {
       std::make_shared<std::map<std::string, std::pair<double, double>>>();
   // Of the base model: as it is given, then where it is fitted.
   std::shared_ptr<Coupling> coupling = std::make_shared<Coupling>();
+  Contacts contacts = Contacts::kAsTheMjcf;
   bool by_windows = false;              // train and held-out logs are the same: every third window is held out
   DiagnosisJournal* journal = nullptr;  // null: none
 

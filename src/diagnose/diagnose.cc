@@ -190,6 +190,14 @@ std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& be
       1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }
 
+// Where nothing touches while the base model replays the logs, nothing is looked for in what is fitted: of an arm that
+// is a third of a step.
+Contacts ContactsOf(const Model& model, const DataSplit& data, ReplayOptions options, ThreadPool& pool) {
+  if (!model.MayCollide()) return Contacts::kAsTheMjcf;
+  const auto touches = [&](const std::vector<Recording>& logs) { return Replay(model, logs, options, pool).contacts; };
+  return touches(data.train) || touches(data.held_out) ? Contacts::kAsTheMjcf : Contacts::kNone;
+}
+
 // One replay of the training windows.
 struct OneReplay {
   std::size_t steps = 0;
@@ -278,9 +286,14 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .values = options.values,
                     .frozen = options.frozen};
     bench.sample_s = FinestStep(fine);
-    bench.time_step_s =
-        ChooseTimeStep(*model, part.held_out, {.mode = ReplayMode::kWindows, .window_s = options.window_s}, pool)
-            .step_s;
+    ReplayOptions step{.mode = ReplayMode::kWindows, .window_s = options.window_s};
+    bench.time_step_s = ChooseTimeStep(*model, part.held_out, step, pool).step_s;
+    if (WindowsIn(options.replay_steps, *model, bench) < kDiagnosePolicy.search.least_windows) {
+      step.step_error_share = kDiagnosePolicy.search.coarse_step;
+      bench.time_step_s = ChooseTimeStep(*model, part.held_out, step, pool).step_s;
+    }
+    step.time_step_s = bench.time_step_s;
+    bench.contacts = ContactsOf(*model, part, step, pool);
     bench.by_windows = by_windows;
     ChooseWindows(*model, WindowsIn(options.replay_steps, *model, bench), &bench);
     bench.most_steps = MostSteps(options.effort, KeepToTime(*model, options, &bench, &fewer_windows));

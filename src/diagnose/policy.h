@@ -30,9 +30,13 @@ struct SearchPolicy {
   double tie = 0.1, tie_share = 0.05;  // what costs more by less than this, or this share of the member's gain, ties
   double simpler = 0.05;               // a richer effect that gains less over one that it contains gives way to it
   std::size_t jacobians = 24;          // kept, of the last fits: what the next ones begin with
-  double jacobian_numbers = 6e7;       // in all of them, half a gigabyte; the base model's and two more are kept anyway
-  std::size_t least_replays = 1500;    // that must fit into a time that is asked for: else fewer windows are fitted
-  std::size_t replays = 6000;          // of all training windows: what a diagnosis of normal effort may take
+  // Where fewer windows than this could be fitted, the time step is one whose halving changes the error by up to so
+  // much: a robot's error is known better from more of its motion than from a finer step.
+  std::size_t least_windows = 8;
+  double coarse_step = 0.03;
+  double jacobian_numbers = 6e7;     // in all of them, half a gigabyte; the base model's and two more are kept anyway
+  std::size_t least_replays = 1500;  // that must fit into a time that is asked for: else fewer windows are fitted
+  std::size_t replays = 6000;        // of all training windows: what a diagnosis of normal effort may take
   // Shares of that until which sets are begun and added to, and until which effects are tried in each other's place.
   // The rest is for judging, shares and intervals, which are never cut.
   double until_grown = 0.35, until_exchanged = 0.8;

@@ -25,15 +25,20 @@ int EstimateAddress(const mjModel& m, int actuator) {
   return m.plugin_stateadr[instance] + plugins::MotorState::kEstimate;
 }
 
+bool MayTouch(const mjModel& m) {
+  const auto any = [](const int* values, mjtSize count) {
+    return std::any_of(values, values + count, [](int value) { return value > 0; });
+  };
+  return !(m.opt.disableflags & mjDSBL_CONTACT) &&
+         (m.npair > 0 || m.nflex > 0 || any(m.geom_contype, m.ngeom) || any(m.geom_conaffinity, m.ngeom));
+}
+
 // Whether anything in the model could ever push, stop or rub by MuJoCo's constraint solver.
 bool MayConstrain(const mjModel& m) {
   const auto any = [](const auto* values, mjtSize count) {
     return std::any_of(values, values + count, [](auto value) { return value > 0; });
   };
-  const bool collides =
-      !(m.opt.disableflags & mjDSBL_CONTACT) &&
-      (m.npair > 0 || m.nflex > 0 || any(m.geom_contype, m.ngeom) || any(m.geom_conaffinity, m.ngeom));
-  return m.neq > 0 || collides || any(m.jnt_limited, m.njnt) || any(m.dof_frictionloss, m.nv) ||
+  return m.neq > 0 || MayTouch(m) || any(m.jnt_limited, m.njnt) || any(m.dof_frictionloss, m.nv) ||
          any(m.tendon_limited, m.ntendon) || any(m.tendon_frictionloss, m.ntendon);
 }
 
@@ -57,7 +62,7 @@ Result<std::shared_ptr<const Model>> Model::Load(const Experiment& experiment) {
 }
 
 Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig, const std::vector<EffectUse>& effects,
-                                                  const ScaleTable& scales) {
+                                                  const ScaleTable& scales, Contacts contacts) {
   std::shared_ptr<Model> model(new Model);
   model->rig_ = std::move(rig);
   model->effects_ = effects;
@@ -67,6 +72,7 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   GS_RETURN_IF_ERROR(structure.Finish());
   GiveRoomToDelays(structure.spec.get());
   structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step
+  if (contacts == Contacts::kNone) structure.spec->option.disableflags |= mjDSBL_CONTACT;
   GS_RETURN_IF_ERROR(model->Compile(&structure));
   model->FindMirrored();
   GS_RETURN_IF_ERROR(model->CheckInertias());
@@ -75,6 +81,8 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   model->FindMemories();
   return std::shared_ptr<const Model>(std::move(model));
 }
+
+bool Model::MayCollide() const { return MayTouch(*compiled_); }
 
 Status Model::Compile(Structure* structure) {
   const std::string& path = experiment().model_path;

@@ -51,13 +51,17 @@ struct ExportedModel {
   std::map<std::string, DriveLaw> laws;
 };
 
+// Whether bodies that touch are looked for.
+enum class Contacts { kAsTheMjcf, kNone };
+
 class Model {
  public:
   // The rig with effects added. Errors: a name in the experiment that the MJCF lacks (file:line and the nearest),
   // effects that do not go together, an expression that does not parse, a model that does not compile.
   static Result<std::shared_ptr<const Model>> Build(std::shared_ptr<const Rig> rig,
                                                     const std::vector<EffectUse>& effects = {},
-                                                    const ScaleTable& scales = {});
+                                                    const ScaleTable& scales = {},
+                                                    Contacts contacts = Contacts::kAsTheMjcf);
   // The experiment's model as it stands: of a rig of its own. Errors: as Rig::Load and Build.
   static Result<std::shared_ptr<const Model>> Load(const Experiment& experiment);
 
@@ -91,6 +95,8 @@ class Model {
   const std::vector<FreeStart>& free_starts() const { return free_starts_; }
   // Bodies on `hold` that stand where a measured pose is.
   const std::vector<FreeStart>& held_starts() const { return held_starts_; }
+  // Whether its bodies could touch each other.
+  bool MayCollide() const;
   // Whether quick steps (StepKind) are another thing than its own: two bodies on a stiff link always take their own.
   bool HasQuickSteps() const { return compiled().opt.integrator == mjINT_RK4 && mirrored_.empty(); }
 

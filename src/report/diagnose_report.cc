@@ -229,6 +229,8 @@ ordered_json JsonSearchPolicy() {
           {"search.tie_share", policy.search.tie_share},
           {"search.simpler", policy.search.simpler},
           {"search.jacobians", policy.search.jacobians},
+          {"search.least_windows", policy.search.least_windows},
+          {"search.coarse_step", policy.search.coarse_step},
           {"search.jacobian_numbers", policy.search.jacobian_numbers},
           {"search.least_replays", policy.search.least_replays},
           {"search.replays", policy.search.replays},

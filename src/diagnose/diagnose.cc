@@ -198,6 +198,20 @@ Contacts ContactsOf(const Model& model, const DataSplit& data, ReplayOptions opt
   return touches(data.train) || touches(data.held_out) ? Contacts::kAsTheMjcf : Contacts::kNone;
 }
 
+// Where too few windows could be fitted by the finer step, it is a coarser one.
+void ChooseSteps(const Model& model, const DiagnoseOptions& options, Workbench* bench) {
+  const SearchPolicy& policy = kDiagnosePolicy.search;
+  ReplayOptions replay{.mode = ReplayMode::kWindows, .window_s = options.window_s};
+  const auto choose = [&] { return ChooseTimeStep(model, bench->data->held_out, replay, bench->pool).step_s; };
+  bench->time_step_s = choose();
+  if (WindowsIn(options.replay_steps, model, *bench) < policy.least_windows) {
+    replay.step_error_share = policy.coarse_step;
+    bench->time_step_s = choose();
+  }
+  replay.time_step_s = bench->time_step_s;
+  bench->contacts = ContactsOf(model, *bench->data, replay, bench->pool);
+}
+
 // One replay of the training windows.
 struct OneReplay {
   std::size_t steps = 0;
@@ -286,14 +300,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .values = options.values,
                     .frozen = options.frozen};
     bench.sample_s = FinestStep(fine);
-    ReplayOptions step{.mode = ReplayMode::kWindows, .window_s = options.window_s};
-    bench.time_step_s = ChooseTimeStep(*model, part.held_out, step, pool).step_s;
-    if (WindowsIn(options.replay_steps, *model, bench) < kDiagnosePolicy.search.least_windows) {
-      step.step_error_share = kDiagnosePolicy.search.coarse_step;
-      bench.time_step_s = ChooseTimeStep(*model, part.held_out, step, pool).step_s;
-    }
-    step.time_step_s = bench.time_step_s;
-    bench.contacts = ContactsOf(*model, part, step, pool);
+    ChooseSteps(*model, options, &bench);
     bench.by_windows = by_windows;
     ChooseWindows(*model, WindowsIn(options.replay_steps, *model, bench), &bench);
     bench.most_steps = MostSteps(options.effort, KeepToTime(*model, options, &bench, &fewer_windows));

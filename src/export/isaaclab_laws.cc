@@ -4,7 +4,6 @@
 
 #include <fmt/core.h>
 
-
 #include "src/export/drive_laws.h"
 #include "src/export/python_text.h"
 

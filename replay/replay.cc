@@ -175,7 +175,6 @@ ReplayResult Replay(const Model& model, const std::vector<Recording>& recordings
     LogReplay& log = result.logs[jobs[i].log];
     ++log.windows;
     result.steps += runs[i].steps;
-    result.contacts = result.contacts || runs[i].contacts;
     if (runs[i].outcome == Outcome::kDiverged) {
       if (log.diverged_windows++ == 0) log.diverged_at_s = runs[i].diverged_at_s;
       log.outcome = Outcome::kDiverged;

@@ -51,7 +51,6 @@ struct ReplayResult {
   std::vector<LogReplay> logs;
   double wall_s = 0, simulated_s = 0;
   std::size_t steps = 0;
-  bool contacts = false;  // bodies touched
 };
 
 // The windows of a recording: one for a free run; else windows of `window_s`, the last one at least half as long.

@@ -270,7 +270,6 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
     if (row + 1 == window.end) break;
 
     result.steps += static_cast<std::size_t>(StepToNext(recording, row));
-    result.contacts = result.contacts || d->ncon > 0;
     if (!IsSane(*m, *d)) {
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;

@@ -26,7 +26,6 @@ struct RunResult {
   Outcome outcome = Outcome::kCompleted;
   double diverged_at_s = 0;  // the recording's time at the last good stamp
   std::size_t steps = 0;     // of the model's integrator, each as long as four quick ones
-  bool contacts = false;     // bodies touched
 };
 
 // Each step as the model's integrator makes it, or by one evaluation (semi-implicit Euler) where that one makes four: a

@@ -190,16 +190,21 @@ std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& be
       1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }
 
-// Where nothing touches while the base model replays the logs, nothing is looked for in what is fitted: of an arm that
-// is a third of a step.
-Contacts ContactsOf(const Model& model, const DataSplit& data, ReplayOptions options, ThreadPool& pool) {
+// Where it makes no difference to the base model's replays, no contact is looked for in what is fitted: of an arm with
+// collision geometry that is most of a step. Error: as Model::Build.
+Result<Contacts> ContactsOf(const Model& model, const DataSplit& data, const ReplayOptions& options, ThreadPool& pool) {
   if (!model.MayCollide()) return Contacts::kAsTheMjcf;
-  const auto touches = [&](const std::vector<Recording>& logs) { return Replay(model, logs, options, pool).contacts; };
-  return touches(data.train) || touches(data.held_out) ? Contacts::kAsTheMjcf : Contacts::kNone;
+  GS_ASSIGN(const auto without, Model::Build(model.rig(), {}, {}, Contacts::kNone));
+  for (const auto* logs : {&data.train, &data.held_out}) {
+    const double error = ReplayError(Replay(model, *logs, options, pool).logs),
+                 change = std::abs(error - ReplayError(Replay(*without, *logs, options, pool).logs));
+    if (!(change < options.step_error_share * error)) return Contacts::kAsTheMjcf;
+  }
+  return Contacts::kNone;
 }
 
 // Where too few windows could be fitted by the finer step, it is a coarser one.
-void ChooseSteps(const Model& model, const DiagnoseOptions& options, Workbench* bench) {
+Status ChooseSteps(const Model& model, const DiagnoseOptions& options, Workbench* bench) {
   const SearchPolicy& policy = kDiagnosePolicy.search;
   ReplayOptions replay{.mode = ReplayMode::kWindows, .window_s = options.window_s};
   const auto choose = [&] { return ChooseTimeStep(model, bench->data->held_out, replay, bench->pool).step_s; };
@@ -209,7 +214,8 @@ void ChooseSteps(const Model& model, const DiagnoseOptions& options, Workbench* 
     bench->time_step_s = choose();
   }
   replay.time_step_s = bench->time_step_s;
-  bench->contacts = ContactsOf(model, *bench->data, replay, bench->pool);
+  GS_ASSIGN(bench->contacts, ContactsOf(model, *bench->data, replay, bench->pool));
+  return Ok();
 }
 
 // One replay of the training windows.
@@ -288,7 +294,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   const Deadline deadline = DeadlineOf(options, begin);
   GS_ASSIGN(const auto journal, OpenJournal(*model, fine, options, deadline));
   bool fewer_windows = false;
-  const auto make_bench = [&](const DataSplit& part, bool by_windows) {
+  const auto make_bench = [&](const DataSplit& part, bool by_windows) -> Result<Workbench> {
     Workbench bench{.rig = model->rig(),
                     .data = &part,
                     .scales = scales,
@@ -300,7 +306,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
                     .values = options.values,
                     .frozen = options.frozen};
     bench.sample_s = FinestStep(fine);
-    ChooseSteps(*model, options, &bench);
+    GS_RETURN_IF_ERROR(ChooseSteps(*model, options, &bench));
     bench.by_windows = by_windows;
     ChooseWindows(*model, WindowsIn(options.replay_steps, *model, bench), &bench);
     bench.most_steps = MostSteps(options.effort, KeepToTime(*model, options, &bench, &fewer_windows));
@@ -308,7 +314,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
     bench.journal = journal.get();
     return bench;
   };
-  const Workbench bench = make_bench(data, false);
+  GS_ASSIGN(const Workbench bench, make_bench(data, false));
   at = &bench;
   GS_ASSIGN(auto found, FitBase(bench, say));
   const DescribeOptions describe{noise, options.seed, options.next_experiment};
@@ -317,7 +323,8 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   const DataSplit blocks = by_windows ? InWindows(data) : DataSplit{};
   std::unique_ptr<const Workbench> again;
   if (by_windows) {
-    again = std::make_unique<const Workbench>(make_bench(blocks, true));
+    GS_ASSIGN(Workbench in_windows, make_bench(blocks, true));
+    again = std::make_unique<const Workbench>(std::move(in_windows));
     at = again.get();
     found = nullptr;
     GS_ASSIGN(found, FitBase(*again, say));

@@ -58,13 +58,11 @@ struct MonitorRun {
 
   double Ratio() const { return error_now / error_before; }
   bool AParameterChanged() const { return !parameters.empty() && parameters.front().step.chance <= kFalseChange; }
-  bool MisfitGrew() const { return Grew(misfit); }
-  bool MoreIsLeft() const { return Grew(left); }
-  bool Changed() const { return AParameterChanged() || MisfitGrew() || MoreIsLeft(); }
+  bool Changed() const { return AParameterChanged() || Grown(misfit) || Grown(left); }
 
- private:
-  static bool Grew(const std::optional<ChangePoint>& step) {
-    return step && step->after > step->before && step->chance <= kFalseChange;
+  // Null where it did not grow.
+  static const ChangePoint* Grown(const std::optional<ChangePoint>& step) {
+    return step && step->after > step->before && step->chance <= kFalseChange ? &*step : nullptr;
   }
 };
 
@@ -245,7 +243,7 @@ ordered_json ToJson(const MonitorRun& run) {
                        {"logs", {{"before", run.before}, {"now", run.now}}},
                        {"problems", run.problems},
                        {"versions", JsonVersions()}};
-  if (run.MoreIsLeft()) json["left"]["diagnosis"] = run.diagnosis;
+  if (MonitorRun::Grown(run.left)) json["left"]["diagnosis"] = run.diagnosis;
   for (const auto& [name, unit, step] : run.parameters)
     json["parameters"].push_back({{"name", name},
                                   {"unit", unit},
@@ -262,21 +260,21 @@ std::string ToTable(const MonitorRun& run) {
   if (!run.Changed())
     return table + fmt::format("the same as before, as far as {} logs of the result and {} new ones can tell\n",
                                run.before.size(), run.now.size());
-  if (run.MisfitGrew())
+  if (const ChangePoint* misfit = MonitorRun::Grown(run.misfit))
     table += fmt::format(
         "changed: the result's model misses by {:.3g} times the sensors' noise, {:.3g} before (chance "
         "{:.1g})\n",
-        run.misfit->after, run.misfit->before, run.misfit->chance);
+        misfit->after, misfit->before, misfit->chance);
   for (const auto& [name, unit, step] : run.parameters) {
     if (step.chance <= kFalseChange)
       table += fmt::format("changed: {} from {:.4g} to {:.4g} {} (chance {:.1g})\n", name, step.before, step.after,
                            unit, step.chance);
   }
-  if (run.MoreIsLeft())
+  if (const ChangePoint* left = MonitorRun::Grown(run.left))
     table += fmt::format(
         "changed: what no parameter of it follows, {:.3g} times the noise, {:.3g} before (chance "
         "{:.1g}): the logs may hold an effect that it lacks\n  {}\n",
-        run.left->after, run.left->before, run.left->chance, run.diagnosis);
+        left->after, left->before, left->chance, run.diagnosis);
   return table;
 }
 

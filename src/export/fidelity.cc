@@ -8,10 +8,9 @@
 namespace gapscope {
 namespace {
 
-double ErrorOf(const Model& model, const FixedParameters& fixed, const std::vector<Recording>& logs, ThreadPool& pool,
-               StampShift* stamps = nullptr) {
+double ErrorOf(const Model& model, const FixedParameters& fixed, const std::vector<Recording>& logs, ThreadPool& pool) {
   const TuneOptions fit{.window_s = model.experiment().replay.window_s};
-  return ReplayError(Evaluate(model, logs, fixed, ReplayMode::kWindows, fit, pool, stamps));
+  return ReplayError(Evaluate(model, logs, fixed, ReplayMode::kWindows, fit, pool));
 }
 
 // The experiment on a file that holds its own values: what each log sets anew is set, and nothing else.
@@ -71,7 +70,7 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
       of_exported[i] = values[static_cast<std::size_t>(same)];
   }
   StampShift stamps;
-  errors.model = ErrorOf(model, {{values.begin(), values.end()}, std::nullopt}, logs, pool, &stamps);
+  errors.model = ErrorOf(model, {{values.begin(), values.end()}, std::nullopt, &stamps}, logs, pool);
   // How late a log's stamps are is the log's: found anew it would make up for delays that are rounded or not there, and
   // for half of an integrator's step.
   errors.nominal = ErrorOf(*nominal, {nominal->Nominal(), stamps}, logs, pool);

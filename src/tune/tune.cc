@@ -238,7 +238,7 @@ Found FitFromAll(const Fit& fit, TuneSummary* summary) {
 
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
                                 const FixedParameters& fixed, ReplayMode mode, const TuneOptions& options,
-                                ThreadPool& pool, StampShift* stamps) {
+                                ThreadPool& pool) {
   if (recordings.empty()) return {};
   FitOptions fit =
       MakeFitOptions(options, {}, mode == ReplayMode::kWindows ? ObjectiveKind::kWindows : ObjectiveKind::kFreeRun);
@@ -251,7 +251,7 @@ std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>
   Solved found = SolveStatesAndWeigh(problem, objective, problem.Start(), &work);
   if (std::isfinite(found.left.cost))
     found.point = Solve(problem, found.point, {.max_iterations = 8, .tolerance = 1e-3, .coarse_step = 0.01}).point;
-  if (stamps) *stamps = problem.Stamps(found.point);
+  if (fixed.found) *fixed.found = problem.Stamps(found.point);
   return problem.Predict(found.point);
 }
 

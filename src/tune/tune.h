@@ -62,10 +62,11 @@ Result<TuneSummary> Tune(const Model& model, const DataSplit& data, const std::v
 struct FixedParameters {
   const std::vector<double>& values;
   std::optional<StampShift> stamps;  // none: fitted too, within one sample
+  StampShift* found = nullptr;       // receives them
 };
 std::vector<LogReplay> Evaluate(const Model& model, const std::vector<Recording>& recordings,
                                 const FixedParameters& fixed, ReplayMode mode, const TuneOptions& options,
-                                ThreadPool& pool, StampShift* stamps = nullptr);
+                                ThreadPool& pool);
 
 }  // namespace gapscope
 

@@ -26,17 +26,9 @@ double LogError(const LogReplay& log) {
   int signals = 0;
   for (const auto& signal : log.signals) {
     if (!signal.scored) continue;
-    double error = 0;
-    std::size_t rows = 0;
-    for (std::size_t k = 0; k < signal.measured.size(); ++k) {
-      const double y = signal.measured[k];
-      if (!std::isfinite(y) || !std::isfinite(signal.predicted[k])) continue;
-      ++rows;
-      error += (signal.predicted[k] - y) * (signal.predicted[k] - y);
-    }
-    const double deviation = MomentsOf(signal.measured).deviation;
-    if (rows == 0 || !(deviation > 0)) continue;
-    sum += error / static_cast<double>(rows) / (deviation * deviation);
+    const double square = MeanSquareError(signal), deviation = MomentsOf(signal.measured).deviation;
+    if (std::isnan(square) || !(deviation > 0)) continue;
+    sum += square / (deviation * deviation);
     ++signals;
   }
   return signals == 0 ? kNaN : std::sqrt(sum / signals);
@@ -127,6 +119,18 @@ std::vector<Window> MakeWindows(const Recording& recording, ReplayMode mode, dou
     begin = end;
   }
   return windows;
+}
+
+double MeanSquareError(const SignalTrace& signal) {
+  double sum = 0;
+  std::size_t rows = 0;
+  for (std::size_t k = 0; k < signal.measured.size(); ++k) {
+    const double y = signal.measured[k];
+    if (!std::isfinite(y) || !std::isfinite(signal.predicted[k])) continue;
+    ++rows;
+    sum += (signal.predicted[k] - y) * (signal.predicted[k] - y);
+  }
+  return rows == 0 ? kNaN : sum / static_cast<double>(rows);
 }
 
 double ReplayError(const std::vector<LogReplay>& logs) {

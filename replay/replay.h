@@ -68,6 +68,9 @@ struct TimeStep {
 TimeStep ChooseTimeStep(const Model& model, const std::vector<Recording>& recordings, const ReplayOptions& options,
                         ThreadPool& pool);
 
+// Of predicted less measured, over the rows that have both; NaN: there are none.
+double MeanSquareError(const SignalTrace& signal);
+
 // Root mean square over scored signals of (RMSE / standard deviation of the measured signal), then over logs; NaN rows
 // are left out, a log that diverged gives infinity.
 double ReplayError(const std::vector<LogReplay>& logs);

@@ -50,8 +50,6 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
     const bool beside = mjcf ? effect.fidelity == Fidelity::kHost : effect.fidelity != Fidelity::kDropped;
     // The plugin stands in for a law beside the MJCF, as it was stepped beside it (tests/python/test_torch.py).
     if ((beside && !effect.by_sender) || effect.by_law) file.host.push_back(effect.use);
-    // All drives' commands are late by it, also of those that the engine itself would delay.
-    if (effect.by_law && effect.use == EffectUse{"command_delay", kOnAll}) file.delays_s.clear();
   }
   GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
   return Ok();

@@ -57,8 +57,9 @@ struct MonitorRun {
   std::string diagnosis;  // the command that names what the result lacks
 
   double Ratio() const { return error_now / error_before; }
-  bool AParameterChanged() const { return !parameters.empty() && parameters.front().step.chance <= kFalseChange; }
-  bool Changed() const { return AParameterChanged() || Grown(misfit) || Grown(left); }
+  bool Changed() const {
+    return (!parameters.empty() && parameters.front().step.chance <= kFalseChange) || Grown(misfit) || Grown(left);
+  }
 
   // Null where it did not grow.
   static const ChangePoint* Grown(const std::optional<ChangePoint>& step) {
@@ -97,19 +98,15 @@ Result<ResultLogs> LogsOf(const ordered_json& json, const std::string& where) {
   return logs;
 }
 
-// Root mean square of residual over noise, all scored signals alike.
-double OverNoise(const LogReplay& log) {
+// Root mean square of residual over noise, all scored signals alike. `noise`: of each signal.
+double OverNoise(const LogReplay& log, const std::vector<double>& noise) {
   double sum = 0;
   int signals = 0;
-  for (const SignalTrace& signal : log.signals) {
-    if (!signal.scored) continue;
-    double squares = 0, rows = 0;
-    for (std::size_t k = 0; k < signal.measured.size(); ++k) {
-      const double off = signal.measured[k] - signal.predicted[k];
-      if (std::isfinite(off)) squares += off * off, ++rows;
-    }
-    const double noise = SensorNoise(log.time_s, signal.measured, signal.resolution);
-    if (rows > 0 && noise > 0) sum += squares / rows / (noise * noise), ++signals;
+  for (std::size_t s = 0; s < log.signals.size(); ++s) {
+    const double square = MeanSquareError(log.signals[s]);
+    if (!log.signals[s].scored || std::isnan(square) || !(noise[s] > 0)) continue;
+    sum += square / (noise[s] * noise[s]);
+    ++signals;
   }
   return signals > 0 ? std::sqrt(sum / signals) : kNaN;
 }
@@ -118,17 +115,20 @@ LogFindings Look(const ResultModel& result, Recording recording, const CommonFla
   const ReplayDefaults& replay = result.model->rig()->experiment().replay;
   const TuneOptions options = DefaultTuneOptions(replay, 1, common.seed);
   LogFindings found{.sizes = std::vector<SeriesValue>(result.model->parameters().size(), {.value = kNaN})};
+  const auto noise = Collect(recording.measured, [&](const Recording::Measured& signal) {
+    return SensorNoise(recording.time_s, signal.values, signal.spec.resolution);
+  });
   std::vector<Recording> one;
   one.push_back(std::move(recording));
   const auto as_it_is = Evaluate(*result.model, one, {result.values, std::nullopt}, replay.mode, options, pool);
   found.error = ReplayError(as_it_is);
-  found.misfit = OverNoise(as_it_is.front());
+  found.misfit = OverNoise(as_it_is.front(), noise);
   const auto tuned = Tune(*result.model, SplitData(std::move(one), {}), result.values, options, pool);
   if (!tuned.ok()) {
     found.problems.push_back(tuned.error().Text());
     return found;
   }
-  found.left = OverNoise(tuned.value().train.front());
+  found.left = OverNoise(tuned.value().train.front(), noise);
   for (const TunedParameter& p : tuned.value().tuned) {
     if (p.identifiable)
       found.sizes[static_cast<std::size_t>(p.index)] = {p.value, (p.high - p.low) / (2 * kNormalQuantile)};
@@ -244,12 +244,11 @@ ordered_json ToJson(const MonitorRun& run) {
                        {"problems", run.problems},
                        {"versions", JsonVersions()}};
   if (MonitorRun::Grown(run.left)) json["left"]["diagnosis"] = run.diagnosis;
-  for (const auto& [name, unit, step] : run.parameters)
-    json["parameters"].push_back({{"name", name},
-                                  {"unit", unit},
-                                  {"before", JsonNumber(step.before)},
-                                  {"now", JsonNumber(step.after)},
-                                  {"chance", JsonNumber(step.chance)}});
+  for (const auto& [name, unit, step] : run.parameters) {
+    ordered_json one = {{"name", name}, {"unit", unit}};
+    one.update(StepJson(step));
+    json["parameters"].push_back(std::move(one));
+  }
   return json;
 }
 

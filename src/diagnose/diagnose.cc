@@ -10,6 +10,7 @@
 #include "src/core/file.h"
 #include "src/core/names.h"
 #include "src/core/statistics.h"
+#include "src/diagnose/base_fit.h"
 #include "src/diagnose/coarsen.h"
 #include "src/diagnose/columns.h"
 #include "src/diagnose/describe.h"
@@ -203,7 +204,7 @@ Result<Contacts> ContactsOf(const Model& model, const DataSplit& data, const Rep
   return Contacts::kNone;
 }
 
-// Where too few windows could be fitted by the finer step, it is a coarser one.
+// How the model is stepped. Where too few windows could be fitted by the finer time step, it is a coarser one.
 Status ChooseSteps(const Model& model, const DiagnoseOptions& options, Workbench* bench) {
   const SearchPolicy& policy = kDiagnosePolicy.search;
   ReplayOptions replay{.mode = ReplayMode::kWindows, .window_s = options.window_s};

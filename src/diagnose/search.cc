@@ -7,10 +7,10 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
+#include "src/diagnose/base_fit.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
-#include "src/diagnose/torques.h"
 
 namespace gapscope {
 namespace {
@@ -32,43 +32,13 @@ class Searcher {
  public:
   Searcher(const Workbench& bench, const Say& say, SearchResult* result) : bench_(bench), say_(say), result_(*result) {}
 
-  Status Fit() {
-    say_("refitting the baseline");
-    GS_ASSIGN(Candidate nominal, MakeCandidate(bench_, {}));
-    nominal.point = nominal.problem->Start();
-    nominal.train_cost = nominal.problem->Evaluate(nominal.point, Keep::kCost).cost;
-    if (!std::isfinite(nominal.train_cost)) {
-      return Error{.what = "the base model cannot be simulated along these logs, even in windows",
-                   .where = bench_.rig->experiment().path,
-                   .cure = "check units, signs and nominal parameters with `gapscope replay --mode windows`"};
-    }
-    ScoreCandidate(bench_, &nominal);
-    FindCoupling(nominal);
-    result_.nominal = std::make_unique<Candidate>(std::move(nominal));
-    result_.base = result_.ledger.Refit({}, *result_.nominal, {}, {}, Effort::kFinish);
-    for (std::size_t round = 0; round < kPolicy.widenings && WidenBounds(*result_.base); ++round) {
-      GS_ASSIGN(Candidate wider, MakeCandidate(bench_, {}));
-      wider.values = result_.base->values;
-      wider.point = CarryOver(*result_.base->problem, result_.base->point, *wider.problem, wider.values);
-      result_.ledger.Clear();
-      result_.base = result_.ledger.Refit({}, wider, {}, {}, Effort::kFinish);
-    }
-    ScoreCandidate(bench_, result_.base);
-    result_.chosen = result_.base;
-    for (const auto& use : AllUses(*bench_.rig)) {
-      if (Has(bench_.known, use) || IsOfMissingSensor(use, *bench_.rig, result_.logged)) continue;
-      if (IsFinding(use, *result_.base->model)) result_.uses.push_back(use);
-    }
-    return Ok();
-  }
-
   void Find(const std::vector<Hint>& hints) {
     for (const Hint& hint : hints) {
       if (hint.effects.empty()) result_.ledger.Refit({}, *result_.base, hint.values, {}, Effort::kFinish);
     }
     ScoreCandidate(bench_, result_.base);
     say_("columns of all effects");
-    FindCoupling(*result_.base);
+    MeasureCoupling(bench_, *result_.base);
     SplitTrainCost(bench_, result_.base);
     result_.columns = MakeColumns(bench_, *result_.base, result_.uses, {});
     if (!result_.columns.valid) return;
@@ -82,26 +52,16 @@ class Searcher {
     // However little may be done, the first sets are looked at.
     until_ = kPolicy.until_grown;
     Grow(Leaders());
-    Lead();
-    Settle();
-    // What leads after an exchange has other gaps than what growth ended on.
     until_ = kPolicy.until_exchanged;
-    GrowToTheEnd();
-    if (RefitFromNominal(counts)) {
+    bool begun_anew = false;
+    // What leads after an exchange has other gaps than what growth ended on.
+    do {
       Lead();
       Settle();
-      GrowToTheEnd();
-    }
+    } while (GrowFurther() || (!std::exchange(begun_anew, true) && RefitFromNominal(counts)));
   }
 
  private:
-  void GrowToTheEnd() {
-    while (GrowFurther()) {
-      Lead();
-      Settle();
-    }
-  }
-
   // A base model that was refitted without an effect may have gone to where it imitates that, and no small step leads
   // on from there. So with the work that is left sets are begun from the model as it is given, too. Whether another set
   // leads then.
@@ -113,16 +73,6 @@ class Searcher {
     if (!table.valid) return false;
     RefitSets(*result_.nominal, table, counts);
     return Leaders().front() != leader;
-  }
-
-  // Few joints, or one drive's, all touch.
-  void FindCoupling(Candidate& at) {
-    constexpr std::size_t kFew = 2;
-    if (bench_.rig->Actuators().size() <= kFew) return;
-    const std::vector<ProbeTorque> torques = MakeTorques(bench_);
-    const auto other = [&](const ProbeTorque& torque) { return torque.joint != torques.front().joint; };
-    if (std::none_of(torques.begin(), torques.end(), other)) return;
-    *bench_.coupling = Coupling::Measure(*at.problem, at.point, torques, bench_.work.get());
   }
 
   // Members are taken out and others tried in their places, until neither changes the set. What is known of members
@@ -138,23 +88,6 @@ class Searcher {
     if (!bench_.Late(share)) return false;
     if (result_.cut.empty() || result_.cut.back() != what) result_.cut.emplace_back(what);
     return true;
-  }
-
-  // Base parameters that ended on a bound get as much room again beyond it: an effect must not stand in for a value
-  // that the experiment file happens to exclude. Zero is a bound of physics. False: there are none.
-  bool WidenBounds(const Candidate& base) {
-    bool widened = false;
-    for (const Coordinate& c : base.problem->space().coordinates()) {
-      const Parameter& p = base.problem->space().parameter(c);
-      const OnBound bound = BoundOf(base.values[static_cast<std::size_t>(c.parameter)], p.low, p.high);
-      if (bound == OnBound::kNo || (bound == OnBound::kLow && p.low == 0)) continue;
-      const double factor = p.low > 0 ? p.high / p.low : 0, width = p.high - p.low;
-      const double low = p.low > 0 ? p.low / factor : p.low - width,
-                   high = p.low > 0 ? p.high * factor : p.high + width;
-      (*bench_.bounds)[p.name] = {bound == OnBound::kLow ? low : p.low, bound == OnBound::kHigh ? high : p.high};
-      widened = true;
-    }
-    return widened;
   }
 
   // By limb, whether it can move by the effects.
@@ -481,19 +414,6 @@ double Gain(const Candidate& without, const Candidate& with) {
 }
 
 double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(kPolicy.far_behind); }
-
-Result<std::unique_ptr<SearchResult>> FitBase(const Workbench& bench, const Say& say) {
-  auto result = std::make_unique<SearchResult>(bench);
-  result->logged = WhatIsLogged(bench.data->train);
-  Searcher searcher(bench, say, result.get());
-  GS_RETURN_IF_ERROR(searcher.Fit());
-  const double train_floors = std::sqrt(
-      2 * result->base->train_cost / static_cast<double>(std::max<std::size_t>(1, result->base->problem->residuals())));
-  constexpr double kUneven = 1.5;
-  result->uneven =
-      std::max(train_floors / result->base->held_out_floors, result->base->held_out_floors / train_floors) > kUneven;
-  return result;
-}
 
 void FindEffects(const Workbench& bench, const std::vector<Hint>& hints, const Say& say, SearchResult* result) {
   Searcher(bench, say, result).Find(hints);

@@ -42,9 +42,6 @@ double Gain(const Candidate& without, const Candidate& with);
 // The cost above which a set is so far behind the chosen one that it matters little how far.
 double FarBehind(const Candidate& chosen);
 
-// The base model, refitted; nothing is searched yet. Errors: it cannot be simulated along the logs.
-Result<std::unique_ptr<SearchResult>> FitBase(const Workbench& bench, const Say& say);
-
 // A set of effects, and values of its parameters, that a search elsewhere ended at.
 struct Hint {
   EffectSet effects;

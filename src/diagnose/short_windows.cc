@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "src/diagnose/base_fit.h"
 #include "src/diagnose/policy.h"
 
 namespace gapscope {

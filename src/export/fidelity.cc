@@ -56,8 +56,11 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
   }
   std::vector<EffectUse> beside = file.host;
   std::map<std::string, double> late;
+  const auto delay_of = [](const std::string& on) { return EffectUse{"command_delay", on}; };
   for (const auto& [drive, delay_s] : file.delays_s) {
-    beside.push_back({"command_delay", drive});
+    // The host's delay of all drives is of this one too.
+    if (std::ranges::find(file.host, delay_of(kOnAll)) != file.host.end()) break;
+    beside.push_back(delay_of(drive));
     late[beside.back().Text() + ".delay_s"] = delay_s;
   }
   GS_ASSIGN(const auto exported, Model::Build(std::move(rig), beside, {}));

@@ -25,21 +25,21 @@ int EstimateAddress(const mjModel& m, int actuator) {
   return m.plugin_stateadr[instance] + plugins::MotorState::kEstimate;
 }
 
+template <class Value>
+bool AnyAboveZero(const Value* values, mjtSize count) {
+  return std::any_of(values, values + count, [](Value value) { return value > 0; });
+}
+
 bool MayTouch(const mjModel& m) {
-  const auto any = [](const int* values, mjtSize count) {
-    return std::any_of(values, values + count, [](int value) { return value > 0; });
-  };
   return !(m.opt.disableflags & mjDSBL_CONTACT) &&
-         (m.npair > 0 || m.nflex > 0 || any(m.geom_contype, m.ngeom) || any(m.geom_conaffinity, m.ngeom));
+         (m.npair > 0 || m.nflex > 0 || AnyAboveZero(m.geom_contype, m.ngeom) ||
+          AnyAboveZero(m.geom_conaffinity, m.ngeom));
 }
 
 // Whether anything in the model could ever push, stop or rub by MuJoCo's constraint solver.
 bool MayConstrain(const mjModel& m) {
-  const auto any = [](const auto* values, mjtSize count) {
-    return std::any_of(values, values + count, [](auto value) { return value > 0; });
-  };
-  return m.neq > 0 || MayTouch(m) || any(m.jnt_limited, m.njnt) || any(m.dof_frictionloss, m.nv) ||
-         any(m.tendon_limited, m.ntendon) || any(m.tendon_frictionloss, m.ntendon);
+  return m.neq > 0 || MayTouch(m) || AnyAboveZero(m.jnt_limited, m.njnt) || AnyAboveZero(m.dof_frictionloss, m.nv) ||
+         AnyAboveZero(m.tendon_limited, m.ntendon) || AnyAboveZero(m.tendon_frictionloss, m.ntendon);
 }
 
 // A replay takes shorter steps than the MJCF says where stamps lie closer: an actuator that is late must remember as

@@ -11,7 +11,7 @@ namespace gapscope::bench {
 namespace {
 
 constexpr double kSeconds = 10;
-constexpr int kRepeats = 3;
+constexpr int kRenders = 3;
 
 }  // namespace
 
@@ -30,7 +30,7 @@ Result<std::vector<Row>> RenderRows(const BenchOptions& options) {
     const std::vector<VideoModel> models = {{"nominal", bench_case.model, bench_case.values}};
     std::vector<double> ratios;
     VideoSummary last;
-    for (int k = 0; k <= kRepeats; ++k) {
+    for (int k = 0; k <= kRenders; ++k) {
       GS_ASSIGN(last, RenderVideo(recording, models, {.out = out, .frames_per_s = 30}, pool));
       if (k > 0) ratios.push_back(last.length_s / last.wall_s);  // the first one warms the shader compiler's caches
       std::filesystem::remove(out);

@@ -12,8 +12,8 @@
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kRounding = 1e-9;
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
+constexpr double kConditionsRounding = 1e-9;
 
 // A log whose arrays outlive the input that looks at them.
 struct TestLog {
@@ -70,7 +70,7 @@ TestLog WithNoise(TestLog log, unsigned seed) {
 
 TEST(ConditionsTest, SharesAddUpToOneWithinEachFamily) {
   TestLog log = WithNoise(Sine(), 1);
-  log.predicted[17] = log.measured[100] = log.speed[200] = log.angle[3000] = kNaN;
+  log.predicted[17] = log.measured[100] = log.speed[200] = log.angle[3000] = kNoValue;
   const std::vector<ConditionShare> shares = LocateError(log.Input());
   std::map<ConditionFamily, double> error, time;
   for (const ConditionShare& share : shares) {
@@ -81,8 +81,8 @@ TEST(ConditionsTest, SharesAddUpToOneWithinEachFamily) {
     EXPECT_EQ(share.signal, "arm_rad");
   }
   EXPECT_EQ(error.size(), 7u);
-  for (const auto& [family, sum] : error) EXPECT_NEAR(sum, 1, kRounding);
-  for (const auto& [family, sum] : time) EXPECT_NEAR(sum, 1, kRounding);
+  for (const auto& [family, sum] : error) EXPECT_NEAR(sum, 1, kConditionsRounding);
+  for (const auto& [family, sum] : time) EXPECT_NEAR(sum, 1, kConditionsRounding);
 }
 
 TEST(ConditionsTest, NamesHoldTheLimitsThatWereUsed) {
@@ -106,7 +106,7 @@ TEST(ConditionsTest, AnErrorPutIntoAConditionIsFoundThere) {
     if (log.speed[i] >= 0.16) log.predicted[i] += 0.1;
   }
   const std::vector<ConditionShare> shares = LocateError(log.Input());
-  EXPECT_NEAR(Find(shares, "direction positive")->share_of_error, 1, kRounding);
+  EXPECT_NEAR(Find(shares, "direction positive")->share_of_error, 1, kConditionsRounding);
   EXPECT_EQ(Find(shares, "direction negative")->share_of_error, 0);
   const std::vector<ConditionShare> telling = MostTelling(shares);
   ASSERT_FALSE(telling.empty());
@@ -124,7 +124,7 @@ TEST(ConditionsTest, ReversalsCountFromTheChangeOfSign) {
   const std::vector<ConditionShare> shares = LocateError(log.Input());
   const ConditionShare* after = Find(shares, "0..0.1 s after reversal");
   ASSERT_NE(after, nullptr);
-  EXPECT_NEAR(after->share_of_error, 1, kRounding);
+  EXPECT_NEAR(after->share_of_error, 1, kConditionsRounding);
   EXPECT_NEAR(after->share_of_time, 0.1, 0.002);
   EXPECT_NEAR(Find(shares, "before the first reversal")->share_of_time, 0.05, 0.002);
   EXPECT_NEAR(Find(shares, "> 0.3 s after reversal")->share_of_time, 9 * 0.07 + 0.02, 0.002);
@@ -240,7 +240,7 @@ TEST(ConditionsTest, TinyPerfectAndConstantInputsSayNothing) {
   for (auto* values : {&still.measured, &still.speed, &still.command, &still.angle}) values->assign(5000, 0);
   for (const ConditionShare& share : LocateError(still.Input())) EXPECT_EQ(share.family, ConditionFamily::kTime);
   TestLog lost = Sine();
-  lost.predicted.assign(5000, kNaN);
+  lost.predicted.assign(5000, kNoValue);
   EXPECT_TRUE(LocateError(lost.Input()).empty());
 }
 
@@ -252,7 +252,7 @@ TEST(ConditionsTest, ExtremeNumbersNeitherOverflowNorCrash) {
     }
     for (const ConditionShare& share : LocateError(log.Input())) {
       EXPECT_GE(share.share_of_error, 0) << share.condition;
-      EXPECT_LE(share.share_of_error, 1 + kRounding) << share.condition;
+      EXPECT_LE(share.share_of_error, 1 + kConditionsRounding) << share.condition;
     }
   }
 }
@@ -303,7 +303,7 @@ TEST(MostTellingTest, KeepsWhatIsClearOfItsTimeAndSortsIt) {
   using enum ConditionFamily;
   const std::vector<ConditionShare> shares = {
       share("q", "unclear", 0.6, 0.1, 0.05, kSpeed), share("q", "small", 0.05, 0.01, 0.04, kSpeed),
-      share("q", "close", 0.55, 0.5, 0.52, kSpeed),  share("q", "no interval", 0.9, 0.1, kNaN, kSpeed),
+      share("q", "close", 0.55, 0.5, 0.52, kSpeed),  share("q", "no interval", 0.9, 0.1, kNoValue, kSpeed),
       share("q", "third", 0.5, 0.1, 0.2, kTime),     share("q", "first", 0.8, 0.1, 0.7, kTime),
       share("p", "equal", 0.8, 0.1, 0.7, kTime),     share("q", "second", 0.6, 0.1, 0.4, kTime)};
   const std::vector<ConditionShare> telling = MostTelling(shares);

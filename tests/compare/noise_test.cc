@@ -11,9 +11,9 @@
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoSample = std::numeric_limits<double>::quiet_NaN();
 
-std::vector<double> Times(std::size_t n, double step_s) {
+std::vector<double> SampleTimes(std::size_t n, double step_s) {
   std::vector<double> time_s(n);
   for (std::size_t i = 0; i < n; ++i) time_s[i] = static_cast<double>(i) * step_s;
   return time_s;
@@ -33,7 +33,7 @@ std::vector<double> Coloured(std::size_t n, double phi, unsigned seed) {
 }
 
 // A robot's motion: a chirp to 3 Hz, 1 rad.
-std::vector<double> Motion(const std::vector<double>& time_s) {
+std::vector<double> NoisyMotion(const std::vector<double>& time_s) {
   std::vector<double> values;
   for (const double t : time_s) values.push_back(std::sin(2 * M_PI * (0.1 * t + 0.145 * t * t)));
   return values;
@@ -63,10 +63,10 @@ TEST(CorrelationTimeTest, TinyConstantAndMissing) {
   EXPECT_TRUE(std::isnan(CorrelationTime({}, 1)));
   EXPECT_TRUE(std::isnan(CorrelationTime(std::vector<double>{1, 2}, 1)));
   EXPECT_TRUE(std::isnan(CorrelationTime(std::vector<double>(50, 0.1), 1)));
-  EXPECT_TRUE(std::isnan(CorrelationTime(std::vector<double>(50, kNaN), 1)));
+  EXPECT_TRUE(std::isnan(CorrelationTime(std::vector<double>(50, kNoSample), 1)));
   std::vector<double> values = Coloured(20000, 0.9, 1);
   const double whole = CorrelationTime(values, 1);
-  for (std::size_t i = 0; i < values.size(); i += 50) values[i] = kNaN;
+  for (std::size_t i = 0; i < values.size(); i += 50) values[i] = kNoSample;
   EXPECT_NEAR(CorrelationTime(values, 1) / whole, 1, 0.05);
 }
 
@@ -76,7 +76,7 @@ TEST(EffectiveSamplesTest, ByHand) {
   EXPECT_EQ(EffectiveSamples(1000, 1), 1);
   EXPECT_EQ(EffectiveSamples(1000, -0.5), 1000);
   EXPECT_TRUE(std::isnan(EffectiveSamples(0, 0.5)));
-  EXPECT_TRUE(std::isnan(EffectiveSamples(10, kNaN)));
+  EXPECT_TRUE(std::isnan(EffectiveSamples(10, kNoSample)));
   EXPECT_TRUE(std::isnan(EffectiveSamples(10, 1.5)));
 }
 
@@ -88,10 +88,10 @@ struct Case {
 // Median over seeds of estimated over true total, and the share of seeds within a factor 1.5.
 void ExpectTotal(const Case& c, double tolerance) {
   const double step_s = 0.002;
-  const std::vector<double> time_s = Times(5000, step_s);
+  const std::vector<double> time_s = SampleTimes(5000, step_s);
   std::vector<double> ratios;
   for (unsigned seed = 0; seed < 21; ++seed) {
-    std::vector<double> values = c.moving ? Motion(time_s) : std::vector<double>(time_s.size());
+    std::vector<double> values = c.moving ? NoisyMotion(time_s) : std::vector<double>(time_s.size());
     const std::vector<double> white = Coloured(time_s.size(), 0, 2 * seed);
     const std::vector<double> slow = Coloured(time_s.size(), std::exp(-step_s / c.tau_s), 2 * seed + 1);
     for (std::size_t i = 0; i < values.size(); ++i) values[i] += c.white * white[i] + c.coloured * slow[i];
@@ -113,8 +113,9 @@ TEST(NoiseTest, WhiteNoiseOnMotionAndAlone) {
 
 // A sensor at a third of the log's rate: lines between its values would pass for less noise.
 TEST(NoiseTest, ASlowerSensorIsJudgedOnItsOwnRows) {
-  const std::vector<double> time_s = Times(15000, 0.002), motion = Motion(time_s), noise = Coloured(15000, 0, 3);
-  std::vector<double> values(time_s.size(), kNaN), own_time_s, own;
+  const std::vector<double> time_s = SampleTimes(15000, 0.002), motion = NoisyMotion(time_s),
+                            noise = Coloured(15000, 0, 3);
+  std::vector<double> values(time_s.size(), kNoSample), own_time_s, own;
   for (std::size_t i = 0; i < values.size(); i += 3) {
     values[i] = 0.1 * motion[i] + 1e-3 * noise[i];
     own_time_s.push_back(time_s[i]);
@@ -133,7 +134,7 @@ TEST(NoiseTest, ColouredNoiseOnMotionAndAlone) {
 
 TEST(NoiseTest, PartsAreToldApart) {
   const double step_s = 0.002;
-  const std::vector<double> time_s = Times(20000, step_s);
+  const std::vector<double> time_s = SampleTimes(20000, step_s);
   const std::vector<double> white = Coloured(time_s.size(), 0, 1), slow = Coloured(time_s.size(), std::exp(-0.1), 2);
   std::vector<double> values(time_s.size());
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = 1e-3 * white[i] + 2e-3 * slow[i];
@@ -148,9 +149,9 @@ TEST(NoiseTest, PartsAreToldApart) {
 }
 
 TEST(NoiseTest, QuantisationOfAMovingSignalIsSeenAndOfAStillOneIsTheResolution) {
-  const std::vector<double> time_s = Times(5000, 0.002);
+  const std::vector<double> time_s = SampleTimes(5000, 0.002);
   const double resolution = 0.003;
-  std::vector<double> values = Motion(time_s);
+  std::vector<double> values = NoisyMotion(time_s);
   for (double& value : values) value = resolution * std::round(value / resolution);
   const NoiseFloor moving = EstimateNoise(time_s, values, {.resolution = resolution, .motion_band_hz = 0});
   EXPECT_NEAR(moving.quantisation_std, resolution / std::sqrt(12.0), 1e-15);
@@ -163,22 +164,22 @@ TEST(NoiseTest, QuantisationOfAMovingSignalIsSeenAndOfAStillOneIsTheResolution) 
 }
 
 TEST(NoiseTest, AGivenBandIsUsedAndTinyInputsGiveNaN) {
-  const std::vector<double> time_s = Times(5000, 0.002);
+  const std::vector<double> time_s = SampleTimes(5000, 0.002);
   const NoiseFloor floor = EstimateNoise(time_s, Coloured(5000, 0, 3), {.resolution = 0, .motion_band_hz = 50});
   EXPECT_GE(floor.band_low_hz, 50);
   EXPECT_LE(floor.band_high_hz, 0.95 * 250);
   EXPECT_NEAR(floor.white_std, 1, 0.05);
   for (const std::size_t n : {0u, 1u, 2u, 63u}) {
     const NoiseFloor tiny =
-        EstimateNoise(Times(n, 1), std::vector<double>(n, 1), {.resolution = 1, .motion_band_hz = 0});
+        EstimateNoise(SampleTimes(n, 1), std::vector<double>(n, 1), {.resolution = 1, .motion_band_hz = 0});
     EXPECT_TRUE(std::isnan(tiny.total_std) && std::isnan(tiny.white_std));
     EXPECT_GT(tiny.quantisation_std, 0);
   }
-  EXPECT_TRUE(std::isnan(EstimateNoise(time_s, std::vector<double>(5000, kNaN)).total_std));
+  EXPECT_TRUE(std::isnan(EstimateNoise(time_s, std::vector<double>(5000, kNoSample)).total_std));
   // A band above all that the rate allows has nothing in it.
   EXPECT_TRUE(
       std::isnan(EstimateNoise(time_s, Coloured(5000, 0, 3), {.resolution = 0, .motion_band_hz = 1e300}).total_std));
-  EXPECT_FALSE(std::isnan(EstimateNoise(Times(64, 0.01), Coloured(64, 0, 3)).total_std));
+  EXPECT_FALSE(std::isnan(EstimateNoise(SampleTimes(64, 0.01), Coloured(64, 0, 3)).total_std));
 }
 
 }  // namespace

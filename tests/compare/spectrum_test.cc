@@ -10,8 +10,8 @@
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kRounding = 1e-10;
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
+constexpr double kSpectrumRounding = 1e-10;
 
 std::vector<double> Noise(std::size_t n, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -23,15 +23,15 @@ std::vector<double> Noise(std::size_t n, unsigned seed) {
 
 TEST(SpectrumTest, MedianStepIgnoresAGap) {
   const std::vector<double> time_s = {0, 0.01, 0.02, 5, 5.01};
-  EXPECT_NEAR(MedianStep(time_s), 0.01, kRounding);
+  EXPECT_NEAR(MedianStep(time_s), 0.01, kSpectrumRounding);
   EXPECT_TRUE(std::isnan(MedianStep(std::vector<double>{1})));
   EXPECT_TRUE(std::isnan(MedianStep({})));
 }
 
 TEST(SpectrumTest, FillGapsBridgesByLinesAndHoldsTheEnds) {
-  const std::vector<double> values = {kNaN, 1, kNaN, kNaN, 4, kNaN};
+  const std::vector<double> values = {kGap, 1, kGap, kGap, 4, kGap};
   EXPECT_EQ(FillGaps(values), (std::vector<double>{1, 1, 2, 3, 4, 4}));
-  EXPECT_TRUE(FillGaps(std::vector<double>{kNaN, kNaN}).empty());
+  EXPECT_TRUE(FillGaps(std::vector<double>{kGap, kGap}).empty());
 }
 
 TEST(SpectrumTest, CrossCorrelationEqualsItsSumForOneBlockAndMany) {
@@ -46,7 +46,7 @@ TEST(SpectrumTest, CrossCorrelationEqualsItsSumForOneBlockAndMany) {
           const auto row = static_cast<long>(i + j) - static_cast<long>(max_lag);
           if (row >= 0 && row < static_cast<long>(n)) sum += a[static_cast<std::size_t>(row)] * b[i];
         }
-        EXPECT_NEAR(got[j], sum, kRounding) << n << " rows, lag " << j << " - " << max_lag;
+        EXPECT_NEAR(got[j], sum, kSpectrumRounding) << n << " rows, lag " << j << " - " << max_lag;
       }
     }
   }
@@ -58,13 +58,13 @@ TEST(SpectrumTest, BandsAddUpToTheSignalAndToItsMeanSquare) {
     const BandSplitter splitter(values, 0.01);
     const std::size_t middle = splitter.bins() / 3;
     const std::vector<double> low = splitter.Part(0, middle), high = splitter.Part(middle, splitter.bins());
-    for (std::size_t i = 0; i < n; ++i) EXPECT_NEAR(low[i] + high[i], values[i], kRounding);
+    for (std::size_t i = 0; i < n; ++i) EXPECT_NEAR(low[i] + high[i], values[i], kSpectrumRounding);
   }
   const std::vector<double> values = Noise(1000, 3);  // 1000 is a quick length: no row is mirrored twice
   const BandSplitter splitter(values, 0.01);
   const double power = std::accumulate(splitter.power().begin(), splitter.power().end(), 0.0);
-  EXPECT_NEAR(power, std::inner_product(values.begin(), values.end(), values.begin(), 0.0) / 1000, kRounding);
-  EXPECT_NEAR(splitter.bin_hz(), 1 / (2 * 1000 * 0.01), kRounding);
+  EXPECT_NEAR(power, std::inner_product(values.begin(), values.end(), values.begin(), 0.0) / 1000, kSpectrumRounding);
+  EXPECT_NEAR(splitter.bin_hz(), 1 / (2 * 1000 * 0.01), kSpectrumRounding);
 }
 
 TEST(SpectrumTest, WelchGivesWhiteNoiseItsDensityAndASineItsPower) {

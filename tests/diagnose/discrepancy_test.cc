@@ -12,10 +12,10 @@ namespace {
 constexpr Eigen::Index kTorques = 12, kRows = 400;
 
 // Columns: an effect, twelve torques, the residual.
-struct Bank {
+struct TorqueBank {
   Eigen::MatrixXd rows;
   ColumnTable table;
-  Bank() {
+  TorqueBank() {
     std::mt19937_64 random(5);
     std::normal_distribution<double> normal;
     rows = Eigen::MatrixXd::NullaryExpr(kRows, kTorques + 2, [&] { return normal(random); });
@@ -36,7 +36,7 @@ struct Bank {
 };
 
 TEST(DiscrepancyTest, AnEffectThatNoTorqueHoldsCounts) {
-  Bank bank;
+  TorqueBank bank;
   bank.rows.col(kTorques + 1) = -5 * bank.rows.col(0) + bank.rows.col(kTorques + 1);
   // 200 numbers that count; their square falls from 26 to 1: half of it times ln 26, less the torques' own share.
   EXPECT_NEAR(bank.Evidence(), 100 * std::log(26.0), 15);
@@ -44,7 +44,7 @@ TEST(DiscrepancyTest, AnEffectThatNoTorqueHoldsCounts) {
 
 // One torque of many that are there beside it: the others' size says that it may well be no effect.
 TEST(DiscrepancyTest, AnEffectAmongTorquesOfItsSizeHardlyCounts) {
-  Bank bank;
+  TorqueBank bank;
   std::mt19937_64 random(8);
   std::normal_distribution<double> normal;
   for (Eigen::Index t = 1; t <= kTorques; ++t) bank.rows.col(kTorques + 1) += 5 * normal(random) * bank.rows.col(t);
@@ -53,7 +53,7 @@ TEST(DiscrepancyTest, AnEffectAmongTorquesOfItsSizeHardlyCounts) {
 }
 
 TEST(DiscrepancyTest, AnEffectThatIsNotThereCountsAgainst) {
-  Bank bank;
+  TorqueBank bank;
   EXPECT_NEAR(bank.Evidence(), 0, 2);
 }
 

@@ -8,14 +8,14 @@
 namespace gapscope {
 namespace {
 
-constexpr std::size_t kRows = 400;
+constexpr std::size_t kRemainderRows = 400;
 
 Recording Sweep(const std::string& path, double amplitude) {
   Recording r;
   r.log_path = path;
   Recording::Command command;
   Recording::Measured measured{.spec = {}, .index = 0};
-  for (std::size_t k = 0; k < kRows; ++k) {
+  for (std::size_t k = 0; k < kRemainderRows; ++k) {
     const double t = 0.01 * static_cast<double>(k);
     r.time_s.push_back(t);
     command.values.push_back(amplitude * std::sin(3 * t));

@@ -4,8 +4,8 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr double kKp = 6, kKd = 0.3;  // N m/rad, N m s/rad
-constexpr double kWithin = 0.1;       // of the gain; the target is held, which is half a row late
+constexpr double kGainsKp = 6, kGainsKd = 0.3;  // N m/rad, N m s/rad
+constexpr double kWithin = 0.1;                 // of the gain; the target is held, which is half a row late
 
 class GainsTest : public DraftBench {
  protected:
@@ -18,37 +18,37 @@ class GainsTest : public DraftBench {
 };
 
 TEST_F(GainsTest, OfTheMeasuredTorque) {
-  const Motion m = Move(0, kKp, kKd);
+  const Motion m = Move(0, kGainsKp, kGainsKd);
   const Experiment e =
       Drafted(Bars({"hip"}), {{"time", m.time_s}, {"q_des", m.target}, {"q", m.angle}, {"tau", m.torque}});
   const AddedActuator* a = Added(e, "hip");
   ASSERT_NE(a, nullptr) << text_;
   EXPECT_EQ(a->kind, AddedActuator::Kind::kPosition);
-  EXPECT_NEAR(a->kp, kKp, kWithin * kKp);
-  EXPECT_NEAR(a->kd, kKd, kWithin * kKd);
+  EXPECT_NEAR(a->kp, kGainsKp, kWithin * kGainsKp);
+  EXPECT_NEAR(a->kd, kGainsKd, kWithin * kGainsKd);
   EXPECT_EQ(CommandOf(e, "hip"), "q_des");
   EXPECT_EQ(ColumnOf(e, "hip", SignalKind::kTorque), "tau");
   EXPECT_FALSE(IsUnsure("gains")) << text_;
 }
 
 TEST_F(GainsTest, OfTheTorqueThatTheMotionTakes) {
-  const Motion m = Move(0, kKp, kKd);
+  const Motion m = Move(0, kGainsKp, kGainsKd);
   const Experiment e = Drafted(Bars({"hip"}), {{"time", m.time_s}, {"q_des", m.target}, {"q", m.angle}});
   const AddedActuator* a = Added(e, "hip");
   ASSERT_NE(a, nullptr) << text_;
-  EXPECT_NEAR(a->kp, kKp, kWithin * kKp);
-  EXPECT_NEAR(a->kd, kKd, 2 * kWithin * kKd);
+  EXPECT_NEAR(a->kp, kGainsKp, kWithin * kGainsKp);
+  EXPECT_NEAR(a->kd, kGainsKd, 2 * kWithin * kGainsKd);
   EXPECT_FALSE(IsUnsure("gains")) << text_;
   // They are parameters that a fit may move; the joint's own damping would be the same as kd.
   for (const auto& p : e.parameters) {
     EXPECT_NE(p.name, "hip.damping");
-    EXPECT_TRUE(p.name != "hip.kp" || (!p.frozen && p.low < kKp && p.high > kKp));
+    EXPECT_TRUE(p.name != "hip.kp" || (!p.frozen && p.low < kGainsKp && p.high > kGainsKp));
   }
 }
 
 TEST_F(GainsTest, AreMadeUpAndMarkedWhereTheLogDoesNotTell) {
   // The joint follows at once: no torque that moves it can be told.
-  Motion m = Move(0, kKp, kKd);
+  Motion m = Move(0, kGainsKp, kGainsKd);
   const Experiment e = Drafted(Bars({"hip"}), {{"time", m.time_s}, {"q_des", m.target}, {"q", m.target}});
   const AddedActuator* a = Added(e, "hip");
   ASSERT_NE(a, nullptr) << text_;
@@ -57,7 +57,7 @@ TEST_F(GainsTest, AreMadeUpAndMarkedWhereTheLogDoesNotTell) {
 }
 
 TEST_F(GainsTest, AsTheUserSaysThem) {
-  const Motion m = Move(0, kKp, kKd);
+  const Motion m = Move(0, kGainsKp, kGainsKd);
   const DraftOptions said{.servo = ServoSaid{.kp = 17, .kd = 0.4, .limit = 3, .armature = 0.01}};
   const Experiment e = Drafted(Bars({"hip"}), {{"time", m.time_s}, {"q_des", m.target}, {"q", m.angle}}, said);
   const AddedActuator* a = Added(e, "hip");
@@ -70,7 +70,7 @@ TEST_F(GainsTest, AsTheUserSaysThem) {
 }
 
 TEST_F(GainsTest, ALightLinkUnderAStiffServoGetsAnArmature) {
-  const Motion m = Move(0, kKp, kKd);
+  const Motion m = Move(0, kGainsKp, kGainsKd);
   const DraftOptions stiff{.servo = ServoSaid{.kp = 3000, .kd = 20, .limit = {}, .armature = {}}};
   const std::vector<Named> log = {{"time", m.time_s}, {"q_des", m.target}, {"q", m.angle}};
   Experiment e = Drafted(Bars({"hip"}), log, stiff);

@@ -7,7 +7,7 @@ namespace gapscope::testing {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180, kCount = 2 * std::numbers::pi / 4096;
-constexpr double kKp = 6, kKd = 0.3;
+constexpr double kUnitsKp = 6, kUnitsKd = 0.3;
 
 class UnitsTest : public DraftBench {
  protected:
@@ -16,7 +16,7 @@ class UnitsTest : public DraftBench {
     const MeasuredSpec* m = Measured(e, "hip", kind);
     return m ? m->factor : 0;
   }
-  const Motion m_ = Move(0, kKp, kKd);
+  const Motion m_ = Move(0, kUnitsKp, kUnitsKd);
 };
 
 TEST_F(UnitsTest, OfTheAngleByASpeedWhoseUnitIsStated) {
@@ -68,7 +68,7 @@ TEST_F(UnitsTest, APolicysActionIsMappedToATarget) {
 
 TEST_F(UnitsTest, AFamilyHasOneUnit) {
   // The second joint hardly moves: alone it would be in radians.
-  const Motion other = Move(1, kKp, kKd);
+  const Motion other = Move(1, kUnitsKp, kUnitsKd);
   const Experiment e =
       Drafted(Bars({"hip", "knee"}, "", "range=\"-1 1\" limited=\"true\""),
               {{"time", m_.time_s}, {"q1", Times(m_.angle, 1 / kDegree)}, {"q2", Times(other.angle, 0.01 / kDegree)}});

@@ -16,7 +16,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr double kRounding = 1e-12;
+constexpr double kGramRounding = 1e-12;
 
 double Wave(double t) { return 1.5 * std::sin(6 * t + 2 * t * t); }
 
@@ -60,8 +60,8 @@ TEST(GramTest, SumsAreTheReducedNormalEquations) {
     Eigen::MatrixXd hessian = sum.topLeftCorner(n, n);
     hessian.diagonal() += problem.prior().weight;
     const Eigen::VectorXd gradient = sum.col(n).head(n) + problem.prior().Gradient(point.y);
-    EXPECT_LT((hessian - at.hessian).norm(), kRounding * at.hessian.norm()) << huber;
-    EXPECT_LT((gradient - at.gradient).norm(), kRounding * at.gradient.norm()) << huber;
+    EXPECT_LT((hessian - at.hessian).norm(), kGramRounding * at.hessian.norm()) << huber;
+    EXPECT_LT((gradient - at.gradient).norm(), kGramRounding * at.gradient.norm()) << huber;
     // Half the squares left are the cost with the states at their best.
     if (huber == 0) {
       EXPECT_NEAR(0.5 * sum(n, n) + problem.prior().Cost(point.y), at.reduced_cost, 1e-10 * at.cost);
@@ -99,7 +99,7 @@ TEST(GramTest, PartsAddUpToTheWhole) {
   ASSERT_EQ(parts.parts.size(), 3U);
   for (const auto& part : parts.parts) EXPECT_GT(part.norm(), 0.01 * whole.parts[0].norm());
   const Eigen::MatrixXd sum = parts.parts[0] + parts.parts[1] + parts.parts[2];
-  EXPECT_LT((sum - whole.parts[0]).norm(), kRounding * whole.parts[0].norm());
+  EXPECT_LT((sum - whole.parts[0]).norm(), kGramRounding * whole.parts[0].norm());
   EXPECT_EQ(parts.half_seconds, whole.half_seconds);
 }
 

@@ -16,7 +16,7 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kPeriod_s = 0.004;
+constexpr double kPosePeriod_s = 0.004;
 
 class PosesFitTest : public ::testing::Test {
  protected:
@@ -31,7 +31,7 @@ class PosesFitTest : public ::testing::Test {
   void Record(const Vector3d& mount) {
     std::string csv = "t,x,y,z,qw,qx,qy,qz,angle,aw,ax,ay,az\n";
     for (int k = 0; k < 251; ++k) {
-      const double t = k * kPeriod_s, angle = 0.3 + 2 * t;
+      const double t = k * kPosePeriod_s, angle = 0.3 + 2 * t;
       const Vector3d p = top_.Marker(t);
       const Quaterniond q = top_.MarkerTurn(t) * SpinningTop::Exp(mount),
                         a = SpinningTop::Exp(angle * Vector3d::UnitZ()) * SpinningTop::Exp(mount);

@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::string_literals;
 
-struct Broken {
+struct BrokenBam {
   const char* name;
   std::string bytes;
   const char* where;
@@ -31,7 +31,7 @@ std::string SparseEntries(std::size_t count) {
   return all;
 }
 
-std::vector<Broken> Table() {
+std::vector<BrokenBam> BamTable() {
   const std::string head = "{\"kp\": 100, \"entries\": [\n";
   const std::string entry = "{\"timestamp\": 0.1, \"position\": 1}";
   const std::string good = head + entry + ",\n{\"timestamp\": 0.2, \"position\": 2}]}";
@@ -109,7 +109,7 @@ std::vector<Broken> Table() {
 
 TEST(BamHostileTest, EachIsRefusedWithFileAndLine) {
   const TempFolder folder;
-  const auto table = Table();
+  const auto table = BamTable();
   EXPECT_GE(table.size(), 40u);
   for (const auto& broken : table) {
     const std::string path = folder.Write("broken.json", broken.bytes);

@@ -11,14 +11,14 @@
 namespace gapscope {
 namespace {
 
-Log Read(const std::string& bytes) {
+Log ReadBam(const std::string& bytes) {
   const Result<Log> log = ReadBamJson("log.json", bytes);
   EXPECT_TRUE(log.ok()) << (log.ok() ? "" : log.error().Text()) << "\n" << bytes;
   return log.ok() ? log.value() : Log{};
 }
 
 TEST(BamReaderTest, ReadsHeaderAndEntries) {
-  const Log log = Read(R"({"mass": 0.49, "kp": 100, "motor": "xl330", "spare": true, "entries": [
+  const Log log = ReadBam(R"({"mass": 0.49, "kp": 100, "motor": "xl330", "spare": true, "entries": [
     {"timestamp": 0.0035, "position": -0.5, "load": 65527, "torque_enable": true},
     {"timestamp": 0.0087, "position": 1e-3, "load": 0, "torque_enable": false}]})");
   EXPECT_EQ(log.header, (std::map<std::string, double>{{"kp", 100}, {"mass", 0.49}, {"spare", 1}}));
@@ -33,13 +33,13 @@ TEST(BamReaderTest, ReadsHeaderAndEntries) {
 }
 
 TEST(BamReaderTest, EntriesMayComeBeforeTheHeader) {
-  const Log log = Read(R"({"entries": [{"t": 0, "x": 1}], "kp": 3})");
+  const Log log = ReadBam(R"({"entries": [{"t": 0, "x": 1}], "kp": 3})");
   EXPECT_EQ(log.header.at("kp"), 3);
   EXPECT_EQ(log.rows(), 1u);
 }
 
 TEST(BamReaderTest, MissingKeysAndNullsAreMissingValues) {
-  const Log log = Read(R"({"entries": [{"t": 0, "x": 1}, {"t": 1}, {"x": null, "t": 2, "late": 5}]})");
+  const Log log = ReadBam(R"({"entries": [{"t": 0, "x": 1}, {"t": 1}, {"x": null, "t": 2, "late": 5}]})");
   ASSERT_EQ(log.rows(), 3u);
   EXPECT_EQ(log.Find("t")->values, (std::vector<double>{0, 1, 2}));
   EXPECT_TRUE(std::isnan(log.Find("x")->values[1]));
@@ -53,7 +53,7 @@ TEST(BamReaderTest, MissingKeysAndNullsAreMissingValues) {
 }
 
 TEST(BamReaderTest, PythonsNaNIsMissing) {
-  const Log log = Read(
+  const Log log = ReadBam(
       R"({"note": "NaN \" Infinity", "entries": [{"t": 0, "x": NaN},
       {"t":1, "x":-Infinity}, {"t":2, "x":Infinity}, {"t":3, "x":-3}]})");
   EXPECT_EQ(log.header_text.at("note"), "NaN \" Infinity");
@@ -70,13 +70,13 @@ TEST(BamReaderTest, PlacesStayRightBehindNaN) {
 
 TEST(BamReaderTest, NestedHeaderIsReportedAndIgnored) {
   const Log log =
-      Read(R"({"gains": {"p": [1, 2, {"deep": true}]}, "list": [[]], "kp": 2, "entries": [{"t": 0, "x": 1}]})");
+      ReadBam(R"({"gains": {"p": [1, 2, {"deep": true}]}, "list": [[]], "kp": 2, "entries": [{"t": 0, "x": 1}]})");
   EXPECT_EQ(log.header, (std::map<std::string, double>{{"kp", 2}}));
   EXPECT_TRUE(FindFinding(log.findings, "ignored_header", "gains"));
   EXPECT_TRUE(FindFinding(log.findings, "ignored_header", "list"));
 }
 
-TEST(BamReaderTest, ByteOrderMark) { EXPECT_EQ(Read("\xEF\xBB\xBF{\"entries\": [{\"t\": 0}]}").rows(), 1u); }
+TEST(BamReaderTest, ByteOrderMark) { EXPECT_EQ(ReadBam("\xEF\xBB\xBF{\"entries\": [{\"t\": 0}]}").rows(), 1u); }
 
 TEST(BamReaderTest, RoundTripsRandomTables) {
   std::mt19937_64 random(11);
@@ -103,7 +103,7 @@ TEST(BamReaderTest, RoundTripsRandomTables) {
       }
       bytes += random() % 3 ? "}" : "}\n";
     }
-    const Log log = Read(bytes + "]}");
+    const Log log = ReadBam(bytes + "]}");
     ASSERT_EQ(log.columns.size(), columns);
     for (std::size_t c = 0; c < columns; ++c) ASSERT_EQ(log.columns[c].values, table[c]);
   }
@@ -116,7 +116,7 @@ TEST(BamReaderTest, EveryPrefixIsRefused) {
     ASSERT_FALSE(log.ok()) << whole.substr(0, size);
     EXPECT_EQ(log.error().where.substr(0, 9), "log.json:") << log.error().Text();
   }
-  EXPECT_EQ(Read(whole).rows(), 2u);
+  EXPECT_EQ(ReadBam(whole).rows(), 2u);
 }
 
 }  // namespace

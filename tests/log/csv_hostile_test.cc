@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::string_literals;
 
-struct Broken {
+struct BrokenCsv {
   const char* name;
   std::string bytes;
   const char* where;  // behind the path
@@ -33,7 +33,7 @@ std::string Utf16(const std::string& text, bool mark, bool little) {
   return bytes;
 }
 
-std::vector<Broken> Table() {
+std::vector<BrokenCsv> Table() {
   const std::string head = "time_s,voltage_v\n";
   return {
       {"empty", "", ":1", "empty"},

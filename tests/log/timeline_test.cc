@@ -10,7 +10,7 @@
 namespace gapscope {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
 constexpr double kRounding = 1e-12;
 
 Timeline Build(const std::vector<double>& stamps, const TimelineOptions& options = {},
@@ -163,7 +163,7 @@ TEST(TimelineTest, CounterThatRunsOverIsCarriedOn) {
 }
 
 TEST(TimelineTest, RowsWithoutStampAreDropped) {
-  const Timeline timeline = Build({kNaN, 0.1, kNaN, 0.3, 0.4});
+  const Timeline timeline = Build({kNoTime, 0.1, kNoTime, 0.3, 0.4});
   EXPECT_EQ(timeline.rows, (std::vector<std::size_t>{1, 3, 4}));
   ExpectFinding(timeline.findings, "missing_stamp", 2, 0);
 }
@@ -189,7 +189,7 @@ TEST(TimelineTest, PoliciesOfErrorNameFileAndLine) {
   } rows[] = {
       {{0, 1, 1, 2}, {.repeated = TimeRepair::kError}, "made.csv:4, column time_s"},
       {{0, 2, 1, 3}, {.reversed = TimeRepair::kError}, "made.csv:4, column time_s"},
-      {{0, kNaN, 1, 3}, {.missing = MissingRepair::kError}, "made.csv:3, column time_s"},
+      {{0, kNoTime, 1, 3}, {.missing = MissingRepair::kError}, "made.csv:3, column time_s"},
   };
   for (const auto& row : rows) {
     const auto timeline = BuildTimeline(MakeLog({{"time_s", row.stamps}}), row.options);
@@ -200,7 +200,7 @@ TEST(TimelineTest, PoliciesOfErrorNameFileAndLine) {
 }
 
 TEST(TimelineTest, RequiredColumnsDropRows) {
-  const Log log = MakeLog({{"t", {0, 0.1, 0.2, 0.3}}, {"x", {1, kNaN, 3, 4}}});
+  const Log log = MakeLog({{"t", {0, 0.1, 0.2, 0.3}}, {"x", {1, kNoTime, 3, 4}}});
   const auto timeline = BuildTimeline(log, {.missing = MissingRepair::kDropRows, .required = {"x"}});
   ASSERT_TRUE(timeline.ok());
   EXPECT_EQ(timeline.value().rows, (std::vector<std::size_t>{0, 2, 3}));
@@ -216,7 +216,7 @@ TEST(TimelineTest, RandomStampsGiveAGrowingTimeline) {
     for (int k = 0; k < 60; ++k) {
       const int what = static_cast<int>(random() % 12);
       t = what == 0 ? 0 : what == 1 ? t : what == 2 ? t - 0.05 : what == 3 ? t + 0.7 : t + 0.01;
-      stamps.push_back(random() % 20 == 0 ? kNaN : t);
+      stamps.push_back(random() % 20 == 0 ? kNoTime : t);
     }
     const auto result = BuildTimeline(MakeLog({{"time_s", stamps}}), {});
     if (!result.ok()) continue;
@@ -244,14 +244,14 @@ class ExtractTest : public testing::Test {
 };
 
 TEST_F(ExtractTest, ScalesAndHolds) {
-  const auto values = Extract({kNaN, 1, kNaN, kNaN, 4}, {.factor = 2, .offset = 1});
+  const auto values = Extract({kNoTime, 1, kNoTime, kNoTime, 4}, {.factor = 2, .offset = 1});
   ASSERT_TRUE(values.ok());
   EXPECT_EQ(values.value(), (std::vector<double>{3, 3, 3, 3, 9}));
   ExpectFinding(findings_, "held", 3, 0);
 }
 
 TEST_F(ExtractTest, MissingUnderErrorNamesTheLine) {
-  const auto values = Extract({0, 1, kNaN, 3}, {.missing = MissingRepair::kError});
+  const auto values = Extract({0, 1, kNoTime, 3}, {.missing = MissingRepair::kError});
   ASSERT_FALSE(values.ok());
   EXPECT_EQ(values.error().where, "made.csv:4, column x");
 }

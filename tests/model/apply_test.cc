@@ -10,7 +10,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr char kRobot[] = R"(<?xml version='1.0'?>
+constexpr char kAppliedRobot[] = R"(<?xml version='1.0'?>
 <!-- A robot. <joint name="arm" damping="9"/> -->
 <mujoco model='robot'>
   <compiler autolimits='true'/>   <!-- degrees, as MuJoCo has it -->
@@ -78,17 +78,17 @@ std::string With(std::string text, const std::string& from, const std::string& t
 }
 
 TEST_F(ApplyTest, NothingToSayLeavesEveryByte) {
-  const auto applied = Apply(kRobot, {}, {});
+  const auto applied = Apply(kAppliedRobot, {}, {});
   ASSERT_TRUE(applied.ok()) << applied.error().Text();
-  EXPECT_EQ(applied.value().text, kRobot);
+  EXPECT_EQ(applied.value().text, kAppliedRobot);
   EXPECT_TRUE(applied.value().changes.empty());
 }
 
 TEST_F(ApplyTest, ValuesGoToTheElementItselfWhereAClassHadThem) {
-  const auto applied = Apply(kRobot, {}, {{"arm.damping", 0.25}, {"arm.kp", 21}, {"tip.mass", 0.3}},
+  const auto applied = Apply(kAppliedRobot, {}, {{"arm.damping", 0.25}, {"arm.kp", 21}, {"tip.mass", 0.3}},
                              {{"arm.damping", "less damping"}, {"arm.kp", "stiffer"}, {"tip.mass", "heavier"}});
   ASSERT_TRUE(applied.ok()) << applied.error().Text();
-  EXPECT_EQ(ChangedLines(kRobot, applied.value().text),
+  EXPECT_EQ(ChangedLines(kAppliedRobot, applied.value().text),
             R"(-    <body name="arm"><joint name='arm' class="stiff"   axis="0 0 1"/>
 +    <body name="arm"><!-- gapscope: less damping --> <joint name='arm' class="stiff"   axis="0 0 1" damping="0.25"/>
 +        <!-- gapscope: heavier -->
@@ -101,14 +101,14 @@ TEST_F(ApplyTest, ValuesGoToTheElementItselfWhereAClassHadThem) {
 
 TEST_F(ApplyTest, AnglesAreWrittenInTheFilesUnit) {
   const auto applied =
-      Apply(kRobot, {"cable_spring@arm"},
+      Apply(kAppliedRobot, {"cable_spring@arm"},
             {{"cable_spring@arm.stiffness_n_m_per_rad", 2}, {"cable_spring@arm.rest_rad", 0.5235987756}});
   ASSERT_TRUE(applied.ok()) << applied.error().Text();
   EXPECT_NE(applied.value().text.find("springref=\"30\""), std::string::npos) << applied.value().text;
 }
 
 TEST_F(ApplyTest, EffectsThatMujocoLacksBecomePluginElements) {
-  const auto applied = Apply(kRobot, {"torque_limit@arm", "backlash@arm"},
+  const auto applied = Apply(kAppliedRobot, {"torque_limit@arm", "backlash@arm"},
                              {{"torque_limit@arm.limit_n_m", 3}, {"backlash@arm.gap_rad", 0.02}},
                              {{"torque_limit@arm.limit_n_m", "it saturates"}, {"backlash@arm.motor_share", "a gap"}});
   ASSERT_TRUE(applied.ok()) << applied.error().Text();
@@ -122,7 +122,7 @@ TEST_F(ApplyTest, EffectsThatMujocoLacksBecomePluginElements) {
 
 TEST_F(ApplyTest, WhatAnIncludedFileHoldsTakesItsPlace) {
   // The main file includes one that holds the robot, which includes one that stays.
-  std::string robot = With(kRobot, "  <worldbody>", "  <include file='scene.xml'/>\n  <worldbody>");
+  std::string robot = With(kAppliedRobot, "  <worldbody>", "  <include file='scene.xml'/>\n  <worldbody>");
   robot = With(robot, "<?xml version='1.0'?>\n", "");
   scratch_.Write("parts/scene.xml", "<mujoco><statistic extent='2'/></mujoco>");
   scratch_.Write("parts/robot.xml", robot);
@@ -140,7 +140,7 @@ TEST_F(ApplyTest, WhatAnIncludedFileHoldsTakesItsPlace) {
 
 TEST_F(ApplyTest, WhatStandsInAFrameIsChangedThere) {
   const std::string framed =
-      With(With(kRobot, "<body name=\"arm\">", "<frame pos=\"0 0 0.1\" euler=\"0 0 90\"><body name=\"arm\">"),
+      With(With(kAppliedRobot, "<body name=\"arm\">", "<frame pos=\"0 0 0.1\" euler=\"0 0 90\"><body name=\"arm\">"),
            "  </worldbody>", "  </frame></worldbody>");
   const auto applied = Apply(framed, {}, {{"arm.damping", 0.25}}, {{"arm.damping", "less damping"}});
   ASSERT_TRUE(applied.ok()) << applied.error().Text();
@@ -150,18 +150,20 @@ TEST_F(ApplyTest, WhatStandsInAFrameIsChangedThere) {
 
 TEST_F(ApplyTest, WhatTextCannotFollowIsRefused) {
   // The masses are those of the geoms, whatever <inertial> says.
-  ExpectRefused(With(kRobot, "autolimits='true'", "inertiafromgeom='true'"), {{"tip.mass", 0.3}}, "another model");
+  ExpectRefused(With(kAppliedRobot, "autolimits='true'", "inertiafromgeom='true'"), {{"tip.mass", 0.3}},
+                "another model");
   // Elements that no text has, as MuJoCo makes them.
   const std::string tip = "<body name=\"tip\" pos=\"0.2 0 0\">";
-  const std::size_t begin = std::string(kRobot).find(tip), end = std::string(kRobot).find("    </body>\n  </world");
-  scratch_.Write("hand.xml", "<mujoco model=\"hand\"><worldbody>" + std::string(kRobot).substr(begin, end - begin) +
-                                 "</worldbody></mujoco>");
-  std::string attached = kRobot;
+  const std::size_t begin = std::string(kAppliedRobot).find(tip),
+                    end = std::string(kAppliedRobot).find("    </body>\n  </world");
+  scratch_.Write("hand.xml", "<mujoco model=\"hand\"><worldbody>" +
+                                 std::string(kAppliedRobot).substr(begin, end - begin) + "</worldbody></mujoco>");
+  std::string attached = kAppliedRobot;
   attached.replace(begin, end - begin, "<attach model=\"hand\" body=\"tip\" prefix=\"\"/>\n");
   attached =
       With(attached, "  <worldbody>", "  <asset><model name=\"hand\" file=\"hand.xml\"/></asset>\n  <worldbody>");
   ExpectRefused(attached, {{"tip.mass", 0.3}}, "the MJCF's text has no");
-  const std::string copied = With(With(kRobot, tip, "<replicate count=\"1\" sep=\"\">" + tip),
+  const std::string copied = With(With(kAppliedRobot, tip, "<replicate count=\"1\" sep=\"\">" + tip),
                                   "      </body>\n    </body>", "      </body></replicate>\n    </body>");
   experiment_ = With(With(experiment_, "joint: tip,", "joint: tip0,"), "body/tip/", "body/tip0/");
   ExpectRefused(copied, {{"tip.mass", 0.3}}, "the MJCF's text has no");

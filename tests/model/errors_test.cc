@@ -7,7 +7,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr const char* kRobot = R"(<mujoco>
+constexpr const char* kErrorsRobot = R"(<mujoco>
   <option><flag contact="disable"/></option>
   <worldbody>
     <body name="bar"><joint name="hinge" axis="0 1 0"/>
@@ -19,7 +19,7 @@ constexpr const char* kRobot = R"(<mujoco>
   <sensor><subtreecom name="centre" body="bar"/><framequat name="turn" objtype="body" objname="bar"/>
     <jointvel name="late" joint="hinge" delay="0.01" nsample="10"/><user name="own" dim="1"/></sensor>
 </mujoco>)";
-constexpr const char* kYaml = R"(commands:
+constexpr const char* kErrorsYaml = R"(commands:
   - {actuator: motor, column: u, unit: N m}
 measured:
   - {signal: q, column: q, joint: hinge, unit: rad}
@@ -37,14 +37,14 @@ std::string MessageOf(const std::string& mjcf, const std::string& yaml) {
 }
 
 TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
-  EXPECT_EQ(MessageOf(kRobot, kYaml), "");
-  struct Case {
+  EXPECT_EQ(MessageOf(kErrorsRobot, kErrorsYaml), "");
+  struct Broken {
     const char* from;
     const char* to;
     std::vector<const char*> says;
   };
   // The setting's key stands in line 9 (line 1 is "model:"), column 3.
-  const std::vector<Case> cases = {
+  const std::vector<Broken> cases = {
       {"{actuator: motor",
        "{actuator: moter",
        {"experiment.yaml", "actuator that the MJCF lacks", "did you mean 'motor'?"}},
@@ -78,8 +78,8 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
        {"experiment.yaml:9:3:", "has 1 numbers", "2 expressions"}},
       {"joint/hinge/damping:", "body/bar/inertia:", {"experiment.yaml:9:3:", "has 3 numbers", "1 expressions"}},
   };
-  for (const Case& test : cases) {
-    const std::string message = MessageOf(kRobot, Replaced(kYaml, test.from, test.to));
+  for (const Broken& test : cases) {
+    const std::string message = MessageOf(kErrorsRobot, Replaced(kErrorsYaml, test.from, test.to));
     ASSERT_NE(message, "") << "accepted: " << test.to;
     for (const char* part : test.says)
       EXPECT_NE(message.find(part), std::string::npos) << message << "\nlacks: " << part;
@@ -87,12 +87,12 @@ TEST(BuildErrorsTest, NamesAndExpressionsOfTheExperiment) {
 }
 
 TEST(BuildErrorsTest, TheMjcf) {
-  struct Case {
+  struct Broken {
     const char* from;
     const char* to;
     const char* says;
   };
-  const std::vector<Case> cases = {
+  const std::vector<Broken> cases = {
       {"<mujoco>", "<mujoko>", "cannot read the MJCF"},
       {"</mujoco>", "", "cannot read the MJCF"},
       {"mass=\"1\"", "mass=\"-1\"", "mass"},
@@ -106,16 +106,16 @@ TEST(BuildErrorsTest, TheMjcf) {
        "plugin=\"gapscope.motor\"><config key=\"law\" value=\"magic\"/></plugin></actuator>",
        "law"},
   };
-  for (const Case& test : cases) {
-    const std::string message = MessageOf(Replaced(kRobot, test.from, test.to), kYaml);
+  for (const Broken& test : cases) {
+    const std::string message = MessageOf(Replaced(kErrorsRobot, test.from, test.to), kErrorsYaml);
     EXPECT_NE(message.find("robot.xml"), std::string::npos) << test.to << ": " << message;
     EXPECT_NE(message.find(test.says), std::string::npos) << test.to << ": " << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
   }
-  EXPECT_NE(MessageOf("", kYaml).find("robot.xml"), std::string::npos);
-  EXPECT_NE(MessageOf(std::string("\x7f\0\x01", 3), kYaml).find("robot.xml"), std::string::npos);
+  EXPECT_NE(MessageOf("", kErrorsYaml).find("robot.xml"), std::string::npos);
+  EXPECT_NE(MessageOf(std::string("\x7f\0\x01", 3), kErrorsYaml).find("robot.xml"), std::string::npos);
   const Scratch scratch;
-  Experiment experiment = MakeExperiment(scratch, kRobot, kYaml);
+  Experiment experiment = MakeExperiment(scratch, kErrorsRobot, kErrorsYaml);
   experiment.model_path = scratch.Path("none.xml");
   const auto built = Model::Load(experiment);
   ASSERT_FALSE(built.ok());
@@ -124,7 +124,7 @@ TEST(BuildErrorsTest, TheMjcf) {
 
 TEST(BuildErrorsTest, EffectUses) {
   const Scratch scratch;
-  const auto model = MakeModel(MakeExperiment(scratch, kRobot, kYaml));
+  const auto model = MakeModel(MakeExperiment(scratch, kErrorsRobot, kErrorsYaml));
   const auto message = [&](std::vector<std::string> texts) {
     const auto uses = ParseEffects(texts, *model->rig());
     return uses.ok() ? "" : uses.error().Text();
@@ -167,10 +167,10 @@ TEST(EffectPlacesTest, AMotorWithoutALawIsAServo) {
 
 TEST(ParameterWriterTest, RefusesWhatIsNotFiniteOrNotPhysical) {
   const Scratch scratch;
-  const std::string yaml = std::string(kYaml) +
+  const std::string yaml = std::string(kErrorsYaml) +
                            "  body/bar/mass: 1 - hinge.damping\n  body/bar/ipos: [\"1 / (hinge.damping - 0.5)\", "
                            "\"0\", \"0\"]\n  body/bar/inertia: [\"0.5\", \"0.9 - hinge.damping\", \"0.5\"]\n";
-  const auto model = MakeModel(MakeExperiment(scratch, kRobot, yaml));
+  const auto model = MakeModel(MakeExperiment(scratch, kErrorsRobot, yaml));
   ASSERT_NE(model, nullptr);
   const ModelPtr copy(mj_copyModel(nullptr, &model->compiled()));
   const DataPtr data(mj_makeData(copy.get()));

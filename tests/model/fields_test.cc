@@ -60,7 +60,7 @@ std::vector<double> Motion(const mjModel* m) {
   return motion;
 }
 
-struct Case {
+struct FieldCase {
   const char* field;
   std::vector<double> values;
   const char* from;  // in the MJCF
@@ -68,7 +68,7 @@ struct Case {
 };
 
 TEST(FieldsTest, AWrittenFieldMovesAsTheMjcfsOwn) {
-  const std::vector<Case> cases = {
+  const std::vector<FieldCase> cases = {
       {"joint/hinge/damping", {0.4}, "damping=\"0.1 0.05\"", "damping=\"0.4 0.05\""},
       {"joint/hinge/damping_quadratic", {0.5}, "damping=\"0.1 0.05\"", "damping=\"0.1 0.5\""},
       {"joint/hinge/frictionloss", {0.3}, "frictionloss=\"0.02\"", "frictionloss=\"0.3\""},
@@ -103,7 +103,7 @@ TEST(FieldsTest, AWrittenFieldMovesAsTheMjcfsOwn) {
   };
   const ModelPtr base = Compile(kRobot);
   const std::vector<double> before = Motion(base.get());
-  for (const Case& test : cases) {
+  for (const FieldCase& test : cases) {
     SCOPED_TRACE(test.field);
     const auto field = ResolveField(*base, test.field, "here");
     ASSERT_TRUE(field.ok()) << field.error().Text();

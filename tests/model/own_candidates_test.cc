@@ -11,7 +11,7 @@
 namespace gapscope::testing {
 namespace {
 
-const std::string kYaml = R"(commands:
+const std::string kCandidatesYaml = R"(commands:
   - {actuator: motor, column: u, unit: N m}
 measured:
   - {signal: q, column: q, joint: hinge, unit: rad}
@@ -52,7 +52,7 @@ without: [cogging, quadratic_drag@wrist]
 class OwnCandidatesTest : public ::testing::Test {
  protected:
   OwnCandidatesTest()
-      : experiment_(MakeExperiment(scratch_, kOwnRobot, kYaml + kCandidates)),
+      : experiment_(MakeExperiment(scratch_, kOwnRobot, kCandidatesYaml + kCandidates)),
         recording_(MakeRecording(experiment_, 400, 0.001,
                                  [](int, double t) { return 0.2 * std::sin(9 * t) + (t > 0.2 ? 0.1 : 0); })) {}
   std::vector<double> With(const std::vector<EffectUse>& uses, const std::map<std::string, double>& set) {
@@ -62,7 +62,7 @@ class OwnCandidatesTest : public ::testing::Test {
     std::string robot = kOwnRobot;
     robot.replace(robot.find(from), from.size(), to);
     const Scratch scratch;
-    return Predict(*MakeModel(MakeExperiment(scratch, robot, kYaml)), recording_)[0];
+    return Predict(*MakeModel(MakeExperiment(scratch, robot, kCandidatesYaml)), recording_)[0];
   }
   Scratch scratch_;
   Experiment experiment_;
@@ -218,7 +218,7 @@ TEST(OwnCandidateErrorsTest, SayWhatAndWhere) {
       {"without: [cogging, quadratic_drag@wrist]", "without: cogging", {"experiment.yaml:36:", "not a list"}},
   };
   for (const Case& c : cases) {
-    std::string yaml = "model: robot.xml\n" + kYaml + kCandidates;
+    std::string yaml = "model: robot.xml\n" + kCandidatesYaml + kCandidates;
     const std::size_t at = yaml.find(c.from);
     ASSERT_NE(at, std::string::npos) << c.from;
     yaml.replace(at, std::string(c.from).size(), c.to);

@@ -15,7 +15,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr double kSame = 1e-12;
+constexpr double kSameInertia = 1e-12;
 
 const BodyInertia kLink = {
     .mass_kg = 1.5, .centre_m = {0.1, -0.02, 0.3}, .moments_kg_m2 = {0.03, 0.02, 0.015}, .axes = {0.8, 0.36, 0.48, 0}};
@@ -43,18 +43,18 @@ double Apart(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 
 TEST(PseudoInertiaTest, AlphaScalesMassAndInertiaTogether) {
   const BodyInertia heavy = Changed(kLink, {0.2});
-  EXPECT_NEAR(heavy.mass_kg, std::exp(0.4) * 1.5, kSame);
-  EXPECT_LT(Apart(Central(heavy), std::exp(0.4) * Central(kLink)), kSame);
+  EXPECT_NEAR(heavy.mass_kg, std::exp(0.4) * 1.5, kSameInertia);
+  EXPECT_LT(Apart(Central(heavy), std::exp(0.4) * Central(kLink)), kSameInertia);
   EXPECT_EQ(heavy.centre_m, kLink.centre_m);
 }
 
 TEST(PseudoInertiaTest, TMovesTheCentreOfMassAlone) {
   const BodyInertia moved = Changed(kLink, {0, 0, 0, 0, 0, 0, 0, 0.01, 0.02, -0.05});
-  EXPECT_NEAR(moved.centre_m[0], 0.11, kSame);
-  EXPECT_NEAR(moved.centre_m[1], 0.0, kSame);
-  EXPECT_NEAR(moved.centre_m[2], 0.25, kSame);
+  EXPECT_NEAR(moved.centre_m[0], 0.11, kSameInertia);
+  EXPECT_NEAR(moved.centre_m[1], 0.0, kSameInertia);
+  EXPECT_NEAR(moved.centre_m[2], 0.25, kSameInertia);
   EXPECT_EQ(moved.mass_kg, 1.5);
-  EXPECT_LT(Apart(Central(moved), Central(kLink)), kSame);
+  EXPECT_LT(Apart(Central(moved), Central(kLink)), kSameInertia);
 }
 
 TEST(PseudoInertiaTest, DStretchesABoxAlongItsEdges) {
@@ -63,7 +63,7 @@ TEST(PseudoInertiaTest, DStretchesABoxAlongItsEdges) {
     return BodyInertia{.mass_kg = 2, .moments_kg_m2 = {m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y)}};
   };
   const BodyInertia stretched = Changed(box(0.3, 0.2, 0.1), {0, std::log(2), std::log(0.5), std::log(3)});
-  EXPECT_LT(Apart(Central(stretched), Central(box(0.6, 0.1, 0.3))), kSame);
+  EXPECT_LT(Apart(Central(stretched), Central(box(0.6, 0.1, 0.3))), kSameInertia);
   EXPECT_EQ(stretched.mass_kg, 2);
 }
 
@@ -73,7 +73,7 @@ TEST(PseudoInertiaTest, SPushesPointsAlongTheFirstAxisByTheSecond) {
   const BodyInertia pushed = Changed(points, {0, 0, 0, 0, 0.5, 0.7});
   Eigen::Matrix3d expected;  // at (0.05, 0.1) and (-0.05, -0.1)
   expected << 0.02, -0.01, 0, -0.01, 0.005, 0, 0, 0, 0.025;
-  EXPECT_LT(Apart(Central(pushed), expected), kSame);
+  EXPECT_LT(Apart(Central(pushed), expected), kSameInertia);
 }
 
 TEST(PseudoInertiaTest, IsTheMatrixOfThePaperWhateverTheNumbers) {
@@ -87,7 +87,7 @@ TEST(PseudoInertiaTest, IsTheMatrixOfThePaperWhateverTheNumbers) {
     Eigen::Matrix4d u;
     u << std::exp(d1), s12, s13, t1, 0, std::exp(d2), s23, t2, 0, 0, std::exp(d3), t3, 0, 0, 0, 1;
     u *= std::exp(alpha);
-    EXPECT_LT(Apart(Matrix(changed), u * Matrix(kLink) * u.transpose()), kSame) << k;
+    EXPECT_LT(Apart(Matrix(changed), u * Matrix(kLink) * u.transpose()), kSameInertia) << k;
     // What MuJoCo's compiler asks of it, without a tolerance.
     const auto& [a, b, c] = changed.moments_kg_m2;
     EXPECT_TRUE(a > 0 && b > 0 && c > 0) << k;
@@ -117,7 +117,7 @@ TEST(PseudoInertiaTest, SmallNumbersTurnTheAxesLittle) {
 
 // A base on a stand that turns and slides, bodies with MuJoCo's short cuts (frames of inertia and body alike) among
 // them. ARM and HAND are their inertials.
-constexpr const char* kRobot = R"(<mujoco>
+constexpr const char* kInertiaRobot = R"(<mujoco>
   <compiler angle="radian"/>
   <option timestep="0.002" integrator="RK4"><flag contact="disable"/></option>
   <worldbody>
@@ -137,7 +137,7 @@ constexpr const char* kRobot = R"(<mujoco>
 </mujoco>)";
 constexpr const char* kHub = R"(<inertial pos="0 0 0" mass="0.6" diaginertia="0.001 0.0012 0.0018"/>)";
 constexpr const char* kHand = R"(<inertial pos="0 0 0" mass="0.2" diaginertia="0.0002 0.0003 0.0004"/>)";
-constexpr const char* kBound = R"(commands:
+constexpr const char* kInertiaYaml = R"(commands:
   - {actuator: hub, column: a, unit: N m}
   - {actuator: shoulder, column: b, unit: N m}
   - {actuator: wrist, column: c, unit: N m}
@@ -176,10 +176,10 @@ std::string Inertial(double mass, const std::vector<double>& moments, const Pseu
 }
 
 std::string Robot(const std::string& hub, const std::string& hand) {
-  return Replaced(Replaced(kRobot, "HUB", hub), "HAND", hand);
+  return Replaced(Replaced(kInertiaRobot, "HUB", hub), "HAND", hand);
 }
 
-double Command(int command, double t) {
+double Commanded(int command, double t) {
   constexpr double kSize[] = {0.02, 1.2, 0.01};
   return Exciting(t, kSize[command]);
 }
@@ -190,12 +190,12 @@ class PseudoInertiaModelTest : public ::testing::Test {
     return MakeModel(MakeExperiment(scratch_, mjcf, yaml));
   }
   static std::vector<std::vector<double>> Run(const Model& model, const std::map<std::string, double>& set = {}) {
-    return Predict(model, MakeRecording(model.experiment(), 500, 0.002, Command), set);
+    return Predict(model, MakeRecording(model.experiment(), 500, 0.002, Commanded), set);
   }
   std::string Message(const std::string& mjcf, const std::string& yaml) {
     scratch_.Write("robot.xml", mjcf);
     const auto experiment =
-        LoadExperiment(scratch_.Write("experiment.yaml", std::string("model: robot.xml\n") + kBound + yaml));
+        LoadExperiment(scratch_.Write("experiment.yaml", std::string("model: robot.xml\n") + kInertiaYaml + yaml));
     if (!experiment.ok()) return experiment.error().Text();
     const auto model = Model::Load(experiment.value());
     return model.ok() ? "" : model.error().Text();
@@ -218,20 +218,21 @@ class PseudoInertiaModelTest : public ::testing::Test {
 };
 
 TEST_F(PseudoInertiaModelTest, MovesAsAnMjcfWithTheInertiaInIt) {
-  const auto freed = Make(Robot(kHub, kHand), kBound + kFree);
+  const auto freed = Make(Robot(kHub, kHand), kInertiaYaml + kFree);
   ASSERT_NE(freed, nullptr);
   const auto motion = Run(*freed, Both());
-  const auto written = Make(
-      Robot(Inertial(0.6, {0.001, 0.0012, 0.0018}, kOne), Inertial(0.2, {0.0002, 0.0003, 0.0004}, kOther)), kBound);
+  const auto written =
+      Make(Robot(Inertial(0.6, {0.001, 0.0012, 0.0018}, kOne), Inertial(0.2, {0.0002, 0.0003, 0.0004}, kOther)),
+           kInertiaYaml);
   ASSERT_NE(written, nullptr);
-  ExpectSame(motion, Run(*written), kSame);
-  const auto as_it_was = Run(*Make(Robot(kHub, kHand), kBound));
+  ExpectSame(motion, Run(*written), kSameInertia);
+  const auto as_it_was = Run(*Make(Robot(kHub, kHand), kInertiaYaml));
   EXPECT_GT(LargestDifference(motion[0], as_it_was[0]), 1e-2);
-  ExpectSame(Run(*freed), as_it_was, kSame);
+  ExpectSame(Run(*freed), as_it_was, kSameInertia);
 }
 
 TEST_F(PseudoInertiaModelTest, ZeroLeavesTheCompiledModel) {
-  const auto freed = Make(Robot(kHub, kHand), std::string(kBound) + "inertia: [hub, arm, hand]\n");
+  const auto freed = Make(Robot(kHub, kHand), std::string(kInertiaYaml) + "inertia: [hub, arm, hand]\n");
   ASSERT_NE(freed, nullptr);
   const ModelPtr written(mj_copyModel(nullptr, &freed->compiled()));
   const DataPtr data(mj_makeData(written.get()));
@@ -245,11 +246,12 @@ TEST_F(PseudoInertiaModelTest, ZeroLeavesTheCompiledModel) {
     }
     for (int k = 0; k < 4; ++k) EXPECT_EQ(a.body_iquat[4 * i + k], b.body_iquat[4 * i + k]);
   }
-  for (int i = 0; i < a.nv; ++i) EXPECT_NEAR(a.dof_invweight0[i], b.dof_invweight0[i], kSame * a.dof_invweight0[i]);
+  for (int i = 0; i < a.nv; ++i)
+    EXPECT_NEAR(a.dof_invweight0[i], b.dof_invweight0[i], kSameInertia * a.dof_invweight0[i]);
 }
 
 TEST_F(PseudoInertiaModelTest, AreTunedOnlyWhereLogsKnowThem) {
-  const auto freed = Make(Robot(kHub, kHand), kBound + kFree);
+  const auto freed = Make(Robot(kHub, kHand), kInertiaYaml + kFree);
   ASSERT_NE(freed, nullptr);
   EXPECT_TRUE(freed->FreeParameters().empty());
   ASSERT_EQ(freed->parameters().size(), 20u);
@@ -260,12 +262,12 @@ TEST_F(PseudoInertiaModelTest, AreTunedOnlyWhereLogsKnowThem) {
     EXPECT_EQ(p.high, -p.low) << p.name;
   }
   // What the experiment says of one holds.
-  const auto listed = Make(Robot(kHub, kHand), std::string(kBound) +
+  const auto listed = Make(Robot(kHub, kHand), std::string(kInertiaYaml) +
                                                    "inertia: [hub]\nparameters: {hub.alpha: {unit: 1, "
                                                    "nominal: 0.1, bounds: [0, 0.2]}}\n");
   ASSERT_NE(listed, nullptr);
   EXPECT_EQ(listed->FreeParameters().size(), 1u);
-  const auto set = Make(Robot(kHub, kHand), std::string(kBound) +
+  const auto set = Make(Robot(kHub, kHand), std::string(kInertiaYaml) +
                                                 "set: {body/hub/pseudo_inertia: [\"0.1\",\"0\",\"0\",\"0\",\"0\",\"0\","
                                                 "\"0\",\"0\",\"0\",\"0\"]}\n");
   ASSERT_NE(set, nullptr);
@@ -273,17 +275,17 @@ TEST_F(PseudoInertiaModelTest, AreTunedOnlyWhereLogsKnowThem) {
 }
 
 TEST_F(PseudoInertiaModelTest, TheExportedModelMovesAlike) {
-  const auto freed = Make(Robot(kHub, kHand), kBound + kFree);
+  const auto freed = Make(Robot(kHub, kHand), kInertiaYaml + kFree);
   ASSERT_NE(freed, nullptr);
   const auto xml = freed->ToXml(ValuesWith(*freed, Both()), {}, {});
   ASSERT_TRUE(xml.ok()) << xml.error().Text();
   EXPECT_EQ(xml.value().find("simple="), std::string::npos) << "what an older MuJoCo cannot read";
-  ExpectSame(Run(*freed, Both()), Run(*Make(xml.value(), kBound)), 1e-4);  // six digits
+  ExpectSame(Run(*freed, Both()), Run(*Make(xml.value(), kInertiaYaml)), 1e-4);  // six digits
 }
 
 TEST_F(PseudoInertiaModelTest, ApplyWritesTheInertialAlone) {
   const std::string mjcf = Robot(kHub, kHand);
-  const auto freed = Make(mjcf, std::string(kBound) + "inertia: [hub]\n");
+  const auto freed = Make(mjcf, std::string(kInertiaYaml) + "inertia: [hub]\n");
   ASSERT_NE(freed, nullptr);
   const auto applied =
       ApplyToMjcf(*freed, ValuesWith(*freed, Values("hub", {0.1, 0, 0, 0, 0, 0, 0, 0.02, 0, 0})),
@@ -298,7 +300,7 @@ TEST_F(PseudoInertiaModelTest, ApplyWritesTheInertialAlone) {
 
 TEST_F(PseudoInertiaModelTest, ApplyTakesAThinPlate) {
   const std::string plate = R"(<inertial pos="0 0 0" mass="0.6" diaginertia="0.0011 0.0009 0.002"/>)";
-  const auto freed = Make(Robot(plate, kHand), std::string(kBound) + "inertia: [hub]\n");
+  const auto freed = Make(Robot(plate, kHand), std::string(kInertiaYaml) + "inertia: [hub]\n");
   ASSERT_NE(freed, nullptr);
   for (const double alpha : {0.1234567, -0.05551, 0.3, 0.77777, 0.012345}) {
     const auto applied = ApplyToMjcf(*freed, ValuesWith(*freed, {{"hub.alpha", alpha}, {"hub.s12", alpha}}),
@@ -311,20 +313,21 @@ TEST_F(PseudoInertiaModelTest, ErrorsSayWhatIsAllowed) {
   const std::string ten = "[\"0\",\"0\",\"0\",\"0\",\"0\",\"0\",\"0\",\"0\",\"0\",\"0\"]";
   const std::string massless = Replaced(Robot(kHub, kHand), "<site name", "<body name=\"tag\"/><site name");
   const std::vector<std::array<std::string, 3>> cases = {
-      {kRobot, "set: {body/hub/pseudo_inertia: [\"0\", \"0\"]}\n", "has 10 numbers"},
-      {kRobot, "set: {body/hub/pseudo_inertia: [\"0\", \"0\"]}\n", "alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3"},
-      {kRobot, "set: {body/hubb/pseudo_inertia: " + ten + "}\n", "did you mean 'hub'?"},
+      {kInertiaRobot, "set: {body/hub/pseudo_inertia: [\"0\", \"0\"]}\n", "has 10 numbers"},
+      {kInertiaRobot, "set: {body/hub/pseudo_inertia: [\"0\", \"0\"]}\n",
+       "alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3"},
+      {kInertiaRobot, "set: {body/hubb/pseudo_inertia: " + ten + "}\n", "did you mean 'hub'?"},
       {massless, "set: {body/tag/pseudo_inertia: " + ten + "}\n", "has no inertia"},
-      {kRobot, "set:\n  body/hub/mass: 1\n  body/hub/pseudo_inertia: " + ten + "\n", "'body/hub/mass' too"},
-      {kRobot, "inertia: [hub]\nset: {body/hub/ipos: [\"0\", \"0\", \"0\"]}\n", "'body/hub/ipos' too"},
-      {kRobot, "inertia: [hub]\nset: {body/hub/pseudo_inertia: " + ten + "}\n", "is set twice"},
-      {kRobot, "inertia: [hubb]\n", "did you mean 'hub'?"},
+      {kInertiaRobot, "set:\n  body/hub/mass: 1\n  body/hub/pseudo_inertia: " + ten + "\n", "'body/hub/mass' too"},
+      {kInertiaRobot, "inertia: [hub]\nset: {body/hub/ipos: [\"0\", \"0\", \"0\"]}\n", "'body/hub/ipos' too"},
+      {kInertiaRobot, "inertia: [hub]\nset: {body/hub/pseudo_inertia: " + ten + "}\n", "is set twice"},
+      {kInertiaRobot, "inertia: [hubb]\n", "did you mean 'hub'?"},
       {massless, "inertia: [tag]\n", "has no inertia"},
-      {kRobot, "inertia: [hub, hub]\n", "names the body 'hub' twice"},
-      {kRobot, "inertia: hub\n", "is not a list of bodies"},
+      {kInertiaRobot, "inertia: [hub, hub]\n", "names the body 'hub' twice"},
+      {kInertiaRobot, "inertia: hub\n", "is not a list of bodies"},
   };
   for (const auto& [mjcf, yaml, says] : cases) {
-    const std::string message = Message(mjcf == kRobot ? Robot(kHub, kHand) : mjcf, yaml);
+    const std::string message = Message(mjcf == kInertiaRobot ? Robot(kHub, kHand) : mjcf, yaml);
     EXPECT_NE(message.find(says), std::string::npos) << yaml << message;
     EXPECT_NE(message.find("experiment.yaml:"), std::string::npos) << yaml << message;
   }

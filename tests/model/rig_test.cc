@@ -43,7 +43,7 @@ constexpr const char* kMjcf = R"(<mujoco>
     <plugin name="switch" joint="free_one" plugin="gapscope.motor" instance="torque"/>
   </actuator>
 </mujoco>)";
-constexpr const char* kYaml = R"(commands:
+constexpr const char* kRigYaml = R"(commands:
   - {actuator: servo, column: u, unit: deg}
   - {actuator: servo.feedforward, column: f, unit: N m}
   - {actuator: duty, column: v, unit: mV}
@@ -59,7 +59,7 @@ set:
 
 class RigTest : public ::testing::Test {
  protected:
-  RigTest() : rig_(Rig::Load(MakeExperiment(scratch_, kMjcf, kYaml)).value()) {}
+  RigTest() : rig_(Rig::Load(MakeExperiment(scratch_, kMjcf, kRigYaml)).value()) {}
   // The expression that a field of the finished structure is set to; empty: none.
   static std::string SetTo(const Structure& structure, const std::string& field) {
     for (const auto& setting : structure.settings) {

@@ -11,7 +11,7 @@ namespace gapscope::testing {
 namespace {
 
 // Two arms: the first one tilted inertial frame, off its hinge; a second body rides on it.
-constexpr const char* kRobot = R"(<mujoco>
+constexpr const char* kSplitRobot = R"(<mujoco>
   <compiler angle="radian"/>
   <option timestep="0.0005" gravity="0 0 0" integrator="RK4"><flag contact="disable"/></option>
   <worldbody>
@@ -24,7 +24,7 @@ constexpr const char* kRobot = R"(<mujoco>
   </worldbody>
   <actuator><motor name="motor" joint="hinge"/><motor name="pusher" joint="slide"/></actuator>
 </mujoco>)";
-constexpr const char* kYaml = R"(commands:
+constexpr const char* kSplitYaml = R"(commands:
   - {actuator: motor, column: u, unit: N m}
 measured:
   - {signal: q, column: q, joint: hinge, unit: rad}
@@ -37,7 +37,7 @@ set:
 
 TEST(DrivenInertiaTest, HandNumbers) {
   const Scratch scratch;
-  const auto model = MakeModel(MakeExperiment(scratch, kRobot, kYaml));
+  const auto model = MakeModel(MakeExperiment(scratch, kSplitRobot, kSplitYaml));
   // A quarter turn about y carries the frame's x to -z: about z stands the first diagonal, 0.03. Arm (0.3, 0.4) from
   // the hinge: 2 * 0.25.
   EXPECT_NEAR(DrivenInertia(model->compiled(), 0), 0.004 + 0.03 + 2 * 0.25, 1e-12);
@@ -52,7 +52,7 @@ class SplitTest : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SplitTest, ConservesTheInertiaWhateverTheShareAndTheMass) {
   const Scratch scratch;
-  const Experiment experiment = MakeExperiment(scratch, kRobot, kYaml);
+  const Experiment experiment = MakeExperiment(scratch, kSplitRobot, kSplitYaml);
   const std::string use = std::string(GetParam()) + "@hinge";
   const auto model = MakeModel(experiment, {{GetParam(), "hinge"}});
   ASSERT_NE(model, nullptr);
@@ -86,9 +86,9 @@ TEST_P(SplitTest, ConservesTheInertiaWhateverTheShareAndTheMass) {
 TEST_P(SplitTest, KeepsTheMomentumOfAPush) {
   const Scratch scratch;
   const Experiment experiment = MakeExperiment(scratch,
-                                               Replaced(Replaced(kRobot, "damping=\"0.02\"", ""), "<body name=\"tip\"",
-                                                        "<body name=\"tip\" childclass=\"main\""),
-                                               kYaml);
+                                               Replaced(Replaced(kSplitRobot, "damping=\"0.02\"", ""),
+                                                        "<body name=\"tip\"", "<body name=\"tip\" childclass=\"main\""),
+                                               kSplitYaml);
   const auto model =
       MakeModel(experiment, {{GetParam(), "hinge"}},
                 {{"hinge", {.torque_n_m = 1, .angle_rad = 0.05, .speed_rad_per_s = 1, .inertia_kg_m2 = 0.534}}});

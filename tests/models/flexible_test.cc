@@ -28,7 +28,7 @@ struct FlexibleCase {
 };
 
 // Contract and source values, written out again here.
-const std::vector<FlexibleCase>& Cases() {
+const std::vector<FlexibleCase>& FlexibleCases() {
   static const std::vector<FlexibleCase> cases = {
       {"flexjoint",
        "base",
@@ -42,8 +42,8 @@ const std::vector<FlexibleCase>& Cases() {
 }
 
 TEST(FlexibleModelTest, FollowsTheEquations) {
-  constexpr double kReferenceStep_s = 2e-5, kTolerance_rad = 1e-6;
-  for (const auto& c : Cases()) {
+  constexpr double kFlexibleStep_s = 2e-5, kFlexible_rad = 1e-6;
+  for (const auto& c : FlexibleCases()) {
     const ModelPtr m = LoadRig(c.rig);
     ASSERT_NE(m, nullptr);
     ASSERT_EQ(JointDof(*m, c.first), 0);
@@ -51,13 +51,13 @@ TEST(FlexibleModelTest, FollowsTheEquations) {
     const double h = m->opt.timestep;
     const auto command = [&](int k) { return std::vector<double>{ChirpAndSteps(k * h, c.amplitude, 0.2, 8, 2)}; };
     const Motion motion = Drive(*m, {0.1, -0.05}, static_cast<int>(std::lround(2 / h)), command);
-    EXPECT_LT(LargestDifference<4>(*m, motion, {0.1, -0.05}, kReferenceStep_s, c.p, command), kTolerance_rad) << c.rig;
+    EXPECT_LT(LargestDifference<4>(*m, motion, {0.1, -0.05}, kFlexibleStep_s, c.p, command), kFlexible_rad) << c.rig;
   }
 }
 
 // The report's A and B, its state (th, th', al, al') reordered to (th, al, th', al').
 TEST(FlexibleModelTest, LinearisedMatricesOfTheReport) {
-  for (const auto& c : Cases()) {
+  for (const auto& c : FlexibleCases()) {
     const ModelPtr m = LoadRig(c.rig);
     ASSERT_NE(m, nullptr);
     const auto& p = c.p;
@@ -78,12 +78,12 @@ TEST(FlexibleModelTest, LinearisedMatricesOfTheReport) {
 // The rig's nominal values: 2.70 Hz with the hub clamped; the seed's resonance of 3.84568 Hz.
 TEST(FlexibleModelTest, ClampedFrequencies) {
   const auto hertz = [](const FlexibleConstants& p) { return std::sqrt(p.k / p.j2) / (2 * 3.14159265358979323846); };
-  EXPECT_NEAR(hertz(Cases()[0].p), 3.84568, 5e-4);
-  EXPECT_NEAR(hertz(Cases()[1].p), 2.70, 5e-3);
+  EXPECT_NEAR(hertz(FlexibleCases()[0].p), 3.84568, 5e-4);
+  EXPECT_NEAR(hertz(FlexibleCases()[1].p), 2.70, 5e-3);
 }
 
 TEST(FlexibleModelTest, EnergyIsKeptWithoutDampingAndCommand) {
-  for (const auto& c : Cases()) {
+  for (const auto& c : FlexibleCases()) {
     const ModelPtr m = LoadRig(c.rig);
     ASSERT_NE(m, nullptr);
     mju_zero(m->dof_damping, m->nv);
@@ -101,7 +101,7 @@ TEST(FlexibleModelTest, EnergyIsKeptWithoutDampingAndCommand) {
 
 // Positive commands accelerate the driven joint positive; the link lags behind.
 TEST(FlexibleModelTest, Signs) {
-  for (const auto& c : Cases()) {
+  for (const auto& c : FlexibleCases()) {
     const ModelPtr m = LoadRig(c.rig);
     ASSERT_NE(m, nullptr);
     DataPtr d(mj_makeData(m.get()));

@@ -44,7 +44,7 @@ struct QubeConstants {
   }
 };
 
-constexpr double kReferenceStep_s = 2e-5;
+constexpr double kQubeStep_s = 2e-5;
 // A rod is given 1e-10 kg m2 about itself, a quarter of a millionth of the inertia about the axis: that is what is left
 // over.
 constexpr double kTolerance_rad = 2e-5;
@@ -55,7 +55,7 @@ TEST(QubeModelTest, FollowsTheEquationsSwingingWidely) {
   const double h = m->opt.timestep;
   const auto command = [&](int k) { return std::vector<double>{ChirpAndSteps(k * h, 4, 0.3, 6, 2)}; };
   const Motion motion = Drive(*m, {0, 0.3}, static_cast<int>(std::lround(2 / h)), command);
-  EXPECT_LT(LargestDifference<4>(*m, motion, {0, 0.3}, kReferenceStep_s, QubeConstants{}, command), kTolerance_rad);
+  EXPECT_LT(LargestDifference<4>(*m, motion, {0, 0.3}, kQubeStep_s, QubeConstants{}, command), kTolerance_rad);
   // It swung: the check would be idle on a hanging pendulum.
   double widest = 0;
   for (const auto& q : motion.q) widest = std::fmax(widest, std::abs(q[1]));
@@ -84,7 +84,7 @@ TEST(QubeModelTest, SimurlacraHoldsTheSourcesOwnFormula) {
   const double h = m->opt.timestep;
   const auto command = [&](int k) { return std::vector<double>{ChirpAndSteps(k * h, 1.5, 10, 0.5, 2)}; };
   const Motion motion = Drive(*m, {0, 0}, static_cast<int>(std::lround(2 / h)), command);
-  EXPECT_LT(LargestDifference<4>(*m, motion, {0, 0}, kReferenceStep_s, source, command), kTolerance_rad);
+  EXPECT_LT(LargestDifference<4>(*m, motion, {0, 0}, kQubeStep_s, source, command), kTolerance_rad);
 }
 
 // The documents' A and B: hanging (sign +1) and upright (sign -1) differ in the coupling and the gravity term.

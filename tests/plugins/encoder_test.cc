@@ -6,7 +6,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr double kRounding = 1e-12;
+constexpr double kEncoderRounding = 1e-12;
 
 // A joint with a plain motor and an encoder.
 std::string Xml(const Attributes& config, const Attributes& live, const std::string& option = "timestep='0.001'",
@@ -50,8 +50,8 @@ TEST(EncoderTest, OffsetThenQuantisation) {
   for (double q = -0.05; q < 0.05; q += 0.00037) {
     d->qpos[0] = q;
     mj_forward(m.get(), d.get());
-    EXPECT_NEAR(d->sensordata[0], 0.01 * std::round((q + 0.004) / 0.01), kRounding);
-    EXPECT_LE(std::abs(d->sensordata[0] - q - 0.004), 0.005 + kRounding);
+    EXPECT_NEAR(d->sensordata[0], 0.01 * std::round((q + 0.004) / 0.01), kEncoderRounding);
+    EXPECT_LE(std::abs(d->sensordata[0] - q - 0.004), 0.005 + kEncoderRounding);
   }
 }
 

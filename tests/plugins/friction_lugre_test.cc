@@ -6,10 +6,10 @@
 namespace gapscope::test {
 namespace {
 
-constexpr double kInertia = 0.01, kCoulomb = 0.2, kSigma0 = 50, kSigma1 = 0.2;
+constexpr double kBristleInertia = 0.01, kCoulomb = 0.2, kSigma0 = 50, kSigma1 = 0.2;
 
 JointModel Bristle(double step_s, const std::string& integrator, double sigma1 = kSigma1) {
-  JointModel joint{.step_s = step_s, .integrator = integrator, .inertia = kInertia};
+  JointModel joint{.step_s = step_s, .integrator = integrator, .inertia = kBristleInertia};
   joint.config = Config("model", "lugre") + Config("friction_n_m", kCoulomb) + Config("sigma0_n_m_per_rad", kSigma0) +
                  Config("sigma1_n_m_s_per_rad", sigma1);
   joint.actuators = "<motor joint=\"j\"/>";
@@ -62,7 +62,7 @@ TEST(FrictionLugreTest, SlidesAtTheLevel) {
   const DataPtr d(mj_makeData(m.get()));
   d->ctrl[0] = 0.5;
   for (int i = 0; i < 500; ++i) mj_step(m.get(), d.get());
-  EXPECT_NEAR(d->qacc[0], (0.5 - kCoulomb) / kInertia, 1e-6);
+  EXPECT_NEAR(d->qacc[0], (0.5 - kCoulomb) / kBristleInertia, 1e-6);
 }
 
 // The gearbox's load is that of motor and gravity, never the friction itself, which would feed itself.
@@ -73,7 +73,7 @@ TEST(FrictionLugreTest, LoadDoesNotCountOwnTorque) {
   const DataPtr d(mj_makeData(m.get()));
   d->ctrl[0] = 0.8;
   for (int i = 0; i < 500; ++i) mj_step(m.get(), d.get());
-  EXPECT_NEAR(d->qacc[0], (0.8 - kCoulomb - 0.5 * 0.8) / kInertia, 1e-6);
+  EXPECT_NEAR(d->qacc[0], (0.8 - kCoulomb - 0.5 * 0.8) / kBristleInertia, 1e-6);
 }
 
 // RK4 computes four times a step; the bristle settles once, so that the result converges to a fine Euler run.

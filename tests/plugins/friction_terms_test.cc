@@ -8,7 +8,7 @@
 namespace gapscope::test {
 namespace {
 
-constexpr double kInertia = 0.01;
+constexpr double kTermsInertia = 0.01;
 
 // The acceleration of a free wheel at a speed under a motor torque, steady (the second step of two).
 double Acceleration(const JointModel& joint, double speed, double torque) {
@@ -23,7 +23,7 @@ double Acceleration(const JointModel& joint, double speed, double torque) {
 }
 
 JointModel Wheel(const std::string& config, bool turn = true) {
-  JointModel joint{.step_s = 1e-4, .inertia = kInertia};
+  JointModel joint{.step_s = 1e-4, .inertia = kTermsInertia};
   joint.config = config + Config("row_softness", 0.01);
   joint.turn = turn;
   joint.actuators = "<motor joint=\"j\" forcerange=\"-2 2\"/>";
@@ -61,8 +61,8 @@ TEST(FrictionTermsTest, SlidingTorqueFollowsTheLaw) {
                          {base + Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5), 3, 1, -0.3}}) {
     const double applied = std::clamp(c.torque, -2.0, 2.0);
     for (const bool turn : {true, false}) {  // the torque is steady, so last step's is this step's
-      EXPECT_NEAR(Acceleration(Wheel(c.config, turn), c.speed, c.torque), (applied + c.friction) / kInertia,
-                  kTolerance / kInertia)
+      EXPECT_NEAR(Acceleration(Wheel(c.config, turn), c.speed, c.torque), (applied + c.friction) / kTermsInertia,
+                  kTolerance / kTermsInertia)
           << c.config << " at " << c.speed << " rad/s, " << c.torque << " N m, turn " << turn;
     }
   }
@@ -74,15 +74,15 @@ TEST(FrictionTermsTest, HoldsDifferentlyByDirection) {
       Config("friction_n_m", 0.1) + Config("friction_positive_n_m", 0.05) + Config("friction_negative_n_m", 0.2);
   for (const bool turn : {true, false}) {
     EXPECT_LT(std::abs(Acceleration(Wheel(config, turn), 0, 0.149)), 1e-3);
-    EXPECT_NEAR(Acceleration(Wheel(config, turn), 0, 0.151), 0.001 / kInertia, 1e-3);
+    EXPECT_NEAR(Acceleration(Wheel(config, turn), 0, 0.151), 0.001 / kTermsInertia, 1e-3);
     EXPECT_LT(std::abs(Acceleration(Wheel(config, turn), 0, -0.299)), 1e-3);
-    EXPECT_NEAR(Acceleration(Wheel(config, turn), 0, -0.301), -0.001 / kInertia, 1e-3);
+    EXPECT_NEAR(Acceleration(Wheel(config, turn), 0, -0.301), -0.001 / kTermsInertia, 1e-3);
   }
   // Held by the motor against back-driving: half of the load's share.
   const std::string geared =
       Config("load_coefficient", 0.2) + Config("backdrive_factor", 0.5) + Config("friction_n_m", 0.01);
   JointModel loaded = Wheel(geared);
-  loaded.mass = 0.5, loaded.length = 0.1, loaded.inertia = kInertia;
+  loaded.mass = 0.5, loaded.length = 0.1, loaded.inertia = kTermsInertia;
   const ModelPtr m = Compile(loaded.Xml());
   const DataPtr d(mj_makeData(m.get()));
   const double load = 0.5 * 9.81 * 0.1;  // at q = pi/2, pulling negative
@@ -213,7 +213,7 @@ TEST(FrictionTermsTest, EveryParameterHasASmoothGradient) {
                                    {"viscous_negative_n_m_s_per_rad", 0.002, 1e-5},
                                    {"backdrive_factor", 0.7, 1e-2}};
   for (const bool lugre : {false, true}) {
-    JointModel joint{.step_s = 0.001, .inertia = kInertia};
+    JointModel joint{.step_s = 0.001, .inertia = kTermsInertia};
     std::vector<Knob> all = knobs;
     if (lugre) {
       all.push_back({"sigma0_n_m_per_rad", 5, 0.1});

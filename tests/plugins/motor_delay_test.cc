@@ -7,7 +7,7 @@ namespace gapscope::testing {
 namespace {
 
 constexpr double kExact = 1e-6;  // rad, asked for of a fractional delay
-constexpr double kRounding = 1e-12;
+constexpr double kDelayRounding = 1e-12;
 
 // --- command delay -------------------------------------------------------------------------------------------------
 
@@ -89,7 +89,7 @@ TEST(MotorDelayTest, WholeStepsEqualTheNativeDelay) {
       a->ctrl[0] = b->ctrl[0] = k == 0 ? 0 : Command(k);
       mj_step(m.get(), a.get());
       mj_step(n.get(), b.get());
-      ASSERT_NEAR(a->qpos[0], b->qpos[0], kRounding) << integrator << " step " << k;
+      ASSERT_NEAR(a->qpos[0], b->qpos[0], kDelayRounding) << integrator << " step " << k;
     }
   }
 }
@@ -134,7 +134,7 @@ TEST(MotorDelayTest, HistoryPushedByTheHostIsTheStart) {
     window->ctrl[0] = Command(k);
     mj_step(m.get(), window.get());
   }
-  EXPECT_NEAR(window->qpos[0], whole->qpos[0], kRounding);
+  EXPECT_NEAR(window->qpos[0], whole->qpos[0], kDelayRounding);
 }
 
 // --- delay in the servo's loop -------------------------------------------------------------------------------------

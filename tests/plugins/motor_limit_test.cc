@@ -6,7 +6,7 @@
 namespace gapscope::testing {
 namespace {
 
-constexpr double kRounding = 1e-12;
+constexpr double kLimitRounding = 1e-12;
 constexpr double kHuge = 1e6;  // a request that every limit cuts
 
 // The torque that is left of a huge request, over speeds on both sides and both directions of torque.
@@ -20,9 +20,9 @@ void Trace(const Rig& rig, double fastest, Motoring motoring, Generating generat
     for (const double sign : {-1.0, 1.0}) {
       const double expected = sign * (sign * speed > 0 ? motoring(std::abs(speed)) : generating(std::abs(speed)));
       const double torque = TorqueAt(m.get(), d.get(), 0, speed, {sign * kHuge});
-      ASSERT_NEAR(torque, expected, kRounding * (1 + std::abs(expected))) << "speed " << speed << " sign " << sign;
+      ASSERT_NEAR(torque, expected, kLimitRounding * (1 + std::abs(expected))) << "speed " << speed << " sign " << sign;
       // What is below the limit passes.
-      ASSERT_NEAR(TorqueAt(m.get(), d.get(), 0, speed, {0.5 * expected}), 0.5 * expected, kRounding);
+      ASSERT_NEAR(TorqueAt(m.get(), d.get(), 0, speed, {0.5 * expected}), 0.5 * expected, kLimitRounding);
     }
   }
 }
@@ -75,14 +75,14 @@ TEST(MotorLimitTest, CubicTableMeetsThePointsAndIsMonotone) {
   const ModelPtr m = Table("cubic").Compile();
   const DataPtr d(mj_makeData(m.get()));
   for (std::size_t i = 1; i < kSpeed.size(); ++i) {
-    EXPECT_NEAR(TorqueAt(m.get(), d.get(), 0, kSpeed[i], {kHuge}), kTorque[i], kRounding);
-    EXPECT_NEAR(TorqueAt(m.get(), d.get(), 0, -kSpeed[i], {-kHuge}), -kTorque[i], kRounding);
-    EXPECT_NEAR(TorqueAt(m.get(), d.get(), 0, -kSpeed[i], {kHuge}), kBrake[i], kRounding);
+    EXPECT_NEAR(TorqueAt(m.get(), d.get(), 0, kSpeed[i], {kHuge}), kTorque[i], kLimitRounding);
+    EXPECT_NEAR(TorqueAt(m.get(), d.get(), 0, -kSpeed[i], {-kHuge}), -kTorque[i], kLimitRounding);
+    EXPECT_NEAR(TorqueAt(m.get(), d.get(), 0, -kSpeed[i], {kHuge}), kBrake[i], kLimitRounding);
   }
   double last = 4;
   for (double w = 0.01; w < 13; w += 0.01) {
     const double torque = TorqueAt(m.get(), d.get(), 0, w, {kHuge});
-    ASSERT_LE(torque, last + kRounding) << w;
+    ASSERT_LE(torque, last + kLimitRounding) << w;
     ASSERT_NEAR(torque, LinearTable(kTorque, w), 0.25) << w;
     last = torque;
   }

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, interpreter
 
-STEP_S, STEPS, ENVS, JOINTS = 0.002, 1500, 2, 3
+STEP_S, STEPS, ENVS, JOINTS = 0.002, 500, 2, 3
 Values = dict[str, list[float]]
 DRIVE: Values = {
     "kp": [157, 90, 40],

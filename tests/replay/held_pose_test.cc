@@ -14,8 +14,8 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kSame = 1e-12, kPeriod_s = 0.004;
-constexpr int kRows = 251;
+constexpr double kSame = 1e-12, kHeldPeriod_s = 0.004;
+constexpr int kHeldRows = 251;
 // Of the sensors on the base.
 const Vector3d kMarker(0.2, -0.1, 0.05);
 const Quaterniond kMounted(Eigen::AngleAxisd(0.4, Vector3d(1, 2, -1).normalized()));
@@ -70,10 +70,10 @@ const std::string kPlace =
 // What a camera has of a stand. The sign of its quaternion says nothing.
 std::string Csv(const Stand& stand, bool moves = false) {
   std::string csv = "t,swing,x,y,z,qw,qx,qy,qz\n";
-  for (int k = 0; k < kRows; ++k) {
+  for (int k = 0; k < kHeldRows; ++k) {
     const Vector3d p = 1000 * (stand.place + stand.turn * kMarker) + Vector3d(moves && k > 100 ? 500 : 0, 0, 0);
     const Quaterniond q = stand.turn * kMounted;
-    csv += Numbers({k * kPeriod_s, 0, p.x(), p.y(), p.z(), -q.w(), -q.x(), -q.y(), -q.z()}, ",") + "\n";
+    csv += Numbers({k * kHeldPeriod_s, 0, p.x(), p.y(), p.z(), -q.w(), -q.x(), -q.y(), -q.z()}, ",") + "\n";
   }
   return csv;
 }

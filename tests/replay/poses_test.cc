@@ -18,7 +18,7 @@ using Eigen::Vector3d;
 constexpr double kPeriod_s = 0.004;
 constexpr int kRows = 401;
 
-const char kYaml[] = R"(log: {time: {column: t, unit: s}}
+const char kPosesYaml[] = R"(log: {time: {column: t, unit: s}}
 measured:
   - {signal: place, sensor: place, columns_of_elements: [x, y, z], unit: mm}
   - {signal: turn, sensor: turn, columns_of_elements: [qw, qx, qy, qz]}
@@ -68,7 +68,7 @@ class PosesTest : public ::testing::Test {
 };
 
 TEST_F(PosesTest, FourColumnsAreThreeSignals) {
-  Load(kYaml);
+  Load(kPosesYaml);
   ASSERT_EQ(recording_.measured.size(), 6u);
   EXPECT_EQ(recording_.measured[3].spec.signal, "turn[0]");
   EXPECT_EQ(recording_.measured[5].spec.signal, "turn[2]");
@@ -85,7 +85,7 @@ TEST_F(PosesTest, FourColumnsAreThreeSignals) {
 
 TEST_F(PosesTest, ThePredictionIsTheClosedForm) {
   constexpr double kTolerance = 1e-8;  // RK4 at 1 ms
-  Load(kYaml);
+  Load(kPosesYaml);
   const InitialState start = Truth();
   const auto predicted = Predict(*model_, recording_, {}, &start);
   for (std::size_t s = 0; s < 6; ++s)
@@ -95,7 +95,7 @@ TEST_F(PosesTest, ThePredictionIsTheClosedForm) {
 // predicted - measured = log(conj(measured) predicted), here the same turn at all times.
 TEST_F(PosesTest, TheResidualIsTheRotationVectorInTheMeasuredFrame) {
   const Vector3d off(0.4, -1.1, 0.7);
-  Load(kYaml, -off);
+  Load(kPosesYaml, -off);
   const InitialState start = Truth();
   const auto predicted = Predict(*model_, recording_, {}, &start);
   for (std::size_t e = 0; e < 3; ++e) {
@@ -106,7 +106,7 @@ TEST_F(PosesTest, TheResidualIsTheRotationVectorInTheMeasuredFrame) {
 }
 
 TEST_F(PosesTest, AMountIsAParameterOfEachNumber) {
-  const std::string yaml = std::string(kYaml).insert(std::string(kYaml).rfind('}'), ", mount: [mx, my, mz]") +
+  const std::string yaml = std::string(kPosesYaml).insert(std::string(kPosesYaml).rfind('}'), ", mount: [mx, my, mz]") +
                            "parameters:\n  mx: {unit: rad, nominal: 0.4, bounds: [-1, 1]}\n"
                            "  my: {unit: rad, nominal: -0.3, bounds: [-1, 1]}\n"
                            "  mz: {unit: rad, nominal: 0.2, bounds: [-1, 1]}\n";
@@ -122,7 +122,7 @@ TEST_F(PosesTest, AMountIsAParameterOfEachNumber) {
 
 TEST_F(PosesTest, AFreeBodyStartsFromItsMeasuredPose) {
   constexpr double kPlace_m = 1e-5, kTurn = 1e-5, kSpeed = 2e-3;  // of local parabolas of 40 ms
-  Load(kYaml);
+  Load(kPosesYaml);
   ASSERT_EQ(model_->free_starts().size(), 1u);
   for (const std::size_t row : {10u, 137u, 250u, 390u}) {
     const double t = recording_.time_s[row];
@@ -139,13 +139,13 @@ TEST_F(PosesTest, AFreeBodyStartsFromItsMeasuredPose) {
 
 // The MJCF's sensors and those that the experiment adds read the same: of the site, and of the body itself.
 TEST_F(PosesTest, BodiesAndSitesNeedNoSensorInTheMjcf) {
-  Load(Replaced(Replaced(kYaml, "sensor: place", "site: marker"), "sensor: turn", "site: marker"));
+  Load(Replaced(Replaced(kPosesYaml, "sensor: place", "site: marker"), "sensor: turn", "site: marker"));
   ASSERT_EQ(model_->free_starts().size(), 1u);
   InitialState start = Truth();
   const auto predicted = Predict(*model_, recording_, {}, &start);
   for (std::size_t s = 0; s < 6; ++s)
     EXPECT_LT(LargestDifference(predicted[s], recording_.measured[s].values), 1e-8) << s;
-  Load(Replaced(Replaced(kYaml, "sensor: place", "body: top"), "sensor: turn", "body: top"));
+  Load(Replaced(Replaced(kPosesYaml, "sensor: place", "body: top"), "sensor: turn", "body: top"));
   start = Truth();
   const auto of_body = Predict(*model_, recording_, {}, &start);
   for (std::size_t row = 0; row < recording_.rows(); ++row) {
@@ -155,7 +155,7 @@ TEST_F(PosesTest, BodiesAndSitesNeedNoSensorInTheMjcf) {
 }
 
 TEST_F(PosesTest, OrderOfColumnsMayBeStated) {
-  const std::string yaml = Replaced(kYaml, "[qw, qx, qy, qz]", "[qx, qy, qz, qw], order: xyzw");
+  const std::string yaml = Replaced(kPosesYaml, "[qw, qx, qy, qz]", "[qx, qy, qz, qw], order: xyzw");
   Load(yaml);
   const InitialState start = Truth();
   EXPECT_LT(LargestDifference(Predict(*model_, recording_, {}, &start)[3], recording_.measured[3].values), 1e-8);
@@ -175,7 +175,7 @@ TEST_F(PosesTest, AnOrientationAloneTurnsTheBodyWhereItStands) {
 }
 
 TEST_F(PosesTest, APoseThatIsNotToBeTakenLeavesTheModelsOwn) {
-  std::string yaml = Replaced(kYaml, "unit: mm", "unit: mm, start: false");
+  std::string yaml = Replaced(kPosesYaml, "unit: mm", "unit: mm, start: false");
   Load(Replaced(yaml, "qz]", "qz], start: false"));
   EXPECT_TRUE(model_->free_starts().empty());
   EXPECT_EQ(InitialStateAt(*model_, recording_, 137, model_->Nominal()).qpos[0], 0.5);
@@ -221,7 +221,7 @@ TEST_F(PosesTest, ErrorsSayWhatAndWhere) {
       {"sensor: turn", "body: arm, start: true", {"experiment.yaml:5:5:", "'arm' has no free joint"}},
       {"sensor: turn", "sensor: tern", {"experiment.yaml:5:5:", "that the MJCF lacks", "'turn'"}},
   };
-  const std::string good = Replaced(kYaml, "unit: mm", "unit: \"1\"");
+  const std::string good = Replaced(kPosesYaml, "unit: mm", "unit: \"1\"");
   EXPECT_EQ(MessageOf(scratch_, good, Csv()), "");
   for (const Case& broken : cases) {
     const std::string message = MessageOf(scratch_, Replaced(good, broken.from, broken.to), Csv());

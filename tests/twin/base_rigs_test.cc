@@ -9,7 +9,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kIntegration = 1e-7;  // relative, of a fourth-order method at 50 us
 constexpr double kCrossing = 2e-5;     // relative, periods from interpolated crossings
 

@@ -7,7 +7,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSizingStep_s = 5e-4;
 
 RecordOptions Sizing() {

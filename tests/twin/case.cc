@@ -9,7 +9,6 @@ namespace {
 constexpr std::pair<Kind, const char*> kKinds[] = {
     {Kind::kAuto, "auto"},     {Kind::kNone, "none"},       {Kind::kSingle, "single"},       {Kind::kPair, "pair"},
     {Kind::kTriple, "triple"}, {Kind::kUnknown, "unknown"}, {Kind::kAmbiguous, "ambiguous"}, {Kind::kRough, "rough"}};
-constexpr int kTries = 12;
 
 Kind DrawKind(Random* random) {
   const double u = random->Unit();

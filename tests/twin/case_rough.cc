@@ -8,7 +8,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr int kTries = 12;
 constexpr double kBeside = 1.5, kLeastShare = 0.5;
 
 // The laws are taken out over the plant's own motion, which the torque itself changes a little.

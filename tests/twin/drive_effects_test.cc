@@ -10,8 +10,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
-
 // A command that jumps to `value` at 10 ms.
 Commands Jump(double value, double late_s, double feedforward = 0) {
   Commands commands;

@@ -9,7 +9,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr std::array<std::pair<Shape, const char*>, 9> kNames = {{{Shape::kZero, "zero"},
                                                                   {Shape::kChirp, "chirp"},
                                                                   {Shape::kMultisine, "multisine"},

@@ -11,7 +11,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kInertia = 0.159221308;
 
 class DryTest : public testing::TestWithParam<FrictionLaw> {};

@@ -3,8 +3,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kSpread = 0.18;  // inside the contract's 20 %
-
 std::vector<BaseParameter> MotorModule() {
   return {{"motor.resistance", "ohm", &Base::resistance_ohm, kSpread},
           {"motor.kt", "N m/A", &Base::kt_n_m_per_a, kSpread},

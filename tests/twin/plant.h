@@ -5,6 +5,7 @@
 
 #include <array>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,8 @@ namespace gapscope::twin {
 enum class Rig { kJoint, kQube, kFlexJoint, kFlexLink };
 inline constexpr std::array kRigs = {Rig::kJoint, Rig::kQube, Rig::kFlexJoint, Rig::kFlexLink};
 inline constexpr double kNever = std::numeric_limits<double>::infinity();
+inline constexpr double kTurn = 2 * std::numbers::pi;  // rad
+inline constexpr double kSpread = 0.18;                // of base parameters: inside the experiment files' bounds
 
 // Base parameters; those that a rig does not have stay at zero (gear and efficiency at one).
 struct Base {

@@ -9,7 +9,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSmoothSign = 0.1;            // of the speed's deviation
 constexpr double kSame = 1e-3;                 // laws whose difference is less over the motion count as one
 constexpr double kMostHeld = 0.5;              // by one law, of the torque's square

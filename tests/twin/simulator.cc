@@ -10,8 +10,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kJust_s = 1e-8;
 constexpr double kLongestDelay_s = 0.05;
 constexpr double kLowestCeiling = 0.15;  // a sagging supply keeps this share
 

@@ -7,8 +7,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kSpread = 0.18;  // inside the experiment file's bounds
-
 const Vector3d kUp(0, 0, 1), kLift(0, -1, 0), kAlong(1, 0, 0);
 
 // A vertical plane, hanging at zero: positive angles turn both links forward and up.

@@ -6,7 +6,6 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr int kTries = 12;
 constexpr double kWeakest = 0.8;  // of the lowest ratio that was drawn for: weaker cases are drawn again
 
 // An attempt at a case: effects with severities, roughness beside them.

@@ -10,16 +10,15 @@
 namespace gapscope::twin {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSettle_s = 1.5;  // at the first targets, before a log
-constexpr double kSizing_s = 1e-3;
-constexpr double kTorqueQuantum = 1e-3, kMotionSample_s = 0.005;
+constexpr double kArmSizing_s = 1e-3;
+constexpr double kArmTorqueQuantum = 1e-3, kMotionSample_s = 0.005;
 constexpr double kTolerableSpeed = 12, kTolerableTorque = 4, kTolerableTurn_rad = 3;  // rad/s, rated torques, from home
 constexpr int kLogs = 4;
 
-RecordOptions Sizing() {
+RecordOptions ArmSizing() {
   RecordOptions options;
-  options.step_s = kSizing_s;
+  options.step_s = kArmSizing_s;
   options.noise = false;
   return options;
 }
@@ -41,7 +40,7 @@ struct ArmPeaks {
 ArmPeaks PeaksOfArm(const ArmPlant& plant, const ArmLog& log) {
   ArmLog clean = log;
   clean.dropped_share = 0;
-  const ArmRecord record = MakeArmRecord(plant, clean, ArmSensors{}, Sizing());
+  const ArmRecord record = MakeArmRecord(plant, clean, ArmSensors{}, ArmSizing());
   const auto& links = ArmLinks(plant.rig);
   ArmPeaks peaks;
   const auto grow = [](double* peak, double value) {
@@ -201,7 +200,7 @@ class ArmRecorder {
       const double noise = sensors_.torque_noise * ArmLinks(plant_.rig)[j].rated_n_m * noise_.Normal();
       const double late = log_late_s_ / simulator_.step_s(), now = t / simulator_.step_s();
       const double estimate = late > 0 ? torque_history_.At(j, now - late) : simulator_.estimate_n_m()[j];
-      if (log_.torque_columns) row.push_back(options_.noise ? Rounded(estimate + noise, kTorqueQuantum) : estimate);
+      if (log_.torque_columns) row.push_back(options_.noise ? Rounded(estimate + noise, kArmTorqueQuantum) : estimate);
     }
     if (missed) return;
     Snapshot(t, last);
@@ -297,7 +296,7 @@ std::vector<Motion> ArmMotions(const ArmPlant& plant, const std::vector<ArmLog>&
   const auto grow = [](double* peak, double value) { *peak = std::max(*peak, std::abs(value)); };
   double count = 0;
   for (const ArmLog& log : logs) {
-    const ArmRecord record = MakeArmRecord(plant, log, ArmSensors{}, Sizing());
+    const ArmRecord record = MakeArmRecord(plant, log, ArmSensors{}, ArmSizing());
     count += static_cast<double>(record.time_s.size());
     for (std::size_t i = 0; i < record.time_s.size(); ++i) {
       for (int j = 0; j < plant.count(); ++j) {
@@ -322,7 +321,7 @@ std::vector<Motion> ArmMotions(const ArmPlant& plant, const std::vector<ArmLog>&
 std::vector<JointMotion> ArmJointMotions(const ArmPlant& plant, const std::vector<ArmLog>& logs) {
   std::vector<JointMotion> motions(plant.joints.size());
   for (const ArmLog& log : logs) {
-    const ArmRecord record = MakeArmRecord(plant, log, ArmSensors{}, Sizing());
+    const ArmRecord record = MakeArmRecord(plant, log, ArmSensors{}, ArmSizing());
     for (JointMotion& m : motions) m.begins.push_back(m.angle_rad.size());
     double next = 0;
     for (std::size_t i = 0; i < record.time_s.size(); ++i) {

@@ -6,11 +6,7 @@
 #include "tests/twin/rough.h"
 
 namespace gapscope::twin {
-namespace {
-
-constexpr double kJust_s = 1e-8;
-
-}  // namespace
+namespace {}  // namespace
 
 ArmSimulator::ArmSimulator(const ArmPlant& plant, double step_s) : step_s_(step_s) {
   const JointVector none = JointVector::Zero(plant.count());

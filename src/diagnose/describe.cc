@@ -252,7 +252,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   const std::vector<LogReplay> predicted = PredictHeldOut(bench, chosen);
   result.remainder = Divide(bench, base, chosen, predicted, result.floor, beside);
   result.at_bounds = FindAtBounds(bench, chosen, *base.model);
-  if (next_experiment) {
+  if (next_experiment && !bench.deadline.stopped()) {
     say("designing the next experiment");
     result.next = DesignNext(OpenQuestions(bench, found, judgement), bench, noise);
   }
@@ -270,6 +270,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.nominal_values = found.nominal->values;
   result.refit_model = base.model;
   result.refit_values = base.values;
+  result.interrupted = bench.deadline.stopped();
   result.explanation = Explain(result);
   return result;
 }

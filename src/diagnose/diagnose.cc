@@ -337,7 +337,6 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   result.most_steps += lead.work.steps;
   SayWhatWasFitted(*at, &result);
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
-  result.interrupted = deadline.stopped();
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

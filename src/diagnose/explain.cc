@@ -105,11 +105,13 @@ std::string Explain(const Diagnosis& d) {
       break;
     }
     case Verdict::kUnknown:
-      text +=
-          d.effects.empty()
-              ? fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise{}.",
-                            d.evidence.floors_left, FloorsText(d.evidence))
-              : ExplainEffects(d) + ", and no known effect explains what remains.";
+      if (!d.effects.empty())
+        text += ExplainEffects(d) + ", and no known effect explains what remains.";
+      else if (d.statements.empty())
+        text += "No effect was looked at.";
+      else
+        text += fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise{}.",
+                            d.evidence.floors_left, FloorsText(d.evidence));
       if (!d.remains.empty())
         text += " It lies mostly at: " + d.remains.front().signal + ", " + d.remains.front().condition + ".";
       text += RetunedText(d);

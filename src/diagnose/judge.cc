@@ -339,6 +339,7 @@ class Judging {
   // Effects that were looked at and did not enter the set.
   void AddOthers(Judgement* result) {
     const ColumnTable& table = found_.columns;
+    if (!table.valid) return;  // nothing was looked at
     for (const EffectUse& use : found_.uses) {
       if (FindTold(use, result)) continue;
       double seen = 0, moved = 0;

@@ -9,6 +9,7 @@
 #define GAPSCOPE_FIT_FIT_PROBLEM_H_
 
 #include <Eigen/Core>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -47,7 +48,8 @@ struct DifferenceOptions {
   // Columns that are left zero: of y (empty: none), and the first ones of a window's state.
   std::vector<char> known = {};
   Eigen::Index known_states = 0;
-  WindowMask mask = {};  // windows that are left out have no residuals and no Jacobian
+  WindowMask mask = {};                     // windows that are left out have no residuals and no Jacobian
+  const std::atomic<bool>* stop = nullptr;  // once it is set, MakeGram begins no other column and has no valid system
 };
 
 // Residuals and Jacobian of a point.

@@ -242,6 +242,7 @@ std::optional<std::vector<WindowColumns>> ColumnsOf(FitProblem& parent, const Fi
   }
   ExtraColumns columns(parent, point, at, options.mask, &gram->work);
   for (std::size_t e = 0; e < extra.size(); ++e) {
+    if (options.stop && options.stop->load()) return std::nullopt;
     const std::optional<Residuals> added = columns.Make(extra[e]);
     if (!added) gram->failed[e] = static_cast<char>(true);
     for (std::size_t w = 0; w < windows.size() && added; ++w) {

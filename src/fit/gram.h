@@ -24,7 +24,7 @@ struct GramSystem {
   std::vector<Eigen::MatrixXd> parts;  // products of the columns over each part's rows
   std::size_t half_seconds = 0;        // of the logs that have residuals
   std::vector<char> failed;            // per extra column: cannot be simulated, and is zero
-  bool valid = false;                  // false: the point cannot be simulated
+  bool valid = false;                  // false: the point cannot be simulated, or it was stopped
   Work work;
 };
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -93,6 +94,18 @@ TEST_F(ResumeTest, KilledElsewhereEndsInTheSameBytes) {
   const std::vector<std::string> left = Killed(&whole);
   for (const std::size_t i : {std::size_t{0}, 2 * left.size() / 3}) ExpectSameFrom(left[i], whole);
   EXPECT_EQ(warnings_, "");
+}
+
+// Asked to stop at any stage, it looks at nothing more, and tells nothing of what was not looked at.
+TEST_F(ResumeTest, StopsWhereItIs) {
+  std::atomic<bool> stop = false;
+  const auto at_columns = [&](const DiagnoseProgress& p) { stop = stop || p.stage == "columns of all effects"; };
+  const Diagnosis stopped = Run({.progress = at_columns, .stop = &stop, .journal = Path("journal")}).value();
+  ASSERT_TRUE(stop.load());
+  EXPECT_TRUE(stopped.interrupted);
+  EXPECT_TRUE(stopped.statements.empty());
+  EXPECT_NE(stopped.explanation.find("It was interrupted"), std::string::npos) << stopped.explanation;
+  EXPECT_EQ(Bytes(Run({})), Bytes(Run({.journal = Path("journal"), .resume = true})));
 }
 
 TEST_F(ResumeTest, JournalOfAnotherJobIsRefused) {

@@ -25,14 +25,30 @@ class Writer {
       if (gains[a].armature > 0) rotors_.insert(p_.actuators[a].joint);
       if (gains[a].kp > 0 || gains[a].kd > 0) damped_.insert(p_.actuators[a].joint);
     }
-    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) OfJoint(j);
+    std::string unknown;
+    for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) {
+      if (Shows(j))
+        OfJoint(j);
+      else
+        unknown += (unknown.empty() ? "" : ", ") + p_.joints[j].name;
+    }
     for (int a = 0; a < m_.nactuator; ++a) OfActuator(a);
     for (std::size_t a = 0; a < gains.size(); ++a) OfAdded(p_.actuators[a], gains[a]);
-    if (parameters_.empty()) return "";
-    return "parameters:\n" + parameters_ + (set_.empty() ? "" : "set:\n" + set_);
+    if (!unknown.empty())
+      unknown = "# Neither driven, measured nor sprung, so without parameters here: " + unknown + "\n";
+    if (parameters_.empty()) return unknown;
+    return unknown + "parameters:\n" + parameters_ + (set_.empty() ? "" : "set:\n" + set_);
   }
 
  private:
+  // What neither a command moves nor a column says anything of is only carried along. A spring may swing unseen.
+  bool Shows(int slot) const {
+    const int joint = p_.joints[slot].joint;
+    if (p_.positions[slot].column >= 0 || p_.velocities[slot].column >= 0 || m_.jnt_stiffness[joint] > 0) return true;
+    const auto drives = [&](const ActuatorSlot& actuator) { return actuator.joint == slot; };
+    return std::any_of(p_.actuators.begin(), p_.actuators.end(), drives);
+  }
+
   // A name that expressions can use, and no other parameter has.
   std::string ParameterName(const std::string& element) {
     std::string name = NameForExpressions(element);

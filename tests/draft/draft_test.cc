@@ -59,6 +59,18 @@ TEST_F(DraftTest, ByNameWhateverTheOrder) {
   EXPECT_FALSE(IsUnsure("is taken for")) << text_;
 }
 
+// A gripper's finger, say: the logs say nothing of it.
+TEST_F(DraftTest, WhatNothingMovesOrMeasuresHasNoParameters) {
+  std::vector<std::string> names = kThree;
+  names.emplace_back("finger");
+  const std::vector<Named> columns = Columns("target/", "q/", "", {"hip", "knee", "left foot"});
+  const auto of_finger = [](const Parameter& p) { return p.name.starts_with("finger"); };
+  EXPECT_TRUE(std::ranges::none_of(Drafted(Bars(names), columns).parameters, of_finger)) << text_;
+  EXPECT_NE(text_.find("# Neither driven, measured nor sprung, so without parameters here: finger\n"), text_.npos);
+  const Experiment sprung = Drafted(Bars(names, "", "stiffness='2'"), columns);
+  EXPECT_TRUE(std::ranges::any_of(sprung.parameters, of_finger)) << text_;
+}
+
 TEST_F(DraftTest, ForeignNamesGoByOrderAndSaySo) {
   const std::vector<std::string> ends = {"Rotation", "Pitch", "Jaw"};
   const Experiment e = Drafted(Bars(kThree), Columns("control/positions/", "positions/", "velocities/", ends));

@@ -107,7 +107,7 @@ std::string Explain(const Diagnosis& d) {
     case Verdict::kUnknown:
       if (!d.effects.empty())
         text += ExplainEffects(d) + ", and no known effect explains what remains.";
-      else if (d.statements.empty())
+      else if (d.interrupted && d.statements.empty())
         text += "No effect was looked at.";
       else
         text += fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise{}.",

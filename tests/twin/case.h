@@ -20,6 +20,7 @@
 namespace gapscope::twin {
 
 inline constexpr int kTries = 12;  // of the size of an effect
+
 enum class Kind { kAuto, kNone, kSingle, kPair, kTriple, kUnknown, kAmbiguous, kRough };
 const char* KindName(Kind kind);
 bool ParseKind(std::string_view name, Kind* kind);

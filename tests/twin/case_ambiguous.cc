@@ -11,7 +11,7 @@ namespace gapscope::twin {
 namespace {
 
 constexpr double kFarthest = 0.6;  // floors: a rival farther than this is no rival
-constexpr int kDoublings = 14;
+constexpr int kAttempts = 14;
 
 // One member of a group: how it enters a plant with a strength, and how a fit may move it.
 struct Member {
@@ -197,7 +197,7 @@ std::vector<LogSpec> MakeLogs(const Plant& plant, const Construction& built, Ran
 bool MakeAmbiguous(Random* random, Case* made, std::string* problem) {
   Case best;
   double best_distance = kNever;
-  for (int attempt = 0; attempt < kDoublings && best_distance > kFarthest; ++attempt) {
+  for (int attempt = 0; attempt < kAttempts && best_distance > kFarthest; ++attempt) {
     const auto all = ConstructionsOf(made->rig, made->base, random);
     const Construction& built = all[static_cast<std::size_t>(random->Integer(0, static_cast<int>(all.size()) - 1))];
     Case c = *made;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "tests/twin/laws.h"
 #include "tests/twin/rough.h"

@@ -23,6 +23,7 @@
 namespace gapscope::twin {
 
 inline constexpr double kJust_s = 1e-8;  // before a jump of the commands
+
 // Commands in the order of their sending; each acts from its time plus its delay until the next one acts.
 struct Commands {
   std::vector<double> time_s, value, feedforward_n_m, delay_s;

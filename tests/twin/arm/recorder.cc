@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "tests/twin/campaign.h"
 #include "tests/twin/case.h"

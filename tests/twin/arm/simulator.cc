@@ -6,7 +6,6 @@
 #include "tests/twin/rough.h"
 
 namespace gapscope::twin {
-namespace {}  // namespace
 
 ArmSimulator::ArmSimulator(const ArmPlant& plant, double step_s) : step_s_(step_s) {
   const JointVector none = JointVector::Zero(plant.count());

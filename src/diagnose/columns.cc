@@ -239,8 +239,8 @@ ColumnTable Finish(const Workbench& bench, Candidate& parent, Wanted wanted, con
   AddTorques(bench, parent, torques, &wanted, &table);
   const auto make = [&] {
     // Not with the fit's own Jacobian, which is too fine to look ahead.
-    return MakeGram(*parent.problem, parent.point, wanted.columns,
-                    {.step = 0.01, .steps = StepKind::kQuick, .stop = bench.deadline.stop}, parts);
+    return MakeGram(*parent.problem, parent.point, wanted.columns, {.step = 0.01, .steps = StepKind::kQuick}, parts,
+                    bench.deadline.stop);
   };
   table.gram = bench.journal ? bench.journal->Gram("columns " + parent.Name(), parent.point,
                                                    ColumnNames(*parent.problem, wanted.columns), make)

@@ -9,7 +9,6 @@
 #define GAPSCOPE_FIT_FIT_PROBLEM_H_
 
 #include <Eigen/Core>
-#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -48,8 +47,7 @@ struct DifferenceOptions {
   // Columns that are left zero: of y (empty: none), and the first ones of a window's state.
   std::vector<char> known = {};
   Eigen::Index known_states = 0;
-  WindowMask mask = {};                     // windows that are left out have no residuals and no Jacobian
-  const std::atomic<bool>* stop = nullptr;  // once it is set, MakeGram begins no other column and has no valid system
+  WindowMask mask = {};  // windows that are left out have no residuals and no Jacobian
 };
 
 // Residuals and Jacobian of a point.

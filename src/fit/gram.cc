@@ -230,7 +230,8 @@ namespace {
 // The columns of some windows, none of the others; nothing: they cannot be simulated at the point.
 std::optional<std::vector<WindowColumns>> ColumnsOf(FitProblem& parent, const FitPoint& point,
                                                     std::span<const ExtraColumn> extra,
-                                                    const DifferenceOptions& options, GramSystem* gram) {
+                                                    const DifferenceOptions& options, const std::atomic<bool>* stop,
+                                                    GramSystem* gram) {
   Derivatives at = parent.Differentiate(point, options);
   gram->work += at.work;
   if (!at.valid) return std::nullopt;
@@ -242,7 +243,7 @@ std::optional<std::vector<WindowColumns>> ColumnsOf(FitProblem& parent, const Fi
   }
   ExtraColumns columns(parent, point, at, options.mask, &gram->work);
   for (std::size_t e = 0; e < extra.size(); ++e) {
-    if (options.stop && options.stop->load()) return std::nullopt;
+    if (stop && stop->load()) return std::nullopt;
     const std::optional<Residuals> added = columns.Make(extra[e]);
     if (!added) gram->failed[e] = static_cast<char>(true);
     for (std::size_t w = 0; w < windows.size() && added; ++w) {
@@ -258,7 +259,7 @@ std::optional<std::vector<WindowColumns>> ColumnsOf(FitProblem& parent, const Fi
 }  // namespace
 
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options, const GramParts& parts) {
+                    const DifferenceOptions& options, const GramParts& parts, const std::atomic<bool>* stop) {
   GramSystem gram{.columns = ColumnNames(parent, extra),
                   .parameters = parent.layout().low.size(),
                   .failed = std::vector<char>(extra.size(), static_cast<char>(false))};
@@ -268,7 +269,7 @@ GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const E
   DifferenceOptions of_batch = options;
   for (WindowMask& batch : Batches(parent, size)) {
     of_batch.mask = std::move(batch);
-    const auto windows = ColumnsOf(parent, point, extra, of_batch, &gram);
+    const auto windows = ColumnsOf(parent, point, extra, of_batch, stop, &gram);
     if (!windows) return gram;
     for (std::size_t p = 0; p < parts.count; ++p) AddProducts(parent, *windows, rows[p], &gram.parts[p]);
   }

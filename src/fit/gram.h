@@ -9,6 +9,7 @@
 #ifndef GAPSCOPE_FIT_GRAM_H_
 #define GAPSCOPE_FIT_GRAM_H_
 
+#include <atomic>
 #include <functional>
 #include <span>
 #include <string>
@@ -52,8 +53,10 @@ struct GramParts {
   std::function<std::size_t(std::size_t log, long half_second, std::size_t signal)> of = [](std::size_t, long,
                                                                                             std::size_t) { return 0; };
 };
+// `stop`: once it is set no other column is begun, and the system is not valid.
 GramSystem MakeGram(FitProblem& parent, const FitPoint& point, std::span<const ExtraColumn> extra,
-                    const DifferenceOptions& options, const GramParts& parts = {});
+                    const DifferenceOptions& options, const GramParts& parts = {},
+                    const std::atomic<bool>* stop = nullptr);
 
 // The best of a set of columns by arithmetic.
 struct BoundedSolution {

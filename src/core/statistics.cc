@@ -61,6 +61,11 @@ double StudentQuantile(double freedom) {
          z * (3 * z2 * z2 * z2 + 19 * z2 * z2 + 17 * z2 - 15) / (384 * n * n * n);
 }
 
+double JackknifeHalf(std::span<const double> estimates) {
+  const auto parts = static_cast<double>(estimates.size());
+  return parts < 3 ? 0 : StudentQuantile(parts - 1) * MomentsOf(estimates).deviation * std::sqrt(parts);
+}
+
 double StudentTails(double t, std::size_t freedom) {
   // The finite sums of Abramowitz & Stegun 26.7.3 and 26.7.4.
   const double angle = std::atan(std::abs(t) / std::sqrt(static_cast<double>(freedom)));

@@ -34,6 +34,12 @@ inline constexpr double kNormalQuantile = 1.959964;  // 95 % of a normal distrib
 // 3 the value of the next whole number).
 double StudentQuantile(double freedom);
 
+// Half of the 95 % interval of a number, by estimates of it each of which lacks another part of the data: what leaving
+// out shows needs no residuals that are smooth in the number (the delete-a-group jackknife: Wolter, Introduction to
+// Variance Estimation, 2007, section 4.2; its variance is that of an estimate that lacks a part). 0 of fewer than
+// three.
+double JackknifeHalf(std::span<const double> estimates);
+
 // That Student's t with `freedom` degrees of freedom, 1 or more, lies further from zero than `t` on either side.
 double StudentTails(double t, std::size_t freedom);
 

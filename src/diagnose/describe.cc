@@ -11,9 +11,9 @@
 #include "src/core/statistics.h"
 #include "src/diagnose/beside.h"
 #include "src/diagnose/explain.h"
-#include "src/diagnose/gap_by_log.h"
 #include "src/diagnose/gap_shares.h"
 #include "src/diagnose/judge.h"
+#include "src/diagnose/left_out.h"
 #include "src/diagnose/next_experiment.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/remainder.h"
@@ -113,9 +113,9 @@ std::vector<AtBound> FindAtBounds(const Workbench& bench, const Candidate& candi
 
 // The effects that are there, the largest share first.
 std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& found, const Candidate& final,
-                                         const BesideTorques& beside, Judgement* judgement) {
+                                         const BesideTorques& beside, const LeftOut& left_out, Judgement* judgement) {
   std::vector<FoundEffect> effects;
-  const auto sizes = EstimateSizes(bench, final, beside.widening);
+  const auto sizes = EstimateSizes(bench, final, beside.widening, left_out.values);
   GapShares shares(bench, found, final, judgement->groups);
   for (Statement& s : judgement->statements) {
     if (const auto bounds = beside.bounds.find(s.use); s.answer == Answer::kAbsent && bounds != beside.bounds.end())
@@ -240,8 +240,9 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.floor = std::min(FloorError(bench.data->held_out, noise), result.final);
   result.closed = ClosedShare(result.refit, result.final, result.floor);
   say("leaving each log out");
-  result.by_log = GapByLog(bench, base, chosen, noise);
-  result.effects = DescribeEffects(bench, found, chosen, beside, &judgement);
+  const LeftOut left_out = LeaveLogsOut(bench, base, chosen, noise);
+  result.by_log = left_out.gaps;
+  result.effects = DescribeEffects(bench, found, chosen, beside, left_out, &judgement);
   for (const Statement& s : judgement.statements) {
     if (s.group < 0 || s.answer != Answer::kPresent) continue;
     const auto& group = judgement.groups[static_cast<std::size_t>(s.group)];

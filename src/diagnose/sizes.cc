@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
@@ -17,14 +18,30 @@ Eigen::Index LogarithmOf(const SearchSpace& space, int parameter) {
   return found == coordinates.end() ? -1 : found - coordinates.begin();
 }
 
-// An interval's end, as much farther from the value as the policy says: of a logarithm by a factor.
-double Widened(double value, double end, bool logarithmic) {
-  const double factor = kDiagnosePolicy.evidence.interval_factor;
-  return logarithmic && end / value > 0 ? value * std::pow(end / value, factor) : value + factor * (end - value);
+struct Interval {
+  double low = 0, high = 0;
+};
+
+// The wider of what the residuals' slopes say, as much farther as the policy says (of a logarithm by a factor), and of
+// what `left_out` shows: the value's estimates without each part of the logs.
+Interval Widest(double value, Interval by_slopes, bool logarithmic, std::span<const double> left_out) {
+  const double factor = kDiagnosePolicy.evidence.interval_factor, half = JackknifeHalf(left_out);
+  const auto widened = [&](double end) {
+    return logarithmic && end / value > 0 ? value * std::pow(end / value, factor) : value + factor * (end - value);
+  };
+  return {std::min(widened(by_slopes.low), value - half), std::max(widened(by_slopes.high), value + half)};
+}
+
+// `of` what is wanted of a model's values.
+std::vector<double> Estimates(const std::vector<std::vector<double>>& left_out, auto of) {
+  std::vector<double> estimates;
+  for (const auto& values : left_out) estimates.push_back(of(values));
+  return estimates;
 }
 
 // The base parameter that a size is known best beside. Its deviation is that of ln(size / parameter).
-void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int parameter, EffectEstimate* size) {
+void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty,
+              const std::vector<std::vector<double>>& left_out, int parameter, EffectEstimate* size) {
   const SearchSpace& space = candidate.problem->space();
   const Eigen::Index own = LogarithmOf(space, parameter);
   if (own < 0 || !(size->value > 0)) return;
@@ -38,14 +55,16 @@ void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty, int pa
     const double deviation = std::sqrt(std::max(0.0, c(own, own) + c(k, k) - 2 * c(own, k)));
     if (!(deviation < least)) continue;
     least = deviation;
-    const double value = size->value / candidate.values[static_cast<std::size_t>(other.parameter)],
+    const auto ratio_of = [&](const std::vector<double>& values) {
+      return values[static_cast<std::size_t>(parameter)] / values[static_cast<std::size_t>(other.parameter)];
+    };
+    const double value = ratio_of(candidate.values),
                  factor =
                      std::exp(HalfInterval(c, uncertainty.of_prior, uncertainty.freedom,
                                            Eigen::VectorXd::Unit(c.rows(), own) - Eigen::VectorXd::Unit(c.rows(), k)));
-    size->ratio = {.to = space.parameter(other).name,
-                   .value = value,
-                   .low = Widened(value, value / factor, true),
-                   .high = Widened(value, value * factor, true)};
+    const Interval interval = Widest(value, {value / factor, value * factor}, true, Estimates(left_out, ratio_of));
+    size->ratio = {
+        .to = space.parameter(other).name, .value = value, .low = std::max(0.0, interval.low), .high = interval.high};
   }
 }
 
@@ -60,7 +79,8 @@ Uncertainty UncertaintyAt(const Candidate& candidate, double step, const Eigen::
 }  // namespace
 
 std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& bench, const Candidate& candidate,
-                                                               const Eigen::MatrixXd& beside) {
+                                                               const Eigen::MatrixXd& beside,
+                                                               const std::vector<std::vector<double>>& left_out) {
   std::map<EffectUse, std::vector<EffectEstimate>> sizes;
   if (candidate.effects.empty()) return sizes;
   const Uncertainty uncertainty = UncertaintyAt(candidate, kFineStep, beside),
@@ -71,12 +91,12 @@ std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& 
         const TunedParameter &tuned = uncertainty.tuned[i], &coarse = over_kinks.tuned[i];
         if (candidate.model->parameters()[tuned.index].name != p.name) continue;
         const bool logarithmic = LogarithmOf(candidate.problem->space(), tuned.index) >= 0;
-        const auto end = [&](double narrow) {
-          return std::clamp(Widened(tuned.value, narrow, logarithmic), p.low, p.high);
-        };
-        EffectEstimate size{p.key, p.unit, tuned.value, end(std::min(tuned.low, coarse.low)),
-                            end(std::max(tuned.high, coarse.high))};
-        if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, tuned.index, &size);
+        const Interval interval =
+            Widest(tuned.value, {std::min(tuned.low, coarse.low), std::max(tuned.high, coarse.high)}, logarithmic,
+                   Estimates(left_out, [&](const auto& v) { return v[static_cast<std::size_t>(tuned.index)]; }));
+        EffectEstimate size{p.key, p.unit, tuned.value, std::clamp(interval.low, p.low, p.high),
+                            std::clamp(interval.high, p.low, p.high)};
+        if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, left_out, tuned.index, &size);
         sizes[use].push_back(std::move(size));
       }
     }

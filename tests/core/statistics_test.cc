@@ -41,4 +41,16 @@ TEST(StatisticsTest, StudentTailsAreThoseOfTheTables) {
 }
 
 }  // namespace
+
+// Of a mean, the jackknife's variance is the textbook's: of estimates that each lack one of n numbers it is s^2 / (n -
+// 1).
+TEST(StatisticsTest, JackknifeOfAMeanIsItsStandardError) {
+  const std::vector<double> numbers = {1.0, 2.5, 4.0, 3.0, 7.5};
+  std::vector<double> without;
+  for (const double left_out : numbers) without.push_back((18.0 - left_out) / 4);
+  // Deviations from the mean 3.6: squares add up to 23.7, so that s^2 = 5.925.
+  EXPECT_NEAR(JackknifeHalf(without), StudentQuantile(4) * std::sqrt(5.925 / 4), 1e-12);
+  EXPECT_EQ(JackknifeHalf(std::vector<double>{1, 2}), 0);
+}
+
 }  // namespace gapscope

@@ -1,4 +1,4 @@
-#include "src/diagnose/gap_by_log.h"
+#include "src/diagnose/left_out.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,9 +18,12 @@ DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds) {
   return split;
 }
 
-// Errors on the held-out logs of `bench` by the model of `fitted`, its parameters fitted anew to the training logs
-// there. Empty: it cannot be simulated.
-std::vector<double> ErrorsWithout(const Workbench& bench, const Candidate& fitted) {
+// The model of `fitted`, its parameters fitted anew to the training logs of `bench`, and its errors on the held-out
+// ones there. Empty: it cannot be simulated.
+struct Again {
+  std::vector<double> values, errors;
+};
+Again FitAgain(const Workbench& bench, const Candidate& fitted) {
   auto made = MakeCandidate(bench, fitted.effects);
   if (!made.ok()) return {};
   Candidate& candidate = made.value();
@@ -33,7 +36,7 @@ std::vector<double> ErrorsWithout(const Workbench& bench, const Candidate& fitte
                 .least_known = share * fitted.train_cost});
   if (!std::isfinite(candidate.train_cost)) return {};
   ScoreCandidate(bench, &candidate);
-  return NormalisedErrors(candidate.held_out);
+  return {candidate.values, NormalisedErrors(candidate.held_out)};
 }
 
 void Append(const std::vector<Recording>& logs, const std::vector<double>& before, const std::vector<double>& after,
@@ -77,19 +80,23 @@ std::optional<ClosedByLog> ClosedOf(std::span<const LogGap> gaps) {
   return ClosedByLog{.median = median, .least = shares.front(), .most = shares.back(), .logs = shares.size()};
 }
 
-std::vector<LogGap> GapByLog(const Workbench& bench, const Candidate& base, const Candidate& final,
-                             const std::vector<double>& noise) {
-  std::vector<LogGap> gaps;
-  Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &gaps);
-  if (final.effects.empty() || bench.by_windows) return gaps;
+LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
+                     const std::vector<double>& noise) {
+  LeftOut result;
+  Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &result.gaps);
+  if (final.effects.empty() || bench.by_windows) return result;
+  // The held-out logs were left out of the first fit.
+  if (!bench.data->asked) result.values.push_back(final.values);
   const std::size_t folds = std::min(kDiagnosePolicy.evidence.folds, bench.data->train.size());
   for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
     const DataSplit split = LeaveOut(*bench.data, fold, folds);
     if (split.train.empty()) break;
     const Workbench without = WithLogs(bench, split, *base.model);
-    Append(split.held_out, ErrorsWithout(without, base), ErrorsWithout(without, final), noise, &gaps);
+    const Again again = FitAgain(without, final);
+    Append(split.held_out, FitAgain(without, base).errors, again.errors, noise, &result.gaps);
+    if (!again.values.empty()) result.values.push_back(again.values);
   }
-  return gaps;
+  return result;
 }
 
 }  // namespace gapscope

@@ -1,0 +1,31 @@
+// What closes on each log, fitted without it, and how far the sizes move by that.
+#ifndef GAPSCOPE_DIAGNOSE_LEFT_OUT_H_
+#define GAPSCOPE_DIAGNOSE_LEFT_OUT_H_
+
+#include <span>
+#include <vector>
+
+#include "src/diagnose/candidate.h"
+#include "src/diagnose/diagnosis.h"
+
+namespace gapscope {
+
+// The sensors' noise as a normalised error. `noise`: by the experiment's signals, SI.
+double FloorError(std::span<const Recording> logs, const std::vector<double>& noise);
+
+struct LeftOut {
+  std::vector<LogGap> gaps;
+  // Of the final model's parameters: each time fitted without another part of the logs.
+  std::vector<std::vector<double>> values;
+};
+
+// Gaps of the held-out logs, or parts of logs, by both models as they are. Then, where `final` has effects and whole
+// logs were held out, of the training logs: parts of them are left out in turn, the parameters fitted to all other logs
+// from where they are (held-out ones that the user asked to keep are not fitted), and the errors are those of the logs
+// left out. A log where a model cannot be simulated has an infinite error.
+LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
+                     const std::vector<double>& noise);
+
+}  // namespace gapscope
+
+#endif  // GAPSCOPE_DIAGNOSE_LEFT_OUT_H_

@@ -9,12 +9,13 @@
 namespace gapscope {
 namespace {
 
-// Training logs number `fold`, and each `folds`th after it, kept back from the fit.
-DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds) {
+// Training logs number `fold`, and each `folds`th after it, kept back from the fit. `more`: held-out logs may be
+// fitted.
+DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds, bool more) {
   DataSplit split;
   for (std::size_t l = 0; l < data.train.size(); ++l)
     (l % folds == fold ? split.held_out : split.train).push_back(data.train[l]);
-  if (!data.asked) split.train.insert(split.train.end(), data.held_out.begin(), data.held_out.end());
+  if (more) split.train.insert(split.train.end(), data.held_out.begin(), data.held_out.end());
   return split;
 }
 
@@ -84,16 +85,17 @@ LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candid
                      const std::vector<double>& noise) {
   LeftOut result;
   Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &result.gaps);
-  if (final.effects.empty() || bench.by_windows) return result;
-  // The held-out logs were left out of the first fit.
-  if (!bench.data->asked) result.values.push_back(final.values);
+  if (final.effects.empty()) return result;
+  // The held-out logs were left out of the first fit, where they are not windows of the same logs.
+  const bool apart = !bench.by_windows, more = apart && !bench.data->asked;
+  if (more) result.values.push_back(final.values);
   const std::size_t folds = std::min(kDiagnosePolicy.evidence.folds, bench.data->train.size());
   for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
-    const DataSplit split = LeaveOut(*bench.data, fold, folds);
+    const DataSplit split = LeaveOut(*bench.data, fold, folds, more);
     if (split.train.empty()) break;
     const Workbench without = WithLogs(bench, split, *base.model);
     const Again again = FitAgain(without, final);
-    Append(split.held_out, FitAgain(without, base).errors, again.errors, noise, &result.gaps);
+    if (apart) Append(split.held_out, FitAgain(without, base).errors, again.errors, noise, &result.gaps);
     if (!again.values.empty()) result.values.push_back(again.values);
   }
   return result;

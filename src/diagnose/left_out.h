@@ -19,10 +19,10 @@ struct LeftOut {
   std::vector<std::vector<double>> values;
 };
 
-// Gaps of the held-out logs, or parts of logs, by both models as they are. Then, where `final` has effects and whole
-// logs were held out, of the training logs: parts of them are left out in turn, the parameters fitted to all other logs
-// from where they are (held-out ones that the user asked to keep are not fitted), and the errors are those of the logs
-// left out. A log where a model cannot be simulated has an infinite error.
+// Gaps of the held-out logs, or parts of logs, by both models as they are. Then, where `final` has effects, parts of
+// the training logs are left out in turn, and the parameters fitted to all other logs from where they are (held-out
+// ones that the user asked to keep are not fitted). Where whole logs were held out, the errors on those that are left
+// out make gaps too. A log where a model cannot be simulated has an infinite error.
 LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
                      const std::vector<double>& noise);
 

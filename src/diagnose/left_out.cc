@@ -9,24 +9,30 @@
 namespace gapscope {
 namespace {
 
-// Training logs number `fold`, and each `folds`th after it, kept back from the fit. `more`: held-out logs may be
-// fitted.
-DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds, bool more) {
+// Training logs number `fold`, and each `folds`th after it, kept back from the fit.
+DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds) {
   DataSplit split;
   for (std::size_t l = 0; l < data.train.size(); ++l)
     (l % folds == fold ? split.held_out : split.train).push_back(data.train[l]);
-  if (more) split.train.insert(split.train.end(), data.held_out.begin(), data.held_out.end());
+  if (!data.asked) split.train.insert(split.train.end(), data.held_out.begin(), data.held_out.end());
   return split;
 }
 
-// The model of `fitted`, its parameters fitted anew to the training logs of `bench`, and its errors on the held-out
-// ones there. Empty: it cannot be simulated.
-struct Again {
-  std::vector<double> values, errors;
-};
-Again FitAgain(const Workbench& bench, const Candidate& fitted) {
+// The same of the training windows.
+Workbench WithoutWindows(const Workbench& bench, std::size_t fold, std::size_t folds) {
+  std::vector<LogWindow> kept;
+  for (std::size_t w = 0; w < bench.windows->size(); ++w) {
+    if (w % folds != fold) kept.push_back((*bench.windows)[w]);
+  }
+  Workbench without = bench;
+  without.windows = std::make_shared<const std::vector<LogWindow>>(std::move(kept));
+  return without;
+}
+
+// The model of `fitted`, its parameters fitted anew to what `bench` trains with. Empty: it cannot be simulated.
+std::optional<Candidate> FitAgain(const Workbench& bench, const Candidate& fitted) {
   auto made = MakeCandidate(bench, fitted.effects);
-  if (!made.ok()) return {};
+  if (!made.ok()) return std::nullopt;
   Candidate& candidate = made.value();
   const double share = static_cast<double>(candidate.problem->residuals()) /
                        static_cast<double>(std::max<std::size_t>(1, fitted.problem->residuals()));
@@ -35,9 +41,15 @@ Again FitAgain(const Workbench& bench, const Candidate& fitted) {
                {.iterations = policy.left_out_iterations,
                 .tolerance = policy.left_out_tolerance,
                 .least_known = share * fitted.train_cost});
-  if (!std::isfinite(candidate.train_cost)) return {};
-  ScoreCandidate(bench, &candidate);
-  return {candidate.values, NormalisedErrors(candidate.held_out)};
+  if (!std::isfinite(candidate.train_cost)) return std::nullopt;
+  return std::move(candidate);
+}
+
+// On the held-out logs of `bench`.
+std::vector<double> ErrorsOf(const Workbench& bench, std::optional<Candidate> candidate) {
+  if (!candidate) return {};
+  ScoreCandidate(bench, &*candidate);
+  return NormalisedErrors(candidate->held_out);
 }
 
 void Append(const std::vector<Recording>& logs, const std::vector<double>& before, const std::vector<double>& after,
@@ -86,17 +98,20 @@ LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candid
   LeftOut result;
   Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &result.gaps);
   if (final.effects.empty()) return result;
-  // The held-out logs were left out of the first fit, where they are not windows of the same logs.
-  const bool apart = !bench.by_windows, more = apart && !bench.data->asked;
-  if (more) result.values.push_back(final.values);
-  const std::size_t folds = std::min(kDiagnosePolicy.evidence.folds, bench.data->train.size());
+  const bool by_windows = bench.by_windows;
+  // The held-out logs were left out of the first fit.
+  if (!by_windows && !bench.data->asked) result.values.push_back(final.values);
+  const std::size_t parts = by_windows ? bench.windows->size() : bench.data->train.size(),
+                    folds = std::min(kDiagnosePolicy.evidence.folds, parts);
   for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
-    const DataSplit split = LeaveOut(*bench.data, fold, folds, more);
-    if (split.train.empty()) break;
-    const Workbench without = WithLogs(bench, split, *base.model);
-    const Again again = FitAgain(without, final);
-    if (apart) Append(split.held_out, FitAgain(without, base).errors, again.errors, noise, &result.gaps);
-    if (!again.values.empty()) result.values.push_back(again.values);
+    const DataSplit split = by_windows ? DataSplit{} : LeaveOut(*bench.data, fold, folds);
+    if (by_windows ? parts < 2 : split.train.empty()) break;
+    const Workbench without = by_windows ? WithoutWindows(bench, fold, folds) : WithLogs(bench, split, *base.model);
+    std::optional<Candidate> again = FitAgain(without, final);
+    if (again) result.values.push_back(again->values);
+    if (!by_windows)
+      Append(split.held_out, ErrorsOf(without, FitAgain(without, base)), ErrorsOf(without, std::move(again)), noise,
+             &result.gaps);
   }
   return result;
 }

@@ -15,14 +15,15 @@ double FloorError(std::span<const Recording> logs, const std::vector<double>& no
 
 struct LeftOut {
   std::vector<LogGap> gaps;
-  // Of the final model's parameters: each time fitted without another part of the logs.
+  // Of the final model's parameters: each time fitted without another part of what was fitted.
   std::vector<std::vector<double>> values;
 };
 
 // Gaps of the held-out logs, or parts of logs, by both models as they are. Then, where `final` has effects, parts of
 // the training logs are left out in turn, and the parameters fitted to all other logs from where they are (held-out
-// ones that the user asked to keep are not fitted). Where whole logs were held out, the errors on those that are left
-// out make gaps too. A log where a model cannot be simulated has an infinite error.
+// ones that the user asked to keep are not fitted). The errors on those that are left out make gaps too. Where windows
+// of every log are held out, since only some logs show the gap, parts of the training windows are left out, for the
+// values alone. A log where a model cannot be simulated has an infinite error.
 LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
                      const std::vector<double>& noise);
 

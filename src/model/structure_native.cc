@@ -242,7 +242,7 @@ void Structure::NativeDelay(const std::string& joint, const std::string& key, do
                             const std::vector<mjsActuator*>& inputs) {
   const double step_s = spec->option.timestep, steps = delay_s / step_s;
   const bool counted = features.delays == CommandDelays::kWholeSteps;
-  if (counted) delays_s[mjs_getString(mjs_getName(inputs.front()->element))] += delay_s;
+  double* counted_s = counted ? &delays_s[mjs_getString(mjs_getName(inputs.front()->element))] : nullptr;
   if (delay_s <= 0) return;
   const std::string in_steps = fmt::format("{:.4g} ms, {:.3g} steps of {:.4g} ms", 1e3 * delay_s, steps, 1e3 * step_s);
   if (features.delays == CommandDelays::kNone || (!counted && steps < 1)) {
@@ -254,9 +254,14 @@ void Structure::NativeDelay(const std::string& joint, const std::string& key, do
   }
   const bool whole = std::abs(steps - std::round(steps)) < 1e-6;
   const bool late_feedback = FeedsBack(inputs) && key == "torque_delay_s";
-  if (late_feedback) MakeFeedbackLate(joint, delay_s, inputs);
-  const char* how_late = late_feedback ? "; that of its feedback by less damping and other inertia" : "";
-  if (counted) {
+  if (late_feedback && !MakeFeedbackLate(joint, delay_s, inputs)) {
+    Tell(kMotorTerms, joint, key, Fidelity::kDropped,
+         fmt::format("feedback {} late has no native form: that is too long for the joint's inertia", in_steps));
+    return;
+  }
+  const char* how_late = late_feedback ? "; that of its feedback by less damping and other inertia or gains" : "";
+  if (counted_s) {
+    *counted_s += delay_s;
     Tell(kMotorTerms, joint, key, whole && !late_feedback ? Fidelity::kExact : Fidelity::kApproximated,
          fmt::format("commands {} steps late for {}{}", std::lround(steps), in_steps, how_late));
     return;
@@ -278,18 +283,44 @@ void Structure::Put(const std::string& field, double number) {
   Set(field, {ExactText(number)});
 }
 
-// kp q(t - D) + kv q'(t - D), to second order in D: kp q + (kv - kp D) q' + (kp D^2 / 2 - kv D) q''.
-void Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs) {
-  double inertia = ValueOf("joint/" + joint + "/armature", FindJoint(joint)->armature);
+// kp q(t - D) + kv q'(t - D), to second order in D: kp q + (kv - kp D) q' + (kp D^2 / 2 - kv D) q''. The last term is
+// inertia. Where the armature has less than that takes off, the rest is taken off by a drive whose torques are larger
+// by as much as the joint's inertia is then too large: J q'' = T s is (J / s) q'' = T. False: there is no such drive.
+bool Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs) {
+  struct Gains {
+    std::string field;
+    double gain = 0, kp = 0, kv = 0;
+  };
+  std::vector<Gains> drives;
+  double change = 0;
   for (const mjsActuator* input : inputs) {
     const std::string field = std::string("actuator/") + mjs_getString(mjs_getName(input->element)) + "/";
-    const double kp = ValueOf(field + "kp", -input->biasprm[1]);
-    const double kv = ValueOf(field + "kv", -input->biasprm[2]);
+    const double kp = ValueOf(field + "kp", -ValueOf(field + "bias1", input->biasprm[1])),
+                 kv = ValueOf(field + "kv", -ValueOf(field + "bias2", input->biasprm[2]));
     if (kp == 0 && kv == 0) continue;
-    Put(field + "kv", kv - kp * delay_s);
-    inertia += 0.5 * kp * delay_s * delay_s - kv * delay_s;
+    const double gain = ValueOf(field + "gain", ValueOf(field + "kp", input->gainprm[0]));
+    drives.push_back({field, gain, kp, kv - kp * delay_s});
+    change += 0.5 * kp * delay_s * delay_s - kv * delay_s;
   }
-  Put("joint/" + joint + "/armature", std::max(0.0, inertia));
+  const std::string place = "joint/" + joint + "/";
+  const mjsJoint& element = *FindJoint(joint);
+  const double armature = ValueOf(place + "armature", element.armature) + change;
+  double larger = 1;
+  if (armature < 0) {
+    const mjModel& m = rig_.compiled();
+    const int dof = m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, joint.c_str())];
+    const double inertia = m.dof_M0[dof] - m.dof_armature[dof], least = 0.3 * inertia;
+    if (!(inertia + armature > least)) return false;
+    larger = inertia / (inertia + armature);
+  }
+  Put(place + "armature", std::max(0.0, armature));
+  const double passive = (larger - 1) * ValueOf(place + "damping", element.damping[0]);
+  for (const Gains& drive : drives) {
+    Put(drive.field + "kp", larger * drive.kp);
+    Put(drive.field + "kv", larger * drive.kv + (&drive == &drives.front() ? passive : 0));
+    Put(drive.field + "gain", larger * drive.gain);
+  }
+  return true;
 }
 
 // Late commands are the engine's own, where nothing else is there; so is a limit where the engine has the drive's gains

@@ -59,6 +59,9 @@ class Searcher {
       Lead();
       Settle();
     } while (GrowFurther() || (!std::exchange(begun_anew, true) && RefitFromNominal(counts)));
+    // A name is told alone only where what could stand in its place was tried. That is judging, for which no work is
+    // too much.
+    Exchange(kInfinity);
   }
 
  private:
@@ -78,9 +81,8 @@ class Searcher {
   // Members are taken out and others tried in their places, until neither changes the set. What is known of members
   // at the end is of the set that was chosen.
   void Settle() {
-    constexpr int kExchanges = 3;
     TakeOut();
-    for (int round = 0; round < kExchanges && Exchange(); ++round) TakeOut();
+    Exchange(kPolicy.until_exchanged);
   }
 
   // Of the work, `share` may be spent when `what` begins.
@@ -367,14 +369,22 @@ class Searcher {
     return other;
   }
 
+  // `until`: share of the work.
+  void Exchange(double until) {
+    constexpr int kExchanges = 3;
+    for (int round = 0; round < kExchanges && ExchangeOne(until); ++round) TakeOut();
+  }
+
   // True: a rival took a member's place, and everything is asked again.
-  bool Exchange() {
+  bool ExchangeOne(double until) {
     for (Member& member : result_.members) {
+      if (member.asked) continue;
       member.rivals.clear();
       // One that hardly gains is not told apart from nothing.
       if (member.gain < kPolicy.tie) continue;
       for (const EffectUse& use : Shortlist(member)) {
-        if (Late(kPolicy.until_exchanged, "exchange")) return false;
+        // What is not asked for want of work is asked at last.
+        if (std::isfinite(until) ? bench_.Late(until) : Late(until, "exchange")) return false;
         say_("trying " + use.Text() + " for " + member.use.Text());
         Candidate* other = RefitRival(member, use);
         if (!other) continue;
@@ -395,6 +405,7 @@ class Searcher {
       }
       std::stable_sort(member.rivals.begin(), member.rivals.end(),
                        [](const Rival& a, const Rival& b) { return a.behind < b.behind; });
+      member.asked = true;
     }
     return false;
   }

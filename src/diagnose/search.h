@@ -21,6 +21,7 @@ struct Member {
   const Candidate* without = nullptr;  // the best set without it
   double gain = 0;                     // ln(cost without / cost of the set)
   std::vector<Rival> rivals;           // the nearest first
+  bool asked = false;                  // whether all that could be in its place was tried
 };
 
 struct SearchResult {

@@ -240,7 +240,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.floor = std::min(FloorError(bench.data->held_out, noise), result.final);
   result.closed = ClosedShare(result.refit, result.final, result.floor);
   say("leaving each log out");
-  const LeftOut left_out = LeaveLogsOut(bench, base, chosen, noise);
+  const LeftOut left_out = LeaveOut(bench, base, chosen, noise);
   result.by_log = left_out.gaps;
   result.effects = DescribeEffects(bench, found, chosen, beside, left_out, &judgement);
   for (const Statement& s : judgement.statements) {

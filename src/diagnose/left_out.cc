@@ -10,7 +10,7 @@ namespace gapscope {
 namespace {
 
 // Training logs number `fold`, and each `folds`th after it, kept back from the fit.
-DataSplit LeaveOut(const DataSplit& data, std::size_t fold, std::size_t folds) {
+DataSplit WithoutLogs(const DataSplit& data, std::size_t fold, std::size_t folds) {
   DataSplit split;
   for (std::size_t l = 0; l < data.train.size(); ++l)
     (l % folds == fold ? split.held_out : split.train).push_back(data.train[l]);
@@ -65,6 +65,33 @@ void Append(const std::vector<Recording>& logs, const std::vector<double>& befor
   }
 }
 
+// How many parts are left out, of so many logs or windows.
+std::size_t Folds(std::size_t parts) { return std::min(kDiagnosePolicy.evidence.folds, parts); }
+
+void LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
+                  const std::vector<double>& noise, LeftOut* result) {
+  // The held-out logs were left out of the first fit.
+  if (!bench.data->asked) result->values.push_back(final.values);
+  const std::size_t folds = Folds(bench.data->train.size());
+  for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
+    const DataSplit split = WithoutLogs(*bench.data, fold, folds);
+    if (split.train.empty()) return;
+    const Workbench without = WithLogs(bench, split, *base.model);
+    std::optional<Candidate> again = FitAgain(without, final);
+    if (again) result->values.push_back(again->values);
+    Append(split.held_out, ErrorsOf(without, FitAgain(without, base)), ErrorsOf(without, std::move(again)), noise,
+           &result->gaps);
+  }
+}
+
+void LeaveWindowsOut(const Workbench& bench, const Candidate& final, LeftOut* result) {
+  if (bench.windows->size() < 2) return;
+  const std::size_t folds = Folds(bench.windows->size());
+  for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
+    if (const auto again = FitAgain(WithoutWindows(bench, fold, folds), final)) result->values.push_back(again->values);
+  }
+}
+
 }  // namespace
 
 double FloorError(std::span<const Recording> logs, const std::vector<double>& noise) {
@@ -93,26 +120,15 @@ std::optional<ClosedByLog> ClosedOf(std::span<const LogGap> gaps) {
   return ClosedByLog{.median = median, .least = shares.front(), .most = shares.back(), .logs = shares.size()};
 }
 
-LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
-                     const std::vector<double>& noise) {
+LeftOut LeaveOut(const Workbench& bench, const Candidate& base, const Candidate& final,
+                 const std::vector<double>& noise) {
   LeftOut result;
   Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &result.gaps);
   if (final.effects.empty()) return result;
-  const bool by_windows = bench.by_windows;
-  // The held-out logs were left out of the first fit.
-  if (!by_windows && !bench.data->asked) result.values.push_back(final.values);
-  const std::size_t parts = by_windows ? bench.windows->size() : bench.data->train.size(),
-                    folds = std::min(kDiagnosePolicy.evidence.folds, parts);
-  for (std::size_t fold = 0; fold < folds && !bench.TimeIsOver(); ++fold) {
-    const DataSplit split = by_windows ? DataSplit{} : LeaveOut(*bench.data, fold, folds);
-    if (by_windows ? parts < 2 : split.train.empty()) break;
-    const Workbench without = by_windows ? WithoutWindows(bench, fold, folds) : WithLogs(bench, split, *base.model);
-    std::optional<Candidate> again = FitAgain(without, final);
-    if (again) result.values.push_back(again->values);
-    if (!by_windows)
-      Append(split.held_out, ErrorsOf(without, FitAgain(without, base)), ErrorsOf(without, std::move(again)), noise,
-             &result.gaps);
-  }
+  if (bench.by_windows)
+    LeaveWindowsOut(bench, final, &result);
+  else
+    LeaveLogsOut(bench, base, final, noise, &result);
   return result;
 }
 

@@ -24,8 +24,8 @@ struct LeftOut {
 // ones that the user asked to keep are not fitted). The errors on those that are left out make gaps too. Where windows
 // of every log are held out, since only some logs show the gap, parts of the training windows are left out, for the
 // values alone. A log where a model cannot be simulated has an infinite error.
-LeftOut LeaveLogsOut(const Workbench& bench, const Candidate& base, const Candidate& final,
-                     const std::vector<double>& noise);
+LeftOut LeaveOut(const Workbench& bench, const Candidate& base, const Candidate& final,
+                 const std::vector<double>& noise);
 
 }  // namespace gapscope
 

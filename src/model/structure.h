@@ -143,6 +143,7 @@ class Structure {
   void TellLaw(const std::string& group, const std::string& joint, const std::string& key);
   // A number in the place of what the experiment or the MJCF says of a field.
   void Put(const std::string& field, double number);
+  // False: it has no native form, and nothing was changed.
   bool MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs);
   // A passive plugin acts from a body of its own, without mass, since a body carries one plugin.
   void HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance);

@@ -287,6 +287,7 @@ void Structure::Put(const std::string& field, double number) {
 // inertia. Where the armature has less than that takes off, the rest is taken off by a drive whose torques are larger
 // by as much as the joint's inertia is then too large: J q'' = T s is (J / s) q'' = T. False: there is no such drive.
 bool Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs) {
+  constexpr double kLeastInertia = 0.3;  // share of the joint's that must be left for the series to say anything
   struct Gains {
     std::string field;
     double gain = 0, kp = 0, kv = 0;
@@ -309,8 +310,8 @@ bool Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const
   if (armature < 0) {
     const mjModel& m = rig_.compiled();
     const int dof = m.jnt_dofadr[mj_name2id(&m, mjOBJ_JOINT, joint.c_str())];
-    const double inertia = m.dof_M0[dof] - m.dof_armature[dof], least = 0.3 * inertia;
-    if (!(inertia + armature > least)) return false;
+    const double inertia = m.dof_M0[dof] - m.dof_armature[dof];
+    if (!(inertia + armature > kLeastInertia * inertia)) return false;
     larger = inertia / (inertia + armature);
   }
   Put(place + "armature", std::max(0.0, armature));

@@ -40,10 +40,7 @@ TEST(StatisticsTest, StudentTailsAreThoseOfTheTables) {
   EXPECT_NEAR(StudentTails(-3.169, 10), 0.01, 1e-5);
 }
 
-}  // namespace
-
-// Of a mean, the jackknife's variance is the textbook's: of estimates that each lack one of n numbers it is s^2 / (n -
-// 1).
+// Of a mean, the jackknife's variance is the textbook's: s^2 / (n - 1) of estimates that each lack one of n numbers.
 TEST(StatisticsTest, JackknifeOfAMeanIsItsStandardError) {
   const std::vector<double> numbers = {1.0, 2.5, 4.0, 3.0, 7.5};
   std::vector<double> without;
@@ -53,4 +50,5 @@ TEST(StatisticsTest, JackknifeOfAMeanIsItsStandardError) {
   EXPECT_EQ(JackknifeHalf(std::vector<double>{1, 2}), 0);
 }
 
+}  // namespace
 }  // namespace gapscope

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/diagnose/policy.h"
 
@@ -32,13 +33,6 @@ Interval Widest(double value, Interval by_slopes, bool logarithmic, std::span<co
   return {std::min(widened(by_slopes.low), value - half), std::max(widened(by_slopes.high), value + half)};
 }
 
-// `of` what is wanted of a model's values.
-std::vector<double> Estimates(const std::vector<std::vector<double>>& left_out, auto of) {
-  std::vector<double> estimates;
-  for (const auto& values : left_out) estimates.push_back(of(values));
-  return estimates;
-}
-
 // The base parameter that a size is known best beside. Its deviation is that of ln(size / parameter).
 void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty,
               const std::vector<std::vector<double>>& left_out, int parameter, EffectEstimate* size) {
@@ -62,7 +56,7 @@ void AddRatio(const Candidate& candidate, const Uncertainty& uncertainty,
                  factor =
                      std::exp(HalfInterval(c, uncertainty.of_prior, uncertainty.freedom,
                                            Eigen::VectorXd::Unit(c.rows(), own) - Eigen::VectorXd::Unit(c.rows(), k)));
-    const Interval interval = Widest(value, {value / factor, value * factor}, true, Estimates(left_out, ratio_of));
+    const Interval interval = Widest(value, {value / factor, value * factor}, true, Collect(left_out, ratio_of));
     size->ratio = {
         .to = space.parameter(other).name, .value = value, .low = std::max(0.0, interval.low), .high = interval.high};
   }
@@ -93,7 +87,7 @@ std::map<EffectUse, std::vector<EffectEstimate>> EstimateSizes(const Workbench& 
         const bool logarithmic = LogarithmOf(candidate.problem->space(), tuned.index) >= 0;
         const Interval interval =
             Widest(tuned.value, {std::min(tuned.low, coarse.low), std::max(tuned.high, coarse.high)}, logarithmic,
-                   Estimates(left_out, [&](const auto& v) { return v[static_cast<std::size_t>(tuned.index)]; }));
+                   Collect(left_out, [&](const auto& v) { return v[static_cast<std::size_t>(tuned.index)]; }));
         EffectEstimate size{p.key, p.unit, tuned.value, std::clamp(interval.low, p.low, p.high),
                             std::clamp(interval.high, p.low, p.high)};
         if (p.role == ParameterRole::kSize) AddRatio(candidate, uncertainty, left_out, tuned.index, &size);

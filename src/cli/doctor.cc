@@ -210,9 +210,7 @@ Health LookAtConverter(const std::string&) {
     return {.good = false,
             .found = converter + (status < 0 ? fmt::format(": {}", std::strerror(-status))
                                              : fmt::format(" --extras ends with status {}", status)),
-            .cure =
-                "scripts/wheel; in a venv pip install \"$(ls dist/gapscope-*.whl)[all]\"; "
-                "its bin folder on the PATH"};
+            .cure = kInstallConverter};
   const auto text = ReadFile(said);
   std::istringstream lines(text.ok() ? text.value() : "");
   std::string missing, extras;

@@ -159,7 +159,8 @@ bool TextBefore(const std::string& a, const std::string& b) {
   double x = 0, y = 0;
   const auto number = [](const std::string& text, double* value) {
     const auto parsed = std::from_chars(text.data(), text.data() + text.size(), *value);
-    return parsed.ec == std::errc() && parsed.ptr == text.data() + text.size();
+    // "nan" is a name: nothing is before it or behind it.
+    return parsed.ec == std::errc() && parsed.ptr == text.data() + text.size() && !std::isnan(*value);
   };
   const bool a_number = number(a, &x), b_number = number(b, &y);
   if (a_number != b_number) return a_number;

@@ -71,7 +71,7 @@ struct Totals {
   std::vector<Parameter> parameters;
   std::vector<Said> statements;
   std::vector<double> left;          // errors held out
-  std::vector<ordered_json> failed;  // as their tasks wrote them
+  std::vector<ordered_json> failed;  // units with their errors
   std::vector<std::string> missing;  // logs
   std::vector<ordered_json> changes;
   std::size_t merged = 0, robots = 0;
@@ -127,7 +127,7 @@ class Merger {
     files_.json.Write(text.substr(0, text.size() - 2) + ",\n  \"logs\": [");
     for (const auto& unit : plan_.units) {
       if (!robot_.empty() && RobotOf(*last_) != RobotOf(unit)) EndRobot();
-      GS_RETURN_IF_ERROR(AddUnit(unit));
+      AddUnit(unit);
     }
     if (!robot_.empty()) EndRobot();
     totals_.Sort();
@@ -154,29 +154,36 @@ class Merger {
   }
 
   // What is known of a unit; what goes into merged.json is written at once.
-  Result<UnitResult> Read(const PlanUnit& unit) {
+  UnitResult Read(const PlanUnit& unit) {
     const std::string path = ResultPath(folder_, unit).string();
-    const auto file = std::filesystem::exists(path) ? ReadJson(path) : Result<ordered_json>(Error{.what = "none"});
-    if (!file.ok()) {
+    if (!std::filesystem::exists(path)) {
       totals_.missing.push_back(unit.logs.front());
-      return UnitResult{.state = "missing", .error = "it has not been run"};
+      return {.state = "missing", .error = "it has not been run"};
     }
+    const auto file = ReadJson(path);
+    if (!file.ok()) return Failed(unit, file.error().Text());
     const ordered_json& json = file.value();
-    if (json.contains("error")) {
-      totals_.failed.push_back(json);
-      return UnitResult{.state = "failed", .error = json.value("error", "")};
-    }
-    const ordered_json result = json.value("result", ordered_json::object());
-    GS_ASSIGN(UnitResult known, ReadUnitResult(result, path));
+    if (const auto error = json.find("error"); error != json.end() && error->is_string()) return Failed(unit, *error);
+    const ordered_json result = json.contains("result") ? json["result"] : ordered_json();
+    auto known = ReadUnitResult(result, path);
+    const auto parts = MergedParts(result, path);
+    if (!known.ok() || !parts.ok()) return Failed(unit, (known.ok() ? parts.error() : known.error()).Text());
     ordered_json entry = JsonUnit(plan_, unit);
-    entry.update(MergedParts(result));
+    entry.update(parts.value());
     files_.json.Write((totals_.merged > 0 ? ",\n    " : "\n    ") + entry.dump());
-    totals_.Add(known);
-    return known;
+    totals_.Add(known.value());
+    return std::move(known).value();
   }
 
-  Status AddUnit(const PlanUnit& unit) {
-    GS_ASSIGN(UnitResult known, Read(unit));
+  UnitResult Failed(const PlanUnit& unit, const std::string& error) {
+    ordered_json entry = JsonUnit(plan_, unit);
+    entry["error"] = error;
+    totals_.failed.push_back(std::move(entry));
+    return {.state = "failed", .error = error};
+  }
+
+  void AddUnit(const PlanUnit& unit) {
+    UnitResult known = Read(unit);
     known.id = unit.id;
     known.time = unit.group.empty() ? "" : unit.group.back();
     const auto page = ReportFolder(folder_, unit) / "report.html";
@@ -185,11 +192,10 @@ class Merger {
                      known.left, known.gap, known.report);
     for (const auto& said : known.statements) files_.statements.Row(unit, said.name, said.answer, said.probability);
     for (const auto& p : known.sizes) files_.parameters.Row(unit, p.name, p.unit, p.value, p.low, p.high);
-    if (plan_.columns.empty()) return Ok();
+    if (plan_.columns.empty()) return;
     times_.insert(known.time);
     robot_.push_back(std::move(known));
     last_ = &unit;
-    return Ok();
   }
 
   void EndRobot() {

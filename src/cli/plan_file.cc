@@ -39,6 +39,23 @@ Plan PlanFrom(const ordered_json& json) {
   return plan;
 }
 
+// An id names files in the plan's folder.
+bool IsId(const std::string& text) {
+  return text.size() == Hex(0).size() && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+Status CheckUnits(const Plan& plan, const std::string& path) {
+  for (const auto& unit : plan.units) {
+    if (IsId(unit.id) && !unit.logs.empty()) continue;
+    return Error{.what = IsId(unit.id) ? "a task without a log" : "not the name of a task",
+                 .where = path,
+                 .actual = "'" + unit.id + "'",
+                 .allowed = IsId(unit.id) ? "one log or more" : "16 hexadecimal digits",
+                 .cure = "write the plan again"};
+  }
+  return Ok();
+}
+
 // Of a unit that cannot be read: it fails when it is run, unless the files have been mended, and with them its name.
 std::string FailedId(const Plan& plan, const PlanUnit& unit) {
   Hasher hasher;
@@ -78,7 +95,9 @@ Result<Plan> ReadPlan(const std::filesystem::path& folder) {
                  .where = path,
                  .allowed = kPlanSchema,
                  .cure = "write it with gapscope plan or gapscope fleet plan"};
-  return ReadGuarded([&] { return PlanFrom(json); }, path, kPlanSchema);
+  GS_ASSIGN(Plan plan, ReadGuarded([&] { return PlanFrom(json); }, path, kPlanSchema));
+  GS_RETURN_IF_ERROR(CheckUnits(plan, path));
+  return plan;
 }
 
 std::filesystem::path ResultPath(const std::filesystem::path& folder, const PlanUnit& unit) {
@@ -120,7 +139,7 @@ Status WritePlan(Plan plan, const CommonFlags& flags, bool keep_going) {
     unit.id = session.ok() ? UnitId(plan, session.value()) : FailedId(plan, unit);
     if (session.ok()) continue;
     ++unreadable;
-    Print(stderr, "warning: {}\n", session.error().Text());
+    if (!flags.quiet) Print(stderr, "warning: {}\n", session.error().Text());
   }
   if (unreadable == plan.units.size())
     return Error{.what = "no unit of the plan can be read", .where = flags.out, .cure = "the warnings say why"};

@@ -11,6 +11,7 @@
 #include "src/report/json.h"
 #include "src/report/read_run.h"
 #include "src/report/tune_report.h"
+#include "src/report/unit_result.h"
 
 namespace gapscope::cli {
 namespace {
@@ -62,7 +63,8 @@ Result<ordered_json> TryUnit(const Plan& plan, const PlanUnit& unit, const PlanF
 bool IsDone(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) return false;
   const auto before = ReadJson(path);
-  return before.ok() && before.value().contains("result");
+  return before.ok() && before.value().contains("result") &&
+         ReadUnitResult(before.value()["result"], path.string()).ok();
 }
 
 // The units that are asked for.
@@ -96,20 +98,41 @@ Status CheckShard(const std::string& text) {
       .what = "not a shard", .where = "--shard", .actual = "'" + text + "'", .allowed = "i/N with 1 <= i <= N"};
 }
 
+struct Ran {
+  int asked = 0, done = 0, failed = 0, there = 0;  // there: done before
+  bool interrupted = false;
+};
+
+void Say(const Ran& ran, const PlanFolderFlags& flags) {
+  if (flags.common.json) {
+    Print(stdout, "{}",
+          JsonText({{"schema", "gapscope.run/1"},
+                    {"units", ran.asked},
+                    {"done", ran.done},
+                    {"failed", ran.failed},
+                    {"there", ran.there},
+                    {"interrupted", ran.interrupted}}));
+  } else if (!flags.common.quiet) {
+    Print(stderr, "{} {}: {} done ({} failed), {} were there{}\n", flags.unit.empty() ? "shard" : "unit",
+          flags.unit.empty() ? flags.shard : flags.unit, ran.done + ran.failed, ran.failed, ran.there,
+          ran.interrupted ? "; interrupted: run it again, what is done stays" : "");
+  }
+}
+
 Result<int> RunUnits(const PlanFolderFlags& flags) {
   if (!flags.shard.empty()) GS_RETURN_IF_ERROR(CheckShard(flags.shard));
   GS_ASSIGN(const Plan plan, ReadPlan(flags.folder));
   GS_ASSIGN(const auto chosen, Chosen(plan, flags));
-  int done = 0, there = 0, failures = 0;
+  Ran ran{.asked = static_cast<int>(chosen.size())};
   for (const PlanUnit* unit : chosen) {
     const std::filesystem::path path = ResultPath(flags.folder, *unit);
     if (IsDone(path)) {
-      ++there;
+      ++ran.there;
       continue;
     }
     const auto result = TryUnit(plan, *unit, flags);
-    if (result.ok() && result.value().is_null())
-      return Error{.what = "interrupted", .where = unit->logs.front(), .cure = "run it again: what is done stays"};
+    ran.interrupted = result.ok() && result.value().is_null();
+    if (ran.interrupted) break;
     ordered_json file = JsonUnit(plan, *unit);
     if (result.ok()) {
       file["result"] = result.value();
@@ -117,13 +140,11 @@ Result<int> RunUnits(const PlanFolderFlags& flags) {
       file["error"] = result.error().Text();
     }
     GS_RETURN_IF_ERROR(WriteFile(path, JsonText(file)));
-    failures += !result.ok();
-    ++done;
+    ++(result.ok() ? ran.done : ran.failed);
     if (!flags.common.quiet) Print(stderr, "{}: {}\n", unit->logs.front(), result.ok() ? "done" : "failed");
   }
-  Print(stderr, "{} {}: {} done ({} failed), {} were there\n", flags.unit.empty() ? "shard" : "unit",
-        flags.unit.empty() ? flags.shard : flags.unit, done, failures, there);
-  return failures > 0 ? kBelowThreshold : kDone;
+  Say(ran, flags);
+  return ran.failed > 0 || ran.interrupted ? kBelowThreshold : kDone;
 }
 
 }  // namespace

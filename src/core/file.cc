@@ -147,6 +147,9 @@ void PartWriter::Write(std::string_view bytes) {
 }
 
 Status PartWriter::Finish() {
+  // On the disk before it has its name: a machine that loses power keeps the old file or the new one.
+  if (status_.ok() && (std::fflush(file_.get()) != 0 || fsync(fileno(file_.get())) != 0))
+    status_ = SystemError("cannot write the file", path_);
   if (std::fclose(file_.release()) != 0 && status_.ok()) status_ = SystemError("cannot write the file", path_);
   if (status_.ok() && rename(temporary_.c_str(), path_.c_str()) != 0)
     status_ = SystemError("cannot rename the finished file to its place", path_);

@@ -100,6 +100,9 @@ struct ShareOfGap {
   double value = 0, low = 0, high = 0;
 };
 
+// The rule of an effect that no replay ran through with.
+inline constexpr char kNotSimulated[] = "the model with it cannot be simulated at this time step";
+
 // What is said of one effect.
 struct Statement {
   EffectUse use;

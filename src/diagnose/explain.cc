@@ -105,9 +105,7 @@ std::string Explain(const Diagnosis& d) {
       break;
     }
     case Verdict::kUnknown:
-      if (!d.effects.empty())
-        text += ExplainEffects(d) + ", and no known effect explains what remains.";
-      else if (d.interrupted && d.statements.empty())
+      if (d.interrupted && d.statements.empty())
         text += "No effect was looked at.";
       else
         text += fmt::format("No known effect explains what remains: the best leaves {:.1f} times the sensors' noise{}.",

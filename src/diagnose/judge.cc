@@ -342,9 +342,11 @@ class Judging {
     if (!table.valid) return;  // nothing was looked at
     for (const EffectUse& use : found_.uses) {
       if (FindTold(use, result)) continue;
+      bool tried = false;
       double seen = 0, moved = 0;
       for (std::size_t t = 0; t < table.trials.size(); ++t) {
         if (table.trials[t].use != use) continue;
+        tried = true;
         const Eigen::Index c = table.trials[t].columns.front();
         moved = std::max(moved, table.sum(c, c));
         if (table.sum(c, c) > 0)
@@ -355,7 +357,8 @@ class Judging {
           .use = use, .answer = seen > kNothing ? Answer::kAbsent : Answer::kUnseen, .prior = PriorOf(use)};
       statement.rule = seen > kNothing ? "gains too little beside the effects of the final set"
                        : moved > 0     ? "the base model's parameters imitate it fully"
-                                       : "these logs do not move what it acts on";
+                       : tried         ? "these logs do not move what it acts on"
+                                       : kNotSimulated;
       result->statements.push_back(std::move(statement));
     }
   }

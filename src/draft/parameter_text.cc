@@ -77,7 +77,7 @@ class Writer {
       Propose({name + ".damping", unit + " s" + per, damping, 0, 20 * scale, field + "damping",
                damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
     if (!rotors_.contains(slot))
-      Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, std::max(5 * armature, inertia),
+      Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, 5 * std::max(armature, inertia),
                field + "armature"});
     if (const double k = m_.jnt_stiffness[joint.joint]; k > 0)
       Propose({name + ".stiffness", unit + per, k, 0.2 * k, 5 * k, field + "stiffness"});

@@ -61,11 +61,13 @@ std::vector<std::vector<double>> TorquesOf(const mjModel& model, const Pairing& 
 struct Fit {
   double kp = 0, kd = 0, armature = 0, explained = 0, error = 0;  // share of variance; standard error of kp
   bool damped = false;                                            // kd did not come out below zero
+  int late = 0;                                                   // rows
 };
 
 // What the torque may hold beside kp stretch + c. Of the torque that a motion takes the servo bears friction and the
 // armature too.
 enum Term { kDamping, kArmature, kFriction };
+const std::vector<Term> kServo = {kDamping, kArmature, kFriction};
 
 struct Rows {
   std::vector<double> stretch, speed, acceleration, torque;
@@ -78,8 +80,10 @@ double TermAt(const Rows& rows, Term term, std::size_t k) {
                              : -std::tanh(rows.speed[k] / kStill);
 }
 
-// By least squares; terms with the wrong sign are left out.
-std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms) {
+enum class Signs { kRight, kAny };  // terms with the wrong sign are left out, or not
+
+// By least squares.
+std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms, Signs signs = Signs::kRight) {
   std::vector<std::size_t> used;
   for (std::size_t k = 0; k < rows.torque.size(); ++k) {
     if (std::isfinite(rows.stretch[k] + rows.speed[k] + rows.acceleration[k] + rows.torque[k])) used.push_back(k);
@@ -100,7 +104,7 @@ std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms) {
   const double residual = (y - x * solution).squaredNorm(), total = (y.array() - y.mean()).matrix().squaredNorm();
   if (!(total > 0) || !solution.allFinite()) return std::nullopt;
   for (std::size_t t = 0; t < terms.size(); ++t) {
-    if (solution(static_cast<Eigen::Index>(2 + t)) >= 0) continue;
+    if (signs == Signs::kAny || solution(static_cast<Eigen::Index>(2 + t)) >= 0) continue;
     terms.erase(terms.begin() + static_cast<std::ptrdiff_t>(t));
     return FitLaw(rows, terms);
   }
@@ -136,9 +140,15 @@ class Fitter {
         return Fitted(a, *fit, Armature(a), "by regression of the measured torque, which it explains to ");
     }
     if (fits) {
-      if (const auto fit = Best(a, torques_[slot.joint], {kDamping, kArmature, kFriction}); fit && Counts(*fit))
-        return Fitted(a, *fit, fit->armature,
-                      "by regression of the torque that the motion takes, which it explains to ");
+      if (const auto fit = Best(a, torques_[slot.joint], kServo); fit && Counts(*fit)) {
+        ServoGains gains =
+            Fitted(a, *fit, fit->armature, "by regression of the torque that the motion takes, which it explains to ");
+        if (gains.certain && !ScaleIsKnown(a, *fit)) {
+          gains.certain = false;
+          gains.doubt = "gains by the MJCF's inertia alone: a rotor that it lacks would make them larger";
+        }
+        return gains;
+      }
     }
     return MadeUp(slot.joint);
   }
@@ -185,9 +195,18 @@ class Fitter {
     std::optional<Fit> best;
     for (int late = 0; late <= kLatest; ++late) {
       const auto fit = FitLaw(Of(a, torque, late), terms);
-      if (fit && (!best || fit->explained > best->explained)) best = fit;
+      if (!fit || (best && fit->explained <= best->explained)) continue;
+      best = fit;
+      best->late = late;
     }
     return best;
+  }
+
+  // Where nothing but inertia resists, gains and rotor are known up to one factor: a rotor that may take away from the
+  // link's inertia takes the gains with it. Gravity, or a rotor that shows, says how large they are.
+  bool ScaleIsKnown(std::size_t a, const Fit& fit) const {
+    const auto free = FitLaw(Of(a, torques_[p_.actuators[a].joint], fit.late), kServo, Signs::kAny);
+    return free && std::abs(free->kp - fit.kp) < kKnown * fit.kp;
   }
 
   Rows Of(std::size_t a, const std::vector<double>& torque, int late) const {

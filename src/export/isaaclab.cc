@@ -93,6 +93,11 @@ Status IsaacLabWriter::SetGains(int actuator, JointDrive* drive) const {
     drive->note = fmt::format("effort target: {:.6g} N m for each unit of the command", gain[0]);
   else if (gain[0] != drive->stiffness)
     drive->note = fmt::format("position target: {:.6g} times the command", gain[0] / drive->stiffness);
+  if (compiled_.actuator_ctrllimited[actuator]) {
+    const mjtNum* range = compiled_.actuator_ctrlrange + 2 * compiled_.actuator_ctrladr[actuator];
+    drive->note += fmt::format("{}clip commands to {:.6g} .. {:.6g} before they are sent, as the MJCF does",
+                               drive->note.empty() ? "" : "; ", range[0], range[1]);
+  }
   const int joint = compiled_.actuator_trnid[2 * actuator];
   if (compiled_.actuator_forcelimited[actuator] && !by_law)
     GS_RETURN_IF_ERROR(LimitBy(compiled_.actuator_forcerange + 2 * actuator, drive));

@@ -20,10 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const ForeignFormat kMat{"MAT file", "'gapscope[mat]'"}, kHdf5{"HDF5 file", "gapscope[hdf5]"},
-    kArrow{"Parquet or Feather file", "'gapscope[parquet]'"}, kRos{"ROS bag", "'gapscope[ros]'"},
-    kMcap{"MCAP file", "'gapscope[ros,mcap]'"}, kLerobot{"LeRobot dataset", "'gapscope[parquet]'"},
-    kPace{"PACE recording", "gapscope torch"};
+const ForeignFormat kMat{"MAT file"}, kHdf5{"HDF5 file"}, kArrow{"Parquet or Feather file"}, kRos{"ROS bag"},
+    kMcap{"MCAP file"}, kLerobot{"LeRobot dataset"}, kPace{"PACE recording"};
 
 constexpr int kRefused = 2;  // the converter's status for what it refuses, then five lines on stdout
 
@@ -38,10 +36,10 @@ Error RefusedBy(const std::string& said, const std::string& path) {
           .cure = fields[4]};
 }
 
-// A run of the converter: its words, the user's file that it is about, and what is needed for it.
+// A run of the converter: its words, the user's file that it is about, and what it is needed for.
 struct Conversion {
   std::vector<std::string> words;
-  std::string path, needed, install;
+  std::string path, needed;
 };
 
 Status Convert(const Conversion& conversion, const std::string& said) {
@@ -52,7 +50,7 @@ Status Convert(const Conversion& conversion, const std::string& said) {
     return Error{.what = conversion.needed,
                  .where = conversion.path,
                  .actual = "no program " + words[0],
-                 .cure = "pip install " + conversion.install};
+                 .cure = kInstallConverter};
   }
   if (status == kRefused) {
     GS_ASSIGN(const std::string refusal, ReadFile(said));
@@ -118,9 +116,8 @@ Result<std::vector<std::string>> LogsNamed(const std::string& path) {
   if (!asked.empty() && asked.find(':') == std::string::npos) return std::vector{path};
   const ScratchFolder scratch;
   if (!scratch.made()) return NoRoom(path);
-  GS_RETURN_IF_ERROR(Convert(
-      {.words = {"--episodes", "--", path}, .path = path, .needed = Needed(*format), .install = format->install},
-      scratch.Path("said")));
+  GS_RETURN_IF_ERROR(
+      Convert({.words = {"--episodes", "--", path}, .path = path, .needed = Needed(*format)}, scratch.Path("said")));
   GS_ASSIGN(const std::string said, ReadFile(scratch.Path("said")));
   std::istringstream lines(said);
   std::vector<std::string> logs;
@@ -132,7 +129,7 @@ Result<Log> ReadForeign(const std::string& path, const ForeignFormat& format, co
   const ScratchFolder scratch;
   if (!scratch.made()) return NoRoom(path);
   const std::string table = scratch.Path("table.npz");
-  Conversion conversion{.words = {"--out", table}, .path = path, .needed = Needed(format), .install = format.install};
+  Conversion conversion{.words = {"--out", table}, .path = path, .needed = Needed(format)};
   if (!source.empty()) conversion.words.insert(conversion.words.end(), {"--options", source});
   conversion.words.insert(conversion.words.end(), {"--", path});
   GS_RETURN_IF_ERROR(Convert(conversion, scratch.Path("said")));
@@ -149,8 +146,7 @@ Status WriteMcap(const std::string& path, const Log& log) {
   GS_RETURN_IF_ERROR(WriteNpz(table, log));
   return Convert({.words = {"--out", path, "--to", "mcap", "--", table},
                   .path = path,
-                  .needed = "MCAP files are written by the Python package",
-                  .install = kRos.install},
+                  .needed = "MCAP files are written by the Python package"},
                  scratch.Path("said"));
 }
 

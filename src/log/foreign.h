@@ -11,7 +11,7 @@
 namespace gapscope {
 
 struct ForeignFormat {
-  std::string name, install;  // "MAT file"; what pip installs to read it: "'gapscope[mat]'"
+  std::string name;  // "MAT file"
 };
 
 // By the name of a file, or by what a folder holds; null: none of them, or nothing is there.
@@ -23,6 +23,10 @@ std::string WithoutEpisodes(const std::string& path);
 // The logs that a path names: of a LeRobot dataset ("dataset", "dataset#0:20") one for each of its episodes, which the
 // converter lists; else itself. Errors: as ReadForeign.
 Result<std::vector<std::string>> LogsNamed(const std::string& path);
+
+// What to do where there is no converter: no package index has it. It says itself which of its extras it lacks.
+inline constexpr char kInstallConverter[] =
+    "scripts/wheel; in a venv pip install \"$(ls dist/gapscope-*.whl)[all]\"; its bin folder on the PATH";
 
 // The converter: $GAPSCOPE_CONVERT, gapscope-convert beside this program, or on the PATH.
 std::string ConverterProgram();

@@ -1,9 +1,10 @@
 #include "src/report/diagnose_report.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "src/diagnose/policy.h"
@@ -149,12 +150,14 @@ std::string StatementTable(const Diagnosis& d) {
   std::string text =
       fmt::format("\n{:>2} {:<34} {:<8} {:>11}  {}\n", "", "effect", "answer", "probability", "rests on");
   std::string bounds;
-  std::size_t absent = 0, unseen = 0;
+  std::map<std::string, std::vector<std::string>> unseen;  // by why
+  std::size_t absent = 0, unseen_count = 0;
   for (std::size_t i = 0; i < d.statements.size(); ++i) {
     const Statement& s = d.statements[i];
     const StatementNumbers& n = s.numbers;
     if (!s.sets) {
-      ++(s.answer == Answer::kUnseen ? unseen : absent);
+      ++(s.answer == Answer::kUnseen ? unseen_count : absent);
+      if (s.answer == Answer::kUnseen) unseen[WhyOf(s)].push_back(s.use.Text());
       if (!s.bounds.empty() && absent <= kMostBounds)
         bounds +=
             fmt::format("{}{} {} {}", bounds.empty() ? "" : ", ", s.use.Text(), s.bounds.front().key, BoundText(s));
@@ -163,7 +166,9 @@ std::string StatementTable(const Diagnosis& d) {
     text += fmt::format("{:>2} {:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", i + 1, s.use.Text(),
                         AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
   }
-  text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen);
+  text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen_count);
+  for (const auto& [why, uses] : unseen)
+    text += Wrapped(fmt::format("cannot be seen: {}; {}", fmt::join(uses, ", "), why), 120, "  ") + "\n";
   if (!bounds.empty()) {
     const char* more = absent > kMostBounds ? ", ... (--json: all)" : "";
     text += Wrapped("at most (of a limit or a compliance: at least; 95 %): " + bounds + more, 120, "  ") + "\n";
@@ -396,7 +401,7 @@ std::string ToTable(const DiagnoseRun& run) {
   text += RemainderText(d.remainder);
   text += "\n" + Wrapped(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);
-  if (d.verdict == Verdict::kUnknown && !d.effects.empty()) text += ConditionTable("what remains", d.remains);
+  if (!d.effects.empty()) text += ConditionTable("what remains", d.remains);
   text += StatementTable(d);
   if (d.next.why != NextExperiment::Why::kNothing) {
     text += "\nnext experiment\n";

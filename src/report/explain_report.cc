@@ -101,7 +101,7 @@ std::vector<Table> TablesOf(const Statement& s) {
 std::vector<std::string> SentencesOn(const Statement& s) {
   std::vector<std::string> sentences;
   if (!s.sets) {
-    sentences.push_back("It was not refitted: " + s.rule + ".");
+    sentences.push_back("It was not refitted: " + WhyOf(s) + ".");
   } else {
     sentences.push_back(fmt::format(
         "Probability {:.2f}: the logs alone give {:.2f}, the prior is {:.2f}; from {:.2f} on it is told as present.",

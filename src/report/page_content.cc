@@ -19,7 +19,7 @@ void AddStatements(const Diagnosis& d, PageContent* page) {
   for (const Statement& s : d.statements) {
     page->statements.push_back({.title = Words(s.use),
                                 .answer = AnswerName(s.answer),
-                                .why = s.rule,
+                                .why = WhyOf(s),
                                 .bound = BoundText(s),
                                 .probability = s.probability,
                                 .prior = s.prior,
@@ -49,7 +49,7 @@ PageContent PageOf(const DiagnoseRun& run) {
   PageContent page{.headline = HeadlineOf(run), .mapped = d.effects.empty() ? "retuned model" : "diagnosed model"};
   if (d.model) page.values = RunModelOf(*d.model, d.values).values;
   page.where = {{.title = {}, .shares = First(d.where)}};
-  if (d.verdict == Verdict::kUnknown && !d.effects.empty()) {
+  if (!d.effects.empty()) {
     const auto found = Collect(d.effects, [](const auto& effect) { return Words(effect.use); });
     page.where.push_back(
         {.title = "Of what " + Listed(found) + (found.size() > 1 ? " leave" : " leaves"), .shares = First(d.remains)});

@@ -18,8 +18,9 @@ std::string SizeText(const EffectEstimate& size) {
   const bool is_short = size.unit == "s" && std::abs(size.value) < kShort;
   const double factor = is_short ? 1000 : 1;
   const auto number = [&](double value) { return ShortNumber(factor * value, 3); };
-  return fmt::format("{} ({} .. {}){}", number(size.value), number(size.low), number(size.high),
-                     UnitAfter(is_short ? "ms" : size.unit));
+  const bool hardly_known = size.low <= 0 && size.high >= 0;
+  return fmt::format("{} ({} .. {}){}{}", number(size.value), number(size.low), number(size.high),
+                     UnitAfter(is_short ? "ms" : size.unit), hardly_known ? ", a size hardly known" : "");
 }
 
 std::string NamesOf(const std::vector<EffectUse>& uses) {
@@ -32,14 +33,19 @@ std::string NamesOf(const std::vector<EffectUse>& uses) {
   return Listed(names, "or");
 }
 
-// What would tell the members of a group apart, by their effects' own files; empty: one member, or nothing is known.
+// The input that tells an effect from what resembles it, by its own file; empty: a candidate of the user's own.
+std::string InputThatTells(const EffectUse& use) {
+  const auto effect = std::ranges::find(Catalogue(), use.effect, &Effect::name);
+  return effect == Catalogue().end() ? "" : effect->told_apart;
+}
+
+// What would tell the members of a group apart; empty: one member, or nothing is known.
 std::string WhatWouldTell(const std::vector<const Statement*>& members) {
   if (members.size() == 1) return "";
   std::vector<std::string> inputs;
   for (const Statement* s : members) {
-    const auto effect = std::ranges::find(Catalogue(), s->use.effect, &Effect::name);
-    if (effect == Catalogue().end() || effect->told_apart.empty()) continue;
-    if (std::ranges::find(inputs, effect->told_apart) == inputs.end()) inputs.push_back(effect->told_apart);
+    const std::string input = InputThatTells(s->use);
+    if (!input.empty() && std::ranges::find(inputs, input) == inputs.end()) inputs.push_back(input);
   }
   return inputs.empty() ? "" : fmt::format("what would tell: {}", fmt::join(inputs, "; "));
 }
@@ -72,6 +78,11 @@ std::string Sentence::Text() const {
   text += fmt::format(", {:.0f} % of what closes, P {:.2f}", 100 * share_of_gap, probability);
   if (!caveat.empty()) text += ", " + caveat;
   return told_apart.empty() ? text : text + "; " + told_apart;
+}
+
+std::string WhyOf(const Statement& s) {
+  const std::string input = s.answer == Answer::kUnseen && s.rule != kNotSimulated ? InputThatTells(s.use) : "";
+  return s.rule + (input.empty() ? "" : "; what would show it: " + input);
 }
 
 std::vector<Sentence> SentencesOf(const Diagnosis& d) {

@@ -19,6 +19,9 @@ struct Sentence {
   double probability = 0;
   std::string Text() const;  // "dry friction on elbow, 0.15 (0.13 .. 0.17) N m, 41 % of what closes, P 0.94"
 };
+// What a statement rests on; of what these logs cannot show, the input that would.
+std::string WhyOf(const Statement& s);
+
 // The largest share first.
 std::vector<Sentence> SentencesOf(const Diagnosis& d);
 

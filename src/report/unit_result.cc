@@ -9,6 +9,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr char kUnitSchemas[] = "gapscope.tune/1 or gapscope.diagnosis/1";
+
 bool IsTune(const ordered_json& json) { return json.at("schema") == kTuneSchema; }
 
 UnitResult TunedFrom(const ordered_json& json) {
@@ -50,14 +52,7 @@ UnitResult DiagnosedFrom(const ordered_json& json) {
   return unit;
 }
 
-}  // namespace
-
-Result<UnitResult> ReadUnitResult(const ordered_json& json, const std::string& where) {
-  return ReadGuarded([&] { return IsTune(json) ? TunedFrom(json) : DiagnosedFrom(json); }, where,
-                     "gapscope.tune/1 or gapscope.diagnosis/1");
-}
-
-ordered_json MergedParts(const ordered_json& result) {
+ordered_json PartsOf(const ordered_json& result) {
   if (IsTune(result))
     return {{"termination", result.at("termination")},
             {"error", result.at("error")},
@@ -75,6 +70,16 @@ ordered_json MergedParts(const ordered_json& result) {
           {"gap", result.at("gap")},
           {"values", result.at("model").at("values")},
           {"statements", std::move(statements)}};
+}
+
+}  // namespace
+
+Result<UnitResult> ReadUnitResult(const ordered_json& json, const std::string& where) {
+  return ReadGuarded([&] { return IsTune(json) ? TunedFrom(json) : DiagnosedFrom(json); }, where, kUnitSchemas);
+}
+
+Result<ordered_json> MergedParts(const ordered_json& json, const std::string& where) {
+  return ReadGuarded([&] { return PartsOf(json); }, where, kUnitSchemas);
 }
 
 }  // namespace gapscope

@@ -38,8 +38,8 @@ struct UnitResult {
 // Error: something else.
 Result<UnitResult> ReadUnitResult(const nlohmann::ordered_json& json, const std::string& where);
 
-// The parts of a result that a merge repeats. Throws what nlohmann does at a missing key.
-nlohmann::ordered_json MergedParts(const nlohmann::ordered_json& result);
+// The parts of a result that a merge repeats. Error: something else.
+Result<nlohmann::ordered_json> MergedParts(const nlohmann::ordered_json& json, const std::string& where);
 
 }  // namespace gapscope
 

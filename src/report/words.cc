@@ -77,8 +77,7 @@ std::string TitleOf(const Diagnosis& d, const std::string& found) {
       return "The model lacks " + Listed(Collect(SentencesOf(d), [](const Sentence& s) { return s.what; })) +
              ". These logs cannot tell which, where it says or.";
     case Verdict::kUnknown:
-      return d.effects.empty() ? "Something is missing that no known effect explains."
-                               : "The model lacks " + found + ", and something that no known effect explains.";
+      return "Something is missing that no known effect explains.";
   }
   return "";
 }

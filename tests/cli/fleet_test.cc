@@ -56,11 +56,36 @@ TEST_F(FleetTest, RobotsAndDaysComeOutOfPathsAndAFailedUnitIsListed) {
   EXPECT_NE(ReadAll(Work() + "/parameters.csv").find(",b,2,motor.kp,"), std::string::npos);
   EXPECT_NE(ReadAll(Work() + "/fleet.html").find("\"name\":\"b\""), std::string::npos);
 
+  // What a disk or a stranger has damaged is that unit's failure, and is done anew.
+  const auto damage = [&](const char* text) { std::ofstream(Work() + "/results/" + one + ".json") << text; };
+  for (const char* text : {"[1]", "{\"result\": {\"schema\": \"gapscope.tune/1\"}}", "{\"error\": 3}", "{\"resu"}) {
+    damage(text);
+    const Answer damaged = Run("fleet merge '" + Work() + "'");
+    EXPECT_EQ(damaged.status, 1) << damaged.err;
+    EXPECT_NE(damaged.out.find("3 units merged, 2 failed, 0 missing"), std::string::npos) << text << damaged.out;
+  }
+  const Answer anew = Run("fleet run --unit " + one + " '" + Work() + "' --quiet --json");
+  EXPECT_EQ(anew.status, 0) << anew.err;
+  EXPECT_EQ(anew.err, "");
+  EXPECT_EQ(nlohmann::json::parse(anew.out)["done"], 1);
+
   // A result is that of its log: another one is not taken for it.
   std::filesystem::rename(JointLog("other.csv", 0.05), Log("a", "10"));
   std::filesystem::remove(Work() + "/results/" + one + ".json");
   EXPECT_EQ(Run("fleet run --unit " + one + " '" + Work() + "'").status, 1);
   EXPECT_NE(ReadAll(Work() + "/results/" + one + ".json").find("has changed since the plan"), std::string::npos);
+}
+
+// Days that are called as numbers are not all of them ones.
+TEST_F(FleetTest, ADayThatIsCalledNanHasItsPlace) {
+  for (const char* day : {"nan", "3", "inf", "nanny"}) std::filesystem::rename(JointLog(), Log("a", day));
+  ASSERT_EQ(Run("fleet plan " + Fleet() + " --out '" + Work() + "'").status, 0);
+  std::vector<std::string> days;
+  const auto plan = Json("plan.json");
+  for (const auto& task : plan["tasks"]) {
+    if (task["group"]["robot"] == "a") days.push_back(task["group"]["day"]);
+  }
+  EXPECT_EQ(days, (std::vector<std::string>{"2", "3", "10", "inf", "nan", "nanny"}));
 }
 
 // The same without a file: a unit a log.
@@ -89,6 +114,19 @@ TEST_F(FleetTest, AFleetFileThatCannotBeMeantIsRefused) {
   ASSERT_EQ(Run("fleet plan " + Fleet() + out).status, 0);
   ExpectRefused("fleet run --unit 0123 '" + Work() + "'", {"no such unit", "0123"});
   ExpectRefused("fleet run '" + Work() + "'", {"--shard"});
+
+  // A plan of a stranger names no file outside its folder, and no unit without a log.
+  auto plan = Json("plan.json");
+  for (const char* id : {"../../away", "/tmp/away", "0123456789ABCDEF", ""}) {
+    plan["tasks"][0]["task"] = id;
+    std::ofstream(Work() + "/plan.json") << plan;
+    ExpectRefused("fleet run --shard 1/1 '" + Work() + "'", {"not the name of a task", "16 hexadecimal digits"});
+    ExpectRefused("fleet merge '" + Work() + "'", {"not the name of a task"});
+  }
+  plan["tasks"][0]["task"] = "0123456789abcdef";
+  plan["tasks"][0]["logs"] = nlohmann::json::array();
+  std::ofstream(Work() + "/plan.json") << plan;
+  ExpectRefused("fleet merge '" + Work() + "'", {"a task without a log"});
 }
 
 TEST_F(FleetTest, ANewLogIsTheSameAsBeforeOrIsNot) {

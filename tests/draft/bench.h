@@ -42,17 +42,22 @@ struct Motion {
   std::vector<double> time_s, target, angle, speed, torque;
 };
 
-// kInertia q'' = kp (target held from row to row - q) - kd q', by small steps.
-inline Motion Move(std::size_t joint, double kp, double kd, int rows = 2500) {
+struct MoveOptions {
+  int rows = 2500;
+  double gravity_n_m = 0;
+};
+
+// kInertia q'' = kp (target held from row to row - q) - kd q' - gravity sin q, by small steps.
+inline Motion Move(std::size_t joint, double kp, double kd, const MoveOptions& options = {}) {
   Motion m;
   double q = TargetOf(joint, 0), w = 0;
   constexpr int kParts = 40;
-  for (int k = 0; k < rows; ++k) {
+  for (int k = 0; k < options.rows; ++k) {
     const double t = kStep_s * k, u = TargetOf(joint, t);
     m.time_s.push_back(t), m.target.push_back(u), m.angle.push_back(q), m.speed.push_back(w);
     m.torque.push_back(kp * (u - q) - kd * w);
     for (int i = 0; i < kParts; ++i) {
-      w += kStep_s / kParts * (kp * (u - q) - kd * w) / kInertia;
+      w += kStep_s / kParts * (kp * (u - q) - kd * w - options.gravity_n_m * std::sin(q)) / kInertia;
       q += kStep_s / kParts * w;
     }
   }

@@ -38,12 +38,26 @@ TEST_F(GainsTest, OfTheTorqueThatTheMotionTakes) {
   ASSERT_NE(a, nullptr) << text_;
   EXPECT_NEAR(a->kp, kGainsKp, kWithin * kGainsKp);
   EXPECT_NEAR(a->kd, kGainsKd, 2 * kWithin * kGainsKd);
-  EXPECT_FALSE(IsUnsure("gains")) << text_;
+  // Nothing but the link's inertia says how large they are: with a rotor of half of it they are half as large again.
+  EXPECT_TRUE(IsUnsure("a rotor that it lacks would make them larger")) << text_;
   // They are parameters that a fit may move; the joint's own damping would be the same as kd.
   for (const auto& p : e.parameters) {
     EXPECT_NE(p.name, "hip.damping");
-    EXPECT_TRUE(p.name != "hip.kp" || (!p.frozen && p.low < kGainsKp && p.high > kGainsKp));
+    EXPECT_TRUE(p.name != "hip.kp" || (!p.frozen && p.low < kGainsKp && p.high > 5 * kGainsKp));
   }
+}
+
+// Where gravity turns the joint, it says how large gains are.
+TEST_F(GainsTest, OfATorqueWithGravityAreSure) {
+  const Motion m = Move(0, kGainsKp, kGainsKd, {.gravity_n_m = 0.981});
+  const Experiment e = Drafted(
+      "<mujoco><compiler angle=\"radian\"/><worldbody><body><joint name=\"hip\" axis=\"0 1 0\"/><inertial pos=\"0 0 "
+      "-0.1\" "
+      "mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/></body></worldbody></mujoco>",
+      {{"time", m.time_s}, {"q_des", m.target}, {"q", m.angle}});
+  ASSERT_NE(Added(e, "hip"), nullptr) << text_;
+  EXPECT_NEAR(Added(e, "hip")->kp, kGainsKp, kWithin * kGainsKp);
+  EXPECT_FALSE(IsUnsure("gains")) << text_;
 }
 
 TEST_F(GainsTest, AreMadeUpAndMarkedWhereTheLogDoesNotTell) {

@@ -55,7 +55,7 @@ TEST_F(ForeignTest, WithoutAConverterTheErrorSaysWhatToInstall) {
   setenv("GAPSCOPE_CONVERT", folder_.Path("gone").c_str(), 1);
   const std::string said = MessageOf(folder_.Write("a.mcap", "?"));
   EXPECT_NE(said.find("MCAP file"), std::string::npos) << said;
-  EXPECT_NE(said.find("pip install 'gapscope[ros,mcap]'"), std::string::npos) << said;
+  EXPECT_NE(said.find(kInstallConverter), std::string::npos) << said;
 }
 
 TEST_F(ForeignTest, WordsArriveAsTheyStand) {
@@ -84,7 +84,7 @@ TEST_F(ForeignTest, ADatasetIsTheLogsThatTheConverterLists) {
   for (const std::string& one : {set + "#3", folder_.Write("a.mat", "?"), folder_.Path("none.csv")})
     EXPECT_EQ(LogsNamed(one).value(), std::vector{one});
   ASSERT_FALSE(LogsNamed(set).ok());
-  EXPECT_EQ(LogsNamed(set).error().cure, "pip install 'gapscope[parquet]'");
+  EXPECT_EQ(LogsNamed(set).error().cure, kInstallConverter);
 }
 
 TEST_F(ForeignTest, RefusalsAndFailuresAreErrors) {
@@ -109,7 +109,7 @@ TEST_F(ForeignTest, AnMcapFileIsMadeOfATable) {
   setenv("GAPSCOPE_CONVERT", folder_.Path("gone").c_str(), 1);
   const Status lacking = WriteMcap(path, log);
   ASSERT_FALSE(lacking.ok());
-  EXPECT_EQ(lacking.error().cure, "pip install 'gapscope[ros]'");
+  EXPECT_EQ(lacking.error().cure, kInstallConverter);
   EXPECT_FALSE(std::filesystem::exists(path));
   Install("cp \"$6\" \"$2\"");
   ASSERT_TRUE(WriteMcap(path, log).ok());

@@ -41,7 +41,7 @@ def test_the_program_starts_the_converter_by_itself(experiment: str, demo: str, 
     assert run.returncode == 2 and "not a readable MAT file" in run.stderr and run.stdout == ""
     gone = {**os.environ, "GAPSCOPE_CONVERT": str(tmp_path / "gone")}
     run = subprocess.run(command, capture_output=True, text=True, env=gone)
-    assert run.returncode == 2 and "pip install 'gapscope[mat]'" in run.stderr
+    assert run.returncode == 2 and "gapscope-*.whl)[all]" in run.stderr
 
 
 def test_the_doctor_asks_the_converter_for_its_extras(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ FILES = {path.name: path for path in sorted((ROOT / "schemas").iterdir())}
 COMMON = "common.schema.json"
 EXPERIMENT = "experiment.schema.json"  # test_experiment_schema.py
 PLUGINS = {path.name for path in (ROOT / "src" / "plugins").iterdir()}  # gapscope.motor and so on are not results
-NOT_DESCRIBED = {"log", "plan", "merge", "fleet"}  # docs/; files between commands of one version
+NOT_DESCRIBED = {"log", "fleet"}  # files that are read: docs/reference/formats.md, docs/reference/fleet.md
 
 
 def read(name: str) -> Schema:
@@ -67,8 +67,9 @@ def check(result: Mapping[str, Any], name: str) -> None:
     assert not problems
 
 
-def ask(*words: str) -> dict[str, Any]:
-    done = subprocess.run([program(), *words, "--json"], check=True, capture_output=True, text=True, timeout=300)
+def ask(*words: str, status: int = 0) -> dict[str, Any]:
+    done = subprocess.run([program(), *words, "--json"], check=False, capture_output=True, text=True, timeout=300)
+    assert done.returncode == status, done.stderr
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer
 
@@ -147,6 +148,27 @@ def test_logs(experiment: str, demo: str, tmp_path: Path) -> None:
     check(ask("convert", demo, "--out", str(tmp_path)), "convert")
     check(ask("identify", "cable", experiment, demo), "identify")
     check(ask("render", experiment, demo, "--out", str(tmp_path / "still.png")), "render")
+
+
+def test_a_plan_and_its_parts(experiment: str, short: str, tmp_path: Path) -> None:
+    work = str(tmp_path / "work")
+    plan = ask("plan", experiment, short, "--out", work)
+    check(plan, "plan")
+    check(ask("run", "--shard", "1/1", work), "run")
+    check(ask("merge", work), "merge")
+
+    fleet = tmp_path / "fleet.yaml"
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "1.csv").write_bytes(Path(short).read_bytes())
+    (tmp_path / "a" / "2.csv").write_text("not a log\n")
+    fleet.write_text(f"schema: gapscope.fleet/1\nexperiment: {experiment}\nlogs: '{{robot}}/{{day}}.csv'\nwhat: tune\n")
+    plan = ask("fleet", "plan", str(fleet), "--out", work)
+    check(plan, "plan")
+    done = ask("fleet", "run", "--unit", plan["tasks"][0]["task"], work)
+    check(done, "run")
+    assert (done["units"], done["done"], done["failed"], done["there"]) == (1, 1, 0, 0)
+    subprocess.run([program(), "fleet", "run", "--shard", "1/1", work], capture_output=True, check=False)
+    check(ask("fleet", "merge", work, status=1), "merge")
 
 
 def test_the_doctor() -> None:

@@ -235,16 +235,15 @@ def main():
                         "ambiguous": "lacks cable spring or gravity offset on arm and Coulomb friction on arm. "
                                      "These logs cannot tell which",
                         "explained": "Cable spring on arm is present.",
-                        "unknown": "and something that no known effect explains"}
+                        "unknown": "Something is missing that no known effect explains."}
             for name, verdict in verdicts.items():
                 for width in (390, 1440):
                     look(driver, Path(folder) / f"{name}.html", width, verdict)
-            where = driver.find_element(By.ID, "where").text
             fleet(driver, Path(folder) / "fleet.html")
             many_signals(driver, Path(folder) / "many.html")
-            check("Of what cable spring on arm and Coulomb friction on arm leave" in where,
-                  "unknown: what the effects leave")
             linked_zoom(driver, Path(folder) / "effects.html")
+            where = driver.find_element(By.ID, "where").text
+            check("Of what cable spring on arm and Coulomb friction on arm leave" in where, "what the effects leave")
             text = driver.find_element(By.ID, "main").text
             for part in ["91 %", "gains too little", "0.0002 N m", "</script><b>bold</b>",
                          "gapscope design triangle models/qube/experiment.yaml --duration 20",

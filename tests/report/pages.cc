@@ -55,7 +55,7 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   d.verdict = verdict;
   d.probability = 0.91;
   d.nominal = 1.77, d.refit = 1.2, d.final = 0.01, d.floor = 0.008, d.closed = 0.998;
-  if (verdict == Verdict::kNone || verdict == Verdict::kParameters) {
+  if (verdict != Verdict::kEffects && verdict != Verdict::kAmbiguous) {
     d.final = d.refit;
   } else {
     d.effects = {Found(kSpring, {"stiffness_n_m_per_rad", "N m/rad", 0.0012, 0.0011, 0.0013}, 0.97, 0.9, 0.01, 0.8),

@@ -91,7 +91,7 @@ function writeStatements(statements) {
       {class: "note"},
       "Gain: logarithm of the cost without the effect over the cost with it, all else refitted; on the fitted logs, on "
         + "logs held out, and over whole logs. Size, at most: with 95 % probability, of what is absent (of a limit "
-        + "or a compliance: at least). Unseen: the base model's parameters do all that it would do.",
+        + "or a compliance: at least). Unseen: these logs cannot tell, for the reason in the last column.",
     ),
   );
   show("statements");

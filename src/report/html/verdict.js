@@ -50,7 +50,7 @@ function writeVerdict(headline) {
 // A line a finding: what, how large, how sure.
 function writeFindings(findings, gap) {
   const line = (f) => {
-    const rest = [f.size, `${percent(f.share)} of the gap`, f.caveat].filter(Boolean).join(", ");
+    const rest = [f.size, `${percent(f.share)} of what closes`, f.caveat].filter(Boolean).join(", ");
     const apart = f.told_apart ? [element("br"), f.told_apart] : [];
     return element(
       "li",

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -28,16 +29,38 @@ _LOADER_FAILED = (1, 127)  # statuses of a program whose libraries the loader do
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a long call has come; None: not known."""
+    """How far a long call has come; None: not known.
+
+    ``call``: a name that reports of one call share and no other call has; ``number``: which of them this is, from 0 on.
+    """
 
     stage: str
     done: float | None
     total: float | None
     best: float | None  #: cost, of a fit
     elapsed_s: float
+    call: str = ""
+    number: int = 0
 
 
 ProgressCallback: TypeAlias = Callable[[Progress], object]
+
+
+class Reports:
+    """The reports of one call, each told to its callback, if it has one."""
+
+    def __init__(self, progress: ProgressCallback | None) -> None:
+        self._progress = progress
+        self._call = uuid.uuid4().hex
+        self._number = 0
+
+    def tell(
+        self, stage: str, done: float | None, total: float | None, best: float | None, elapsed_s: float
+    ) -> None:
+        if self._progress is not None:
+            report = Progress(stage, done, total, best, elapsed_s, self._call, self._number)
+            self._number += 1
+            self._progress(report)
 
 
 @dataclass(frozen=True)
@@ -170,7 +193,7 @@ class _Listener:
 
     def __init__(self, child: subprocess.Popen[str], progress: ProgressCallback | None) -> None:
         self._child = child
-        self._progress = progress
+        self._reports = Reports(progress)
         self._lock = threading.Lock()
         self.interrupted = False
         self.messages: list[str] = []
@@ -224,10 +247,7 @@ class _Listener:
         except json.JSONDecodeError:
             data = None
         if isinstance(data, dict) and "stage" in data:
-            if self._progress:
-                self._progress(
-                    Progress(data["stage"], data["done"], data["total"], data["best"], data["elapsed_s"])
-                )
+            self._reports.tell(data["stage"], data["done"], data["total"], data["best"], data["elapsed_s"])
         elif isinstance(data, dict) and "error" in data:
             self.error = InputError(**data["error"])
         elif line:

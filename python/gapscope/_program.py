@@ -25,6 +25,7 @@ _DONE, _BELOW_THRESHOLD, _BAD_INPUT = 0, 1, 2
 # Of the program's file: another platform's, no loader for it, a disk from which nothing is run.
 CANNOT_RUN = (errno.ENOEXEC, errno.ENOENT, errno.EACCES, errno.EPERM)
 _LOADER_FAILED = (1, 127)  # statuses of a program whose libraries the loader does not find
+_ERROR = ("what", "where", "actual", "allowed", "cure")  # keys of an error, in the order of InputError's arguments
 
 
 @dataclass(frozen=True)
@@ -249,6 +250,6 @@ class _Listener:
         if isinstance(data, dict) and "stage" in data:
             self._reports.tell(data["stage"], data["done"], data["total"], data["best"], data["elapsed_s"])
         elif isinstance(data, dict) and "error" in data:
-            self.error = InputError(**data["error"])
+            self.error = InputError(*(data["error"].get(name, "") for name in _ERROR))  # a newer program may say more
         elif line:
             self.messages.append(line)

@@ -84,6 +84,16 @@ def test_a_newer_program_and_unknown_numbers() -> None:
     assert math.isnan(score.rmse) and score.mae == 1 and score.extra == {"new": {"a": 1}}
 
 
+def test_an_error_of_a_newer_program(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    says = json.dumps({"error": {"what": "it is wrong", "where": "run.csv", "cure": "mend it", "new": {"a": 1}}})
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "newer", f"echo '{says}' >&2; exit 2"))
+    with pytest.raises(gs.InputError) as raised:
+        gs.replay(experiment, demo)
+    assert raised.value.args == ("it is wrong", "run.csv", "", "", "mend it")
+
+
 def test_files_of_a_temporary_result_live_as_long(experiment: str, demo: str) -> None:
     result = gs.replay(experiment, demo)
     out, model, traces = result.out, result.model, result.traces

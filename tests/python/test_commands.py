@@ -15,6 +15,7 @@ import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gapscope as gs
@@ -378,6 +379,29 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
         result.export("mjy", tmp_path / "other")
     plain, _ = result.model.mujoco(native=True)
     assert plain.nplugin == 0 and plain.dof_frictionloss[0] == pytest.approx(0.0006, rel=1e-4)
+
+
+def test_an_older_mujoco_without_an_element_of_the_native_form(
+    experiment: str, demo: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As 3.11 says it of `<dcmotor input="none">`."""
+    mujoco = pytest.importorskip("mujoco")
+    model = gs.replay(experiment, demo).model
+
+    def refuse(_: str) -> None:
+        raise ValueError("XML Error: invalid keyword: 'none'\nElement 'general', line 76\n")
+
+    monkeypatch.setattr(mujoco, "MjModel", SimpleNamespace(from_xml_path=refuse))
+    monkeypatch.setattr(mujoco, "mj_versionString", lambda: "3.11.0")
+    with pytest.raises(gs.InputError) as raised:
+        model.mujoco(native=True)
+    error = raised.value
+    assert "native=True" in error.where and "4.0.0 or newer" in error.allowed and error.what and error.cure
+    assert error.actual == "mujoco 3.11.0, XML Error: invalid keyword: 'none' Element 'general', line 76"
+    monkeypatch.setattr(mujoco, "mj_versionString", lambda: "4.0.1")  # what it lacks there is our mistake
+    with pytest.raises(ValueError, match="XML Error") as told:
+        model.mujoco(native=True)
+    assert not isinstance(told.value, gs.InputError)
 
 
 def test_what_the_host_sends_goes_beside_an_actuator_with_a_state(

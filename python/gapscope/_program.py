@@ -150,13 +150,10 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
             listener = _Listener(child, progress)
             try:
                 with listener.watching(_wanted.get()):
-                    listener.listen()
-                status = child.wait()
+                    status, text = listener.listen(stdout)
             except BaseException:
                 child.kill()
                 raise
-        stdout.seek(0)
-        text = stdout.read()
     loader = next((line for line in listener.messages if _LOADERS.search(line)), None)
     if status in _LOADER_FAILED and not text and loader is not None:
         raise not_executable(command[0], loader)
@@ -200,15 +197,17 @@ class _Listener:
         self.messages: list[str] = []
         self.error: InputError | None = None
 
-    def listen(self) -> None:
-        """To the end of stderr. A second Ctrl-C is raised."""
+    def listen(self, stdout: IO[str]) -> tuple[int, str]:
+        """To the child's end: its status, and what it has written to ``stdout``. A second Ctrl-C is raised."""
         assert self._child.stderr is not None
         before = False
         while True:
             try:
                 for line in self._child.stderr:
                     self._take(line)
-                return
+                status = self._child.wait()
+                stdout.seek(0)
+                return status, stdout.read()
             except KeyboardInterrupt:
                 if before:
                     raise

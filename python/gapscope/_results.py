@@ -110,7 +110,7 @@ _JUDGING = ("logs", "held_out", "train")
 
 def _answer(finished: Finished) -> dict[str, Any]:
     """What a command printed with --json. Raises Interrupted: Ctrl-C came first."""
-    if not finished.stdout:
+    if finished.interrupted:
         raise Interrupted
     return typing.cast(dict[str, Any], json.loads(finished.stdout))
 

@@ -21,10 +21,10 @@ from typing import Any
 import gapscope as gs
 import numpy as np
 import pytest
-from gapscope import fleet
+from gapscope import _program, fleet
 from gapscope._json import from_json
 
-from conftest import ROOT, interrupt_after, shell_program
+from conftest import ROOT, interrupt_after, interrupt_when, shell_program
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {
@@ -301,6 +301,30 @@ def test_ctrl_c_gives_the_best_so_far(experiment: str, demo: str) -> None:
     assert isinstance(raised.value, gs.Interrupted) and isinstance(partial, gs.Tune)
     assert partial.termination == "interrupted" and math.isfinite(partial.error.held_out)
     assert (partial.out / "model.xml").is_file()
+
+
+def test_ctrl_c_when_the_program_has_said_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its stderr is closed, and it writes its result yet."""
+    said = tmp_path / "said"
+    body = f"trap '' INT; exec 2>&-; touch {said}; sleep 1; echo whole"
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "late", body))
+    interrupt_when(said.exists)
+    assert _program.run(["tune"]) == _program.Finished("whole\n", (), True)
+
+
+def test_ctrl_c_while_a_result_is_read(experiment: str, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[object] = []
+
+    def interrupted_once(*words: Any, **fields: Any) -> Any:
+        calls.append(words)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return from_json(*words, **fields)
+
+    monkeypatch.setattr("gapscope._commands.from_json", interrupted_once)
+    with pytest.raises(gs.Interrupted) as raised:
+        gs.tune(experiment, short, freeze=FROZEN, starts=1)
+    assert isinstance(raised.value.partial, gs.Tune) and raised.value.partial.termination == "converged"
 
 
 def test_an_interrupted_diagnosis_goes_on(experiment: str, short: str, tmp_path: Path) -> None:

@@ -119,15 +119,21 @@ def _add(job: _Job, flag: str, values: Texts | Values | float | None) -> None:
 
 
 def _finish(kind: type[R], job: _Job, progress: ProgressCallback | None) -> R:
-    """Runs the job and reads its result; Interrupted where Ctrl-C cut it short."""
+    """Runs the job and reads its result; Interrupted where Ctrl-C cut it short, or came while it was read."""
     job.arguments += ["--json", "--out", str(job.out)]
     finished = _run(job, progress)
     if not finished.stdout:
         raise Interrupted
-    result = from_json(
-        kind, job.json(finished.stdout), out=job.out, messages=job.messages(finished), _keep=job.keep
-    )
-    if finished.interrupted:
+
+    def read() -> R:
+        data, said = job.json(finished.stdout), job.messages(finished)
+        return from_json(kind, data, out=job.out, messages=said, _keep=job.keep)
+
+    try:
+        result, interrupted = read(), finished.interrupted
+    except KeyboardInterrupt:
+        result, interrupted = read(), True
+    if interrupted:
         raise Interrupted(result if isinstance(result, (Tune, Diagnosis)) else None)
     return result
 

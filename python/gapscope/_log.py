@@ -370,7 +370,7 @@ def converted(path: Path) -> Iterator[Path]:
     Raises InputError: as `read`. Interrupted: Ctrl-C came first.
     """
     with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
-        if not run(["convert", str(path), "--out", folder, "--json"]).stdout:
+        if run(["convert", str(path), "--out", folder, "--json"]).interrupted:
             raise Interrupted
         (table,) = Path(folder).iterdir()
         yield table

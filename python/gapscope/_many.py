@@ -17,7 +17,7 @@ from gapscope._commands import Folder, Logs, OneLog, Source, as_list, diagnose
 from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._log import Log
-from gapscope._program import Progress, ProgressCallback, while_there
+from gapscope._program import ProgressCallback, Reports, while_there
 from gapscope._results import Diagnosis
 
 Outcome: TypeAlias = Diagnosis | Exception
@@ -129,7 +129,7 @@ class _Batch:
         self.tasks: dict[Future[Diagnosis | None], str] = {}
         self._names = names
         self._keep = keep
-        self._progress = progress
+        self._reports = Reports(progress)
         self._begin = time.monotonic()
         self._done: dict[str, Outcome | None] = {}
 
@@ -138,9 +138,7 @@ class _Batch:
         for task in as_completed([task for task, name in self.tasks.items() if name not in self._done]):
             name = self.tasks[task]
             self._done[name] = self._outcome(task)
-            if self._progress is not None:
-                elapsed = time.monotonic() - self._begin
-                self._progress(Progress(name, len(self._done), len(self._names), None, elapsed))
+            self._reports.tell(name, len(self._done), len(self._names), None, time.monotonic() - self._begin)
 
     def _outcome(self, task: Future[Diagnosis | None]) -> Outcome | None:
         try:

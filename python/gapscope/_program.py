@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -24,20 +25,43 @@ _DONE, _BELOW_THRESHOLD, _BAD_INPUT = 0, 1, 2
 # Of the program's file: another platform's, no loader for it, a disk from which nothing is run.
 CANNOT_RUN = (errno.ENOEXEC, errno.ENOENT, errno.EACCES, errno.EPERM)
 _LOADER_FAILED = (1, 127)  # statuses of a program whose libraries the loader does not find
+_ERROR = ("what", "where", "actual", "allowed", "cure")  # keys of an error, in the order of InputError's arguments
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a long call has come; None: not known."""
+    """How far a long call has come; None: not known.
+
+    ``call``: a name that reports of one call share and no other call has; ``number``: which of them this is, from 0 on.
+    """
 
     stage: str
     done: float | None
     total: float | None
     best: float | None  #: cost, of a fit
     elapsed_s: float
+    call: str = ""
+    number: int = 0
 
 
 ProgressCallback: TypeAlias = Callable[[Progress], object]
+
+
+class Reports:
+    """The reports of one call, each told to its callback, if it has one."""
+
+    def __init__(self, progress: ProgressCallback | None) -> None:
+        self._progress = progress
+        self._call = uuid.uuid4().hex
+        self._number = 0
+
+    def tell(
+        self, stage: str, done: float | None, total: float | None, best: float | None, elapsed_s: float
+    ) -> None:
+        if self._progress is not None:
+            report = Progress(stage, done, total, best, elapsed_s, self._call, self._number)
+            self._number += 1
+            self._progress(report)
 
 
 @dataclass(frozen=True)
@@ -126,13 +150,10 @@ def run(arguments: Sequence[str], progress: ProgressCallback | None = None) -> F
             listener = _Listener(child, progress)
             try:
                 with listener.watching(_wanted.get()):
-                    listener.listen()
-                status = child.wait()
+                    status, text = listener.listen(stdout)
             except BaseException:
                 child.kill()
                 raise
-        stdout.seek(0)
-        text = stdout.read()
     loader = next((line for line in listener.messages if _LOADERS.search(line)), None)
     if status in _LOADER_FAILED and not text and loader is not None:
         raise not_executable(command[0], loader)
@@ -170,21 +191,23 @@ class _Listener:
 
     def __init__(self, child: subprocess.Popen[str], progress: ProgressCallback | None) -> None:
         self._child = child
-        self._progress = progress
+        self._reports = Reports(progress)
         self._lock = threading.Lock()
         self.interrupted = False
         self.messages: list[str] = []
         self.error: InputError | None = None
 
-    def listen(self) -> None:
-        """To the end of stderr. A second Ctrl-C is raised."""
+    def listen(self, stdout: IO[str]) -> tuple[int, str]:
+        """To the child's end: its status, and what it has written to ``stdout``. A second Ctrl-C is raised."""
         assert self._child.stderr is not None
         before = False
         while True:
             try:
                 for line in self._child.stderr:
                     self._take(line)
-                return
+                status = self._child.wait()
+                stdout.seek(0)
+                return status, stdout.read()
             except KeyboardInterrupt:
                 if before:
                     raise
@@ -224,11 +247,8 @@ class _Listener:
         except json.JSONDecodeError:
             data = None
         if isinstance(data, dict) and "stage" in data:
-            if self._progress:
-                self._progress(
-                    Progress(data["stage"], data["done"], data["total"], data["best"], data["elapsed_s"])
-                )
+            self._reports.tell(data["stage"], data["done"], data["total"], data["best"], data["elapsed_s"])
         elif isinstance(data, dict) and "error" in data:
-            self.error = InputError(**data["error"])
+            self.error = InputError(*(data["error"].get(name, "") for name in _ERROR))  # a newer program may say more
         elif line:
             self.messages.append(line)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gapscope import _html
-from gapscope._errors import Interrupted
+from gapscope._errors import InputError, Interrupted
 from gapscope._json import Open, from_json
 from gapscope._log import Floats
 from gapscope._parts import (
@@ -39,6 +39,9 @@ from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope._traces import Traces
 
 
+_NATIVE_MAJOR = 4  # of the MuJoCo that `export` to "mujoco_native" writes for
+
+
 @dataclass(frozen=True)
 class Model:
     """A model with what was found in it: an MJCF with the program's plugins, and its parameters.
@@ -59,7 +62,8 @@ class Model:
         """(MjModel, MjData) of the mujoco that is installed, plugins loaded.
 
         ``native``: of MuJoCo 4's own elements instead, as `export` to "mujoco_native" writes them; that says also what
-        is lost. Raises MissingLibrary: there is no mujoco. InputError: there are no plugins for its version.
+        is lost. Raises MissingLibrary: there is no mujoco. InputError: there are no plugins for its version, or it is
+        older than 4 and lacks one of these elements.
         """
         mujoco = users_mujoco()
         if not native:
@@ -67,9 +71,26 @@ class Model:
             model = mujoco.MjModel.from_xml_path(str(self.path))
             return model, mujoco.MjData(model)
         with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
-            run(["export", str(self.path.parent), "--to", "mujoco_native", "--out", folder, "--json"])
-            model = mujoco.MjModel.from_xml_path(str(Path(folder) / "model.xml"))
+            _answer(run(["export", str(self.path.parent), "--to", "mujoco_native", "--out", folder, "--json"]))
+            model = _loaded_native(mujoco, Path(folder) / "model.xml")
         return model, mujoco.MjData(model)
+
+
+def _loaded_native(mujoco: Any, path: Path) -> Any:
+    """Tried, whatever the version: an older MuJoCo has the elements of many effects too."""
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        version = str(mujoco.mj_versionString())
+        if int(version.partition(".")[0]) >= _NATIVE_MAJOR:
+            raise
+        raise InputError(
+            "this MuJoCo lacks an element of the model without plugins",
+            "Model.mujoco(native=True)",
+            f"mujoco {version}, {' '.join(str(error).split())}",
+            f"MuJoCo {_NATIVE_MAJOR}.0.0 or newer",
+            "install such a mujoco; Model.mujoco() without native=True takes older ones too",
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -89,7 +110,7 @@ _JUDGING = ("logs", "held_out", "train")
 
 def _answer(finished: Finished) -> dict[str, Any]:
     """What a command printed with --json. Raises Interrupted: Ctrl-C came first."""
-    if not finished.stdout:
+    if finished.interrupted:
         raise Interrupted
     return typing.cast(dict[str, Any], json.loads(finished.stdout))
 

@@ -15,15 +15,16 @@ import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gapscope as gs
 import numpy as np
 import pytest
-from gapscope import fleet
+from gapscope import _program, fleet
 from gapscope._json import from_json
 
-from conftest import ROOT, interrupt_after, shell_program
+from conftest import ROOT, interrupt_after, interrupt_when, shell_program
 
 EFFECTS = ["cable_spring@arm", "coulomb_friction@arm"]
 TRUTH = {
@@ -82,6 +83,16 @@ def test_replay_mirrors_the_json(experiment: str, demo: str, tmp_path: Path) -> 
 def test_a_newer_program_and_unknown_numbers() -> None:
     score = from_json(gs.SignalScore, {"rmse": None, "mae": 1, "new": {"a": 1}})
     assert math.isnan(score.rmse) and score.mae == 1 and score.extra == {"new": {"a": 1}}
+
+
+def test_an_error_of_a_newer_program(
+    experiment: str, demo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    says = json.dumps({"error": {"what": "it is wrong", "where": "run.csv", "cure": "mend it", "new": {"a": 1}}})
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "newer", f"echo '{says}' >&2; exit 2"))
+    with pytest.raises(gs.InputError) as raised:
+        gs.replay(experiment, demo)
+    assert raised.value.args == ("it is wrong", "run.csv", "", "", "mend it")
 
 
 def test_files_of_a_temporary_result_live_as_long(experiment: str, demo: str) -> None:
@@ -292,6 +303,30 @@ def test_ctrl_c_gives_the_best_so_far(experiment: str, demo: str) -> None:
     assert (partial.out / "model.xml").is_file()
 
 
+def test_ctrl_c_when_the_program_has_said_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its stderr is closed, and it writes its result yet."""
+    said = tmp_path / "said"
+    body = f"trap '' INT; exec 2>&-; touch {said}; sleep 1; echo whole"
+    monkeypatch.setenv("GAPSCOPE_PROGRAM", shell_program(tmp_path / "late", body))
+    interrupt_when(said.exists)
+    assert _program.run(["tune"]) == _program.Finished("whole\n", (), True)
+
+
+def test_ctrl_c_while_a_result_is_read(experiment: str, short: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[object] = []
+
+    def interrupted_once(*words: Any, **fields: Any) -> Any:
+        calls.append(words)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return from_json(*words, **fields)
+
+    monkeypatch.setattr("gapscope._commands.from_json", interrupted_once)
+    with pytest.raises(gs.Interrupted) as raised:
+        gs.tune(experiment, short, freeze=FROZEN, starts=1)
+    assert isinstance(raised.value.partial, gs.Tune) and raised.value.partial.termination == "converged"
+
+
 def test_an_interrupted_diagnosis_goes_on(experiment: str, short: str, tmp_path: Path) -> None:
     """Ctrl-C at the first stage of the search: a verdict so far, and a journal to go on from."""
     stages: list[str] = []
@@ -368,6 +403,29 @@ def test_export_tells_what_is_lost(experiment: str, demo: str, tmp_path: Path) -
         result.export("mjy", tmp_path / "other")
     plain, _ = result.model.mujoco(native=True)
     assert plain.nplugin == 0 and plain.dof_frictionloss[0] == pytest.approx(0.0006, rel=1e-4)
+
+
+def test_an_older_mujoco_without_an_element_of_the_native_form(
+    experiment: str, demo: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As 3.11 says it of `<dcmotor input="none">`."""
+    mujoco = pytest.importorskip("mujoco")
+    model = gs.replay(experiment, demo).model
+
+    def refuse(_: str) -> None:
+        raise ValueError("XML Error: invalid keyword: 'none'\nElement 'general', line 76\n")
+
+    monkeypatch.setattr(mujoco, "MjModel", SimpleNamespace(from_xml_path=refuse))
+    monkeypatch.setattr(mujoco, "mj_versionString", lambda: "3.11.0")
+    with pytest.raises(gs.InputError) as raised:
+        model.mujoco(native=True)
+    error = raised.value
+    assert "native=True" in error.where and "4.0.0 or newer" in error.allowed and error.what and error.cure
+    assert error.actual == "mujoco 3.11.0, XML Error: invalid keyword: 'none' Element 'general', line 76"
+    monkeypatch.setattr(mujoco, "mj_versionString", lambda: "4.0.1")  # what it lacks there is our mistake
+    with pytest.raises(ValueError, match="XML Error") as told:
+        model.mujoco(native=True)
+    assert not isinstance(told.value, gs.InputError)
 
 
 def test_what_the_host_sends_goes_beside_an_actuator_with_a_state(

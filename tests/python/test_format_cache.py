@@ -156,6 +156,9 @@ def test_program_and_package_share_it(tmp_path: Path, cache: Path) -> None:
     (entry,) = entries(cache)
     gs.Log({"time_s": [0.0, 1.0], "/b": [7.0, 8.0]}).save(entry)
     assert gs.read(path).columns == ("time_s", "/b")
+    assert [log.columns for log in gs.read_all(path)] == [("time_s", "/b")]
+    (found,) = gs.inspect(path)  # a command
+    assert [channel.name for channel in found.channels] == ["/b"] and entries(cache) == [entry]
     command = [str(program()), "convert", str(path), "--out", str(tmp_path / "tables")]
     subprocess.run(command, check=True, env=converter(tmp_path), capture_output=True)
     assert np.array_equal(gs.Log(tmp_path / "tables" / "run.npz")["/b"], [7, 8])

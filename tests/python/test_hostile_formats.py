@@ -17,13 +17,14 @@ import numpy as np
 import pytest
 from gapscope._program import program
 from test_converter import converter
-from test_formats import Q, ROWS, TIME, write_bag, write_ros1_bag
+from test_formats import Q, ROWS, TIME, write_bag, write_mcap_protobuf, write_ros1_bag
+from test_lerobot import write_lerobot
 
 pytest.importorskip("scipy")
 pa = pytest.importorskip("pyarrow")
 h5py = pytest.importorskip("h5py")
 pytest.importorskip("rosbags")
-pytest.importorskip("mcap")
+pytest.importorskip("mcap_protobuf")
 
 # All files in one process of its own, with little memory: a line for each. It is what the converter does.
 READS = """
@@ -72,8 +73,10 @@ def whole_files(folder: Path) -> list[Path]:
             file.create_dataset(name, data=values, chunks=(50,), compression="gzip")
     parquet.write_table(pa.table(columns), folder / "a.parquet")
     feather.write_feather(pa.table(columns), str(folder / "a.feather"))
-    write_bag(folder / "bag", "mcap")
-    next((folder / "bag").glob("*.mcap")).rename(folder / "ros.mcap")
+    for name, storage in (("ros.mcap", "mcap"), ("a.db3", "sqlite3")):
+        write_bag(folder / storage, storage)
+        next((folder / storage).glob(f"*{Path(name).suffix}")).rename(folder / name)
+    write_mcap_protobuf(folder / "protobuf.mcap")
     write_ros1_bag(folder / "a.bag")
     with (folder / "json.mcap").open("wb") as stream:
         writer = Writer(stream)
@@ -89,7 +92,7 @@ def whole_files(folder: Path) -> list[Path]:
 def test_truncated_files_are_refused(tmp_path: Path) -> None:
     (tmp_path / "whole").mkdir()
     whole = whole_files(tmp_path / "whole")
-    assert outcomes(whole) == [f"read {300 if path.name == 'ros.mcap' else ROWS} rows" for path in whole]
+    assert outcomes(whole) == [f"read {300 if path.name in ('ros.mcap', 'a.db3') else ROWS} rows" for path in whole]
     cut = []
     for path in whole:
         raw = path.read_bytes()
@@ -97,6 +100,20 @@ def test_truncated_files_are_refused(tmp_path: Path) -> None:
             cut.append(tmp_path / f"{share}_{path.name}")
             cut[-1].write_bytes(raw[: int(share * len(raw))])
     refused(*cut)
+
+
+def cut_lerobot(dataset: Path, file: str, share: float) -> Path:
+    """A dataset, one of whose files is cut."""
+    write_lerobot(dataset, "v3.0")
+    raw = (dataset / file).read_bytes()
+    (dataset / file).write_bytes(raw[: int(share * len(raw))])
+    return dataset
+
+
+def test_a_dataset_with_a_truncated_file_is_refused(tmp_path: Path) -> None:
+    files = ("meta/info.json", "data/chunk-000/file-001.parquet")
+    cuts = [(file, share) for file in files for share in (0.0, 0.5, 0.97)]
+    refused(*(cut_lerobot(tmp_path / str(k) / "set", *cut) for k, cut in enumerate(cuts)))
 
 
 def test_damaged_bytes_end_in_a_log_or_a_refusal(tmp_path: Path) -> None:
@@ -138,6 +155,24 @@ def test_what_claims_too_much_is_refused_before_it_is_read(tmp_path: Path) -> No
     path.write_bytes(raw[: -8 - length] + footer + struct.pack("<I", len(footer)) + b"PAR1")
     for line in refused(tmp_path / "rows.h5", tmp_path / "sum.h5", tmp_path / "rows.mat", path):
         assert "too large" in line, line
+
+
+def claim_rows(feather: Path, rows: int) -> Path:
+    """A file of two columns that says it has so many rows: in its batch, and in each column."""
+    import pyarrow.feather
+
+    pyarrow.feather.write_feather(pa.table({"time_s": TIME, "q": Q}), str(feather))
+    raw, said = feather.read_bytes(), struct.pack("<q", ROWS)
+    assert raw.count(said) == 3
+    feather.write_bytes(raw.replace(said, struct.pack("<q", rows)))
+    return feather
+
+
+def test_rows_that_a_feather_file_has_not_are_refused(tmp_path: Path) -> None:
+    """Else they are what the memory behind its own holds."""
+    rows = (ROWS + 1, 10**7, 10**9, 2**62, -5)
+    lines = refused(*(claim_rows(tmp_path / f"{k}.feather", k) for k in rows))
+    assert ["too small" in line for line in lines[:2]] == ["too large" in line for line in lines[2:4]] == [True, True]
 
 
 def test_bombs_are_refused(tmp_path: Path) -> None:
@@ -252,10 +287,16 @@ def test_the_program_refuses_with_status_2(experiment: str, tmp_path: Path) -> N
     with h5py.File(tmp_path / "rows.h5", "w") as file:
         file.create_dataset("time_s", shape=(10**9,), dtype="f8", chunks=True)
     (tmp_path / "cut.mcap").write_bytes(b"\x89MCAP0\r\n")
-    for name in ("rows.h5", "cut.mcap"):
+    for path in whole_files(tmp_path):
+        if path.name in ("a.db3", "protobuf.mcap"):
+            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    claim_rows(tmp_path / "rows.feather", 10**7)
+    cut_lerobot(tmp_path / "set", "data/chunk-000/file-001.parquet", 0.5)
+    for name in ("rows.h5", "cut.mcap", "a.db3", "protobuf.mcap", "rows.feather", "set"):
         command = [str(program()), "replay", experiment, str(tmp_path / name)]
         run = subprocess.run(command, capture_output=True, text=True, env=converter(tmp_path))
         assert run.returncode == 2 and name in run.stderr and run.stdout == "", run.stderr
+        assert "not a readable" in run.stderr or "too large" in run.stderr, run.stderr
 
 
 def test_json_that_grows_without_end_is_refused(tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
 """What scripts/wheel runs in a fresh environment: the demo through the installed package.
 
-try_wheel.py EXPERIMENT LOG MUJOCO_VERSION      MUJOCO_VERSION is empty where there is no mujoco
+try_wheel.py EXPERIMENT LOG MUJOCO_VERSION      MUJOCO_VERSION is empty where there is no mujoco, but the extra mcap
 """
 
 import json
+import os
 import subprocess
 import sys
+import tempfile
 from importlib import metadata
 from pathlib import Path
 
@@ -39,7 +41,38 @@ for library in site.parent.joinpath("gapscope.libs").iterdir():
 assert packages["mujoco"]["licenseDeclared"] == "Apache-2.0", packages["mujoco"]
 assert any(name.startswith("licenses/libnlopt") for name in holds), sorted(holds)
 
+
+def goes_through_mcap() -> None:
+    """The log as MCAP: by the converter a table, and by the program, which starts that, what it is itself."""
+    from mcap.writer import Writer
+
+    demo = gs.Log(log)
+    names = [name for name in demo.columns if name != "time_s"]
+    with tempfile.TemporaryDirectory() as folder:
+        run, bound, table = (Path(folder) / name for name in ("run.mcap", "experiment.yaml", "run.npz"))
+        with run.open("wb") as stream:
+            writer = Writer(stream)
+            writer.start()
+            channel = writer.register_channel("/run", "json", 0)
+            for time_s, *values in zip(demo["time_s"], *(demo[name] for name in names)):
+                ns = round(1e9 * time_s)
+                writer.add_message(channel, ns, json.dumps(dict(zip(names, values))).encode(), ns)
+            writer.finish()
+        text = Path(experiment).read_text().replace("model: ", f"model: {Path(experiment).parent}/")
+        for name in names:
+            text = text.replace(f"column: {name}", f"column: /run/{name}")
+        bound.write_text(text)
+        env = {**os.environ, "GAPSCOPE_CACHE_DIR": folder}
+        subprocess.run([command.with_name("gapscope-convert"), run, "--out", table], check=True, env=env)
+        assert all((gs.Log(table)[f"/run/{name}"] == demo[name]).all() for name in names)
+        call = [command, "replay", bound, run, "--json"]
+        error = json.loads(subprocess.run(call, check=True, capture_output=True, env=env).stdout)["error"]
+    print(f"  from MCAP: error {error:.4g}")
+    assert abs(error / nominal.error - 1) < 1e-6
+
+
 if not version:
+    goes_through_mcap()
     try:
         gs.load_plugins()
     except ModuleNotFoundError:

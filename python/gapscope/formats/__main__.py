@@ -21,6 +21,7 @@ from gapscope.formats._cache import through_cache
 from gapscope.formats.apart import load_table
 
 _MOST_BYTES = 16 << 30  # of memory, and no more than the machine has, and of a file: a small one may unpack to more
+_TABLE = "{:06d}.npz"  # of a recording, in the folder of all
 
 # What pip installs as gapscope[EXTRA], and the modules that must be there then; of PACE it is torch itself.
 _EXTRAS = {
@@ -57,13 +58,18 @@ def _options(text: str) -> object:
         raise InputError("options that are not JSON", "--options", str(error), '{"topics": [...]}') from None
 
 
-def _convert(file: str, source: Source, out: Path) -> None:
+def _convert(file: str, source: Source, out: Path, every: bool) -> None:
+    """The one recording of a file; with ``every`` all of them, into a folder. What is slow to read has one."""
+
     def write(target: Path) -> None:
         Log.of_table(read_table(file, source)).save(target)
 
     form, place = format_of(file), Path(file)
     if form is not None and form.slow and (place.is_file() or place.is_dir()):
-        through_cache(place, source, form.slow, out, write)
+        through_cache(place, source, form.slow, out / _TABLE.format(0) if every else out, write)
+    elif every:
+        for k, table in enumerate(read_tables(file, source)):
+            Log.of_table(table).save(out / _TABLE.format(k))
     else:
         write(out)
 
@@ -88,11 +94,8 @@ def main() -> int:
             print("\n".join(map(str, episodes_of(given.file))))
         elif given.to == "mcap":
             _joint_states.write(load_table(Path(given.file)), Path(given.out))
-        elif given.all:
-            for k, table in enumerate(read_tables(given.file, source)):
-                Log.of_table(table).save(Path(given.out) / f"{k:06d}.npz")
         else:
-            _convert(given.file, source, Path(given.out))
+            _convert(given.file, source, Path(given.out), given.all)
     except (InputError, MemoryError) as failure:
         error = InputError("not enough memory for this log", given.file, cure="take a part of it")
         if isinstance(failure, InputError):

@@ -44,6 +44,7 @@ def load(path: Path, wanted: Sequence[str] = ()) -> tuple[Any, list[str]]:
             rows += batch.num_rows
             claims(path, "the table", (rows, max(len(names), 1)))
             batches.append(batch.select(names))
+            batches[-1].validate(full=True)  # else rows beyond its buffers are read from whatever memory comes next
         arrow = library("pyarrow", "Feather files", _EXTRA)
         kept = arrow.schema([reader.schema.field(name) for name in names])
         return arrow.Table.from_batches(batches, kept), skipped

@@ -76,9 +76,10 @@ class Writer {
     if (!damped_.contains(slot))
       Propose({name + ".damping", unit + " s" + per, damping, 0, 20 * scale, field + "damping",
                damping > 0 ? "" : "the MJCF has none; the upper bound follows from the inertia"});
+    // A rotor that the MJCF lacks may be several times what the joint turns without it.
     if (!rotors_.contains(slot))
-      Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0, 5 * std::max(armature, inertia),
-               field + "armature"});
+      Propose({name + ".armature", joint.slide ? "kg" : "kg m^2", armature, 0,
+               armature > 0 ? std::max(5 * armature, inertia) : 5 * inertia, field + "armature"});
     if (const double k = m_.jnt_stiffness[joint.joint]; k > 0)
       Propose({name + ".stiffness", unit + per, k, 0.2 * k, 5 * k, field + "stiffness"});
     if (const double f = m_.dof_frictionloss[dof]; f > 0)

@@ -80,6 +80,14 @@ std::vector<double> Samples::Shifted(std::size_t column, long rows) const {
   return values;
 }
 
+std::vector<int> Samples::Lags(double longest_s, double step_s) const {
+  const auto longest = static_cast<int>(longest_s / timeline_.median_step_s);
+  const auto step = static_cast<int>(RowsWithin(timeline_, step_s));
+  std::vector<int> lags;
+  for (int late = 0; late <= longest; late += step) lags.push_back(late);
+  return lags;
+}
+
 Following Samples::Follow(std::size_t leader, std::size_t follower) const {
   Following best;
   const auto most = static_cast<long>(RowsWithin(timeline_, kLongestLag_s));

@@ -32,6 +32,8 @@ class Samples {
   const std::vector<double>& values(std::size_t column) const { return values_[column]; }
   // The same, so many rows earlier.
   std::vector<double> values_before(std::size_t column, int rows) const { return Shifted(column, -rows); }
+  // Rows from 0 to `longest_s`, about `step_s` apart.
+  std::vector<int> Lags(double longest_s, double step_s) const;
   // Of a line through the rows within about 10 ms; per second.
   const std::vector<double>& slopes(std::size_t column) const { return slopes_[column]; }
   double spread(std::size_t column) const { return highest_[column] - lowest_[column]; }  // 0 of a constant

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kHalfWidth_s = 0.03;  // of the parabolas that give speed and acceleration
 constexpr double kExplains = 0.8, kKnown = 0.2;
+constexpr double kLatest_s = 0.08, kLagStep_s = 0.004;  // of a command
 constexpr double kMadeUp_hz = 5, kDroop_rad = 0.1;
 
 // Angle, speed and acceleration of every joint of the pairing at the sampled rows, SI; empty: not measured.
@@ -189,11 +190,10 @@ class Fitter {
     return fit && fit->kp > 0 && fit->error < kKnown * fit->kp ? fit->kp : 0;
   }
 
-  // A command may act some rows late; the lateness that explains most is taken.
+  // A command may act late; the lateness that explains most is taken.
   std::optional<Fit> Best(std::size_t a, const std::vector<double>& torque, const std::vector<Term>& terms) const {
-    constexpr int kLatest = 4;  // rows
     std::optional<Fit> best;
-    for (int late = 0; late <= kLatest; ++late) {
+    for (const int late : samples_.Lags(kLatest_s, kLagStep_s)) {
       const auto fit = FitLaw(Of(a, torque, late), terms);
       if (!fit || (best && fit->explained <= best->explained)) continue;
       best = fit;

@@ -401,7 +401,7 @@ std::string ToTable(const DiagnoseRun& run) {
   text += RemainderText(d.remainder);
   text += "\n" + Wrapped(d.explanation, 120) + "\n";
   text += ConditionTable("where", d.where);
-  if (!d.effects.empty()) text += ConditionTable("what remains", d.remains);
+  if (MuchRemains(d)) text += ConditionTable("what remains", d.remains);
   text += StatementTable(d);
   if (d.next.why != NextExperiment::Why::kNothing) {
     text += "\nnext experiment\n";

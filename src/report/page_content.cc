@@ -49,7 +49,7 @@ PageContent PageOf(const DiagnoseRun& run) {
   PageContent page{.headline = HeadlineOf(run), .mapped = d.effects.empty() ? "retuned model" : "diagnosed model"};
   if (d.model) page.values = RunModelOf(*d.model, d.values).values;
   page.where = {{.title = {}, .shares = First(d.where)}};
-  if (!d.effects.empty()) {
+  if (MuchRemains(d)) {
     const auto found = Collect(d.effects, [](const auto& effect) { return Words(effect.use); });
     page.where.push_back(
         {.title = "Of what " + Listed(found) + (found.size() > 1 ? " leave" : " leaves"), .shares = First(d.remains)});

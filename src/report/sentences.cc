@@ -7,6 +7,7 @@
 #include <set>
 
 #include "src/core/collect.h"
+#include "src/diagnose/policy.h"
 #include "src/report/words.h"
 
 namespace gapscope {
@@ -102,6 +103,10 @@ std::vector<Sentence> SentencesOf(const Diagnosis& d) {
   std::stable_sort(sentences.begin(), sentences.end(),
                    [](const auto& a, const auto& b) { return a.share_of_gap > b.share_of_gap; });
   return sentences;
+}
+
+bool MuchRemains(const Diagnosis& d) {
+  return !d.effects.empty() && d.evidence.floors_left > kDiagnosePolicy.verdict.much_missing;
 }
 
 std::string GapInWindows(const Diagnosis& d) {

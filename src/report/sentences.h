@@ -32,6 +32,9 @@ std::string GapInFreeRuns(const Diagnosis& d);
 // was found.
 std::string GapByLog(const Diagnosis& d);
 
+// Whether what was found leaves more than the sensors' noise, so that it is worth to say where.
+bool MuchRemains(const Diagnosis& d);
+
 // Parts of the refitted base model's misfit, those that are known, in the order of a bar.
 struct Part {
   std::string name;

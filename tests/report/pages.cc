@@ -87,6 +87,7 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
               .share_of_time = 0.1,
               .low = 0.5,
               .high = 0.7}};
+  d.evidence.floors_left = 3;
   d.remains = d.where;
   d.remains[0].condition = "speed 4..9 rad/s";
   d.candidates = {

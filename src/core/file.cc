@@ -14,6 +14,8 @@
 namespace gapscope {
 namespace {
 
+constexpr char kOwnFiles[] = "/proc/self/fd";
+
 Error SystemError(const char* what, const std::string& path) {
   return Error{.what = what, .where = path, .actual = std::strerror(errno)};
 }
@@ -129,6 +131,14 @@ PartWriter::PartWriter(std::string path, std::string temporary, FILE* file)
     : path_(std::move(path)), temporary_(std::move(temporary)), file_(file, &std::fclose) {}
 
 Result<PartWriter> PartWriter::Open(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  std::error_code failure;
+  if (!folder.empty()) std::filesystem::create_directories(folder, failure);
+  // Without a name, so that whatever ends the program leaves nothing; not every file system has that.
+  if (access(kOwnFiles, X_OK) == 0) {
+    const int nameless = open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0644);
+    if (FILE* file = nameless >= 0 ? fdopen(nameless, "w") : nullptr) return PartWriter(path, "", file);
+  }
   GS_ASSIGN(std::string temporary, TemporaryBeside(path));
   FILE* file = std::fopen(temporary.c_str(), "we");
   if (file) return PartWriter(path, std::move(temporary), file);
@@ -138,7 +148,7 @@ Result<PartWriter> PartWriter::Open(const std::string& path) {
 }
 
 PartWriter::~PartWriter() {
-  if (file_) unlink(temporary_.c_str());
+  if (file_ && !temporary_.empty()) unlink(temporary_.c_str());
 }
 
 void PartWriter::Write(std::string_view bytes) {
@@ -146,14 +156,28 @@ void PartWriter::Write(std::string_view bytes) {
     status_ = SystemError("cannot write the file", path_);
 }
 
+// A name cannot be given over an old file: the nameless one gets another first.
+Status PartWriter::Name() {
+  const std::string own = std::string(kOwnFiles) + "/" + std::to_string(fileno(file_.get()));
+  for (int i = 0;; ++i) {
+    temporary_ = path_ + "." + std::to_string(getpid()) + "-" + std::to_string(i);
+    if (linkat(AT_FDCWD, own.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW) == 0) return Ok();
+    if (errno == EEXIST) continue;
+    const Error error = SystemError("cannot write the file", path_);
+    temporary_.clear();
+    return error;
+  }
+}
+
 Status PartWriter::Finish() {
   // On the disk before it has its name: a machine that loses power keeps the old file or the new one.
   if (status_.ok() && (std::fflush(file_.get()) != 0 || fsync(fileno(file_.get())) != 0))
     status_ = SystemError("cannot write the file", path_);
+  if (status_.ok() && temporary_.empty()) status_ = Name();
   if (std::fclose(file_.release()) != 0 && status_.ok()) status_ = SystemError("cannot write the file", path_);
   if (status_.ok() && rename(temporary_.c_str(), path_.c_str()) != 0)
     status_ = SystemError("cannot rename the finished file to its place", path_);
-  if (!status_.ok()) unlink(temporary_.c_str());
+  if (!status_.ok() && !temporary_.empty()) unlink(temporary_.c_str());
   return status_;
 }
 

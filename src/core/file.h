@@ -38,11 +38,11 @@ void EndWhereMappedFileIsCut();
 // A new empty file beside `path`, making its folders; its name. Errors: cannot create.
 Result<std::string> TemporaryBeside(const std::string& path);
 
-// Writes `path` atomically (temporary name in the same folder, then rename), making its folders.
+// Writes `path` atomically (as PartWriter), making its folders.
 // Errors: cannot create, write (disk full) or rename; the old file stays.
 Status WriteFile(const std::string& path, std::string_view bytes);
 
-// A long file, written a part at a time under a temporary name. Without Finish() nothing is left of it.
+// A long file, written a part at a time without a name, or under a temporary one. Without Finish() nothing is left.
 class PartWriter {
  public:
   // Errors: cannot create.
@@ -57,8 +57,9 @@ class PartWriter {
 
  private:
   PartWriter(std::string path, std::string temporary, FILE* file);
+  Status Name();
 
-  std::string path_, temporary_;
+  std::string path_, temporary_;  // temporary_: empty while it has no name
   std::unique_ptr<FILE, int (*)(FILE*)> file_;
   Status status_ = Ok();  // of what was written so far
 };

@@ -26,6 +26,33 @@ TEST(MappedFileTest, EndsWithAMessageWhereTheFileIsCut) {
   std::filesystem::remove(path);
 }
 
+TEST(PartWriterTest, WhatIsKilledLeavesTheOldFileAlone) {
+  const std::filesystem::path folder = testing::TempDir() + "/killed." + std::to_string(getpid());
+  ASSERT_TRUE(WriteFile(folder / "a", "old").ok());
+  const int nameless = open(folder.c_str(), O_TMPFILE | O_WRONLY, 0600);
+  if (nameless < 0) GTEST_SKIP() << "this file system has no files without a name";
+  close(nameless);
+  const auto killed = [&] {
+    auto file = PartWriter::Open(folder / "a");
+    file.value().Write(std::string(1 << 20, 'x'));
+    raise(SIGKILL);
+  };
+  EXPECT_EXIT(killed(), testing::KilledBySignal(SIGKILL), "");
+  EXPECT_EQ(ReadFile(folder / "a").value(), "old");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  {
+    auto half = PartWriter::Open(folder / "a");
+    half.value().Write("half");
+  }
+  EXPECT_EQ(ReadFile(folder / "a").value(), "old");
+  auto whole = PartWriter::Open(folder / "a");
+  whole.value().Write("new");
+  ASSERT_TRUE(whole.value().Finish().ok());
+  EXPECT_EQ(ReadFile(folder / "a").value(), "new");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  std::filesystem::remove_all(folder);
+}
+
 TEST(MappedFileTest, AnotherBusErrorStaysOne) {
   const auto raised = [] {
     EndWhereMappedFileIsCut();

@@ -66,7 +66,7 @@ Result<Row> CompareWithBareLoop(const std::string& name, const Case& made, const
                  .actual = std::to_string(replay_steps),
                  .allowed = std::to_string(bare_steps)};
   }
-  Row row{.name = name, .target = 0.9};
+  Row row{.name = name, .target = 0.97};
   std::vector<double> ratios;
   for (std::size_t i = 0; i < pairs.a_s.size(); ++i) ratios.push_back(pairs.b_s[i] / pairs.a_s[i]);
   Summarise(ratios, row);
@@ -114,7 +114,7 @@ Result<std::vector<Row>> ScalingRows(const BenchOptions& options) {
   const Pairs pairs = TimePairs(
       Clock::kWall, options.repeats, [&] { Replay(*made.model, made.recordings, replay, one); },
       [&] { Replay(*made.model, made.recordings, replay, two); });
-  Row row{.name = "scaling_1_to_2.qube", .target = 1.8};
+  Row row{.name = "scaling_1_to_2.qube", .target = 1.95};
   std::vector<double> ratios;
   for (std::size_t i = 0; i < pairs.a_s.size(); ++i) ratios.push_back(pairs.a_s[i] / pairs.b_s[i]);
   Summarise(ratios, row);

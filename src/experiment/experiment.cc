@@ -139,6 +139,7 @@ Status ReadCommands(const std::vector<YAML::Node>& items, const std::string& pat
     if (map.Has("offset") && map.Has("add"))
       map.Fail(item, {.what = "'offset' and 'add' of a command are the same", .cure = "delete one"});
     command.unit = ReadScaling(map, item, &command.factor, &command.offset, map.Has("offset") ? "offset" : "add");
+    command.unit_stated = map.Has("unit") || map.Has("scale");
     command.kind = KindOfUnit(command.unit);
     for (const auto& other : experiment->commands) {
       if (other.actuator == command.actuator)
@@ -229,6 +230,7 @@ void ReadSource(YamlMap& map, const YAML::Node& item, std::size_t elements, Meas
       map.Fail(item, {.what = "'element' counts a sensor's numbers", .allowed = "0, 1, 2 ..., beside 'sensor'"});
     spec->element = static_cast<int>(std::clamp(element, 0.0, 999.0));
   }
+  spec->unit_stated = map.Has("unit") || map.Has("scale");
   spec->unit = ReadScaling(map, item, &spec->factor, &spec->offset);
   // "1": the column is in SI already. A sensor's unit is checked where the model is known.
   const auto& units = traits.units;

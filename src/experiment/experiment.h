@@ -35,6 +35,7 @@ struct CommandSpec {
   std::string unit;                  // SI unit of the command: "V", "A", "N m", "rad" ...
   CommandKind kind = CommandKind::kOther;
   double factor = 1, offset = 0;  // command in SI = factor * column + offset
+  bool unit_stated = false;       // or a scale
   bool optional = false;          // without the column: `fallback`
   std::string fallback = "0";     // expression of log values
   std::string where = "";         // file:line:column, for errors
@@ -95,6 +96,7 @@ struct MeasuredSpec {
   int elements = 0;               // how many columns `columns_of_elements` gives the sensor; 0: there is no such list
   std::string unit;               // SI unit: "rad", "rad/s", "N m"
   double factor = 1, offset = 0;  // measured in SI = factor * column + offset
+  bool unit_stated = false;       // or a scale
   double resolution = 0;          // size of one sensor count, SI; 0: unknown
   SensorFilter filter;
   bool optional = false;

@@ -39,6 +39,15 @@ Error MissingColumn(const Log& log, const std::vector<std::string>& names, const
                .cure = DidYouMean(names.front(), log.ColumnNames(), "name the right column in the experiment file")};
 }
 
+// Where stamps are made up, as in LeRobot's datasets, numbers are degrees or shares of a range, and nothing says which.
+Status CheckUnit(const Log& log, const Column& column, bool stated) {
+  if (stated || !column.unit.empty() || column.clock != "synthetic") return Ok();
+  return Error{.what = "the unit of '" + column.name + "' is not stated",
+               .where = log.path,
+               .allowed = "'unit:' or 'scale:' beside the column in the experiment file; unit: 1 takes it as it stands",
+               .cure = "find out what was recorded: degrees, or -100 to 100 of the calibrated range"};
+}
+
 // Leaves out what the experiment does not want: the first seconds, and what follows after the `while` column falls to
 // zero. Time starts anew.
 Status CutTimeline(const Experiment& experiment, const Log& log, Timeline* timeline) {
@@ -136,6 +145,7 @@ Status BindMeasured(const Experiment& experiment, const Log& log, const Timeline
       }
       continue;
     }
+    GS_RETURN_IF_ERROR(CheckUnit(log, *columns.front(), spec.unit_stated));
     Recording::Measured measured{
         .spec = spec, .index = index, .column = columns.front()->name, .values = {}, .clock = columns.front()->clock};
     const ColumnOptions options{.factor = spec.factor,
@@ -185,6 +195,7 @@ Result<Recording> BindLog(const Experiment& experiment, const Log& log) {
   for (const auto& spec : experiment.commands) {
     Recording::Command command{.actuator = spec.actuator};
     if (const Column* column = FindFirst(log, spec.columns)) {
+      GS_RETURN_IF_ERROR(CheckUnit(log, *column, spec.unit_stated));
       command.column = column->name;
       command.clock = column->clock;
       const MissingRepair missing = experiment.timeline.missing;

@@ -123,6 +123,26 @@ TEST_F(RecordingTest, ALogOfSeveralRatesIsKept) {
   }
 }
 
+// Numbers of LeRobot's datasets are degrees or shares of a range: radians are not taken for granted.
+TEST_F(RecordingTest, MadeUpStampsNeedAStatedUnit) {
+  const Log log{.path = "set#0",
+                .columns = {{.name = "time_s", .values = {0, 1}, .clock = "synthetic"},
+                            {.name = "u", .values = {100, 300}, .clock = "synthetic"},
+                            {.name = "q", .values = {1, 3}, .clock = "synthetic"}}};
+  const auto bound = [&](const std::string& experiment) {
+    return BindLog(LoadExperiment(scratch_.Write("experiment.yaml", experiment)).value(), log);
+  };
+  EXPECT_TRUE(bound(kExperiment).ok());
+  EXPECT_TRUE(bound(Replaced(kExperiment, "unit: deg", "scale: 0.01")).ok());
+  EXPECT_TRUE(bound(Replaced(kExperiment, "unit: deg", "unit: 1")).ok());
+  const auto measured = bound(Replaced(kExperiment, ", unit: deg", ""));
+  ASSERT_FALSE(measured.ok());
+  EXPECT_NE(measured.error().Text().find("set#0: the unit of 'q' is not stated"), std::string::npos);
+  const auto command = bound(Replaced(kExperiment, ", unit: mV, add", ", add"));
+  ASSERT_FALSE(command.ok());
+  EXPECT_NE(command.error().Text().find("the unit of 'u' is not stated"), std::string::npos);
+}
+
 TEST_F(RecordingTest, MissingColumnsNameTheNearest) {
   const std::string command = MessageOf("time_s,uu,q\n0,1,2\n1,1,2\n");
   EXPECT_NE(command.find("log.csv:1: no column 'u' for the actuator 'motor'"), std::string::npos) << command;

@@ -140,11 +140,11 @@ Result<ordered_json> ReadJson(const std::string& path) {
   const std::string file =
       std::filesystem::is_directory(path, failure) ? (std::filesystem::path(path) / "result.json").string() : path;
   GS_ASSIGN(const std::string text, ReadFile(file));
-  // Copying, comparing and writing recurse on what is nested.
+  // Copying recurses on what is nested, and an object that grows copies: what is too deep is not even built.
   bool too_deep = false;
   const auto watch = [&](int depth, ordered_json::parse_event_t, const ordered_json&) {
     too_deep = too_deep || depth > kDeepest;
-    return true;
+    return depth <= kDeepest;
   };
   ordered_json json = ordered_json::parse(text, watch, false);
   if (json.is_discarded()) return Error{.what = "not JSON", .where = file};

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "src/cli/html.h"
 #include "src/core/digest.h"
 #include "src/core/file.h"
 #include "src/log/log_files.h"
+#include "src/log/text.h"
 #include "src/log/zip_writer.h"
 #include "src/model/mjcf_files.h"
 #include "src/report/json.h"
@@ -59,18 +59,39 @@ fs::path FolderAbove(const fs::path& a, const fs::path& b) {
   return common;
 }
 
+// Where a text says an absolute path, and how: `model: /...` of an experiment, file="/..." or meshdir="/..." of an
+// MJCF; empty: nowhere. Not a regular expression: the library's recurse, a long line would end the program.
+std::string AbsolutePathIn(const std::string& text) {
+  constexpr std::string_view kBlank = " \t\r\n\f\v", kQuotes = "\"'";
+  const auto after_blanks = [&](std::size_t at) { return std::min(text.find_first_not_of(kBlank, at), text.size()); };
+  const auto is = [&](std::size_t at, std::string_view one_of) {
+    return at < text.size() && one_of.find(text[at]) != std::string_view::npos;
+  };
+  for (const std::string key : {"model", "file", "dir"}) {
+    const bool yaml = key == "model";
+    for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1)) {
+      const std::size_t before = at == 0 ? std::string::npos : text.find_last_not_of(" \t\r", at - 1);
+      if (yaml && before != std::string::npos && text[before] != '\n') continue;
+      std::size_t value = after_blanks(at + key.size());
+      if (!is(value, yaml ? ":" : "=")) continue;
+      value = after_blanks(value + 1);
+      const bool quoted = is(value, kQuotes);
+      if ((quoted || yaml) && is(value + quoted, "/"))
+        return text.substr(at, text.find_first_of(yaml ? "\n" : kQuotes, value + 1) - at);
+    }
+  }
+  return "";
+}
+
 // On another machine it would name another file, or none.
 Status CheckRelative(const std::string& path) {
-  static const std::regex absolute(R"re((^|\n)\s*model\s*:\s*["']?/[^\n]*|(file|dir)\s*=\s*["']/[^"']*)re");
   if (!path.ends_with(".xml") && !path.ends_with(".yaml") && !path.ends_with(".yml")) return Ok();
   GS_ASSIGN(const std::string text, ReadFile(path));
-  std::smatch found;
-  if (!std::regex_search(text, found, absolute)) return Ok();
-  std::string actual = found.str();
-  actual.erase(0, actual.find_first_not_of(" \n"));
+  const std::string said = AbsolutePathIn(text);
+  if (said.empty()) return Ok();
   return Error{.what = "a path that holds on this machine alone",
                .where = path,
-               .actual = actual,
+               .actual = Quoted(said, 120),
                .allowed = "paths relative to the file, in what --bundle packs",
                .cure = "write it relative, or leave --bundle out"};
 }

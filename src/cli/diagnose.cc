@@ -12,7 +12,9 @@
 #include "src/core/option_words.h"
 #include "src/diagnose/policy.h"
 #include "src/log/foreign.h"
+#include "src/report/diagnose_report.h"
 #include "src/report/json.h"
+#include "src/report/read_json.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -78,7 +80,7 @@ int StatusOf(const CommandFlags& flags, const nlohmann::ordered_json& expected, 
     return kDone;
   }
   Print(stderr, "gapscope: other digits than {}\n{}", flags.expect, differences);
-  const auto versions = expected.value("versions", nlohmann::ordered_json::object());
+  const auto versions = expected.contains("versions") ? expected["versions"] : nlohmann::ordered_json();
   if (versions != got["versions"])
     Print(stderr, "it was made by {}, this is {}\n", versions.dump(), got["versions"].dump());
   return kBelowThreshold;
@@ -89,6 +91,8 @@ Result<int> RunDiagnose(const CommandFlags& flags) {
   nlohmann::ordered_json expected;
   if (!flags.expect.empty()) {
     GS_ASSIGN(expected, ReadJson(flags.expect));
+    if (TextIn(expected, "schema") != kDiagnosisSchema)
+      return Error{.what = "not a diagnosis", .where = "--expect " + flags.expect, .allowed = kDiagnosisSchema};
   }
   GS_ASSIGN(const std::optional<Bundle> bundle, BundleOf(flags));
   GS_ASSIGN(const DiagnoseRun run, DiagnoseLogs(flags, &clock));

@@ -4,13 +4,14 @@
 #include <charconv>
 #include <filesystem>
 #include <map>
-#include <regex>
+#include <optional>
 #include <set>
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
 #include "src/diagnose/diagnosis.h"
 #include "src/experiment/yaml_reader.h"
+#include "src/log/text.h"
 
 namespace gapscope::cli {
 namespace {
@@ -19,26 +20,57 @@ namespace fs = std::filesystem;
 
 bool IsWild(const std::string& part) { return part.find_first_of("*?{") != std::string::npos; }
 
-// One part of a path as a regular expression; the names of its groups are added.
-std::regex PartExpression(const std::string& part, std::vector<std::string>* names) {
-  std::string text;
+// What a part of a path is made of: a letter, '?', '*' or '{' with its name.
+struct Piece {
+  char letter = 0, wild = 0;  // wild: 0 for a letter
+  std::string name = {};
+};
+
+std::vector<Piece> PiecesOf(const std::string& part) {
+  std::vector<Piece> pieces;
   for (std::size_t i = 0; i < part.size(); ++i) {
     const char c = part[i];
+    if (c == '*' && !pieces.empty() && pieces.back().wild == '*') continue;
     if (c == '{') {
       const std::size_t end = part.find('}', i);
-      names->push_back(part.substr(i + 1, end - i - 1));
-      text += "(.+?)";
+      pieces.push_back({.wild = c, .name = part.substr(i + 1, end - i - 1)});
       i = end;
-    } else if (c == '*') {
-      text += ".*";
-    } else if (c == '?') {
-      text += '.';
     } else {
-      if (!std::isalnum(static_cast<unsigned char>(c)) && static_cast<unsigned char>(c) < 128) text += '\\';
-      text += c;
+      pieces.push_back(c == '*' || c == '?' ? Piece{.wild = c} : Piece{.letter = c});
     }
   }
-  return std::regex(text);
+  return pieces;
+}
+
+// The texts of the names in `pieces`, each as short as it can be, what '*' stands for as long as it can be; nothing:
+// `name` does not fit. In time pieces x letters: a search that goes back would never end on "*a*a*a*a*a*b".
+std::optional<std::vector<std::string>> TextsOf(const std::vector<Piece>& pieces, const std::string& name) {
+  const std::size_t letters = name.size(), columns = letters + 1;
+  const auto stars = std::ranges::count(pieces, '*', &Piece::wild);
+  if (pieces.size() - static_cast<std::size_t>(stars) > letters) return std::nullopt;
+  // Whether the pieces from p on can be what the name holds from its n-th letter on.
+  std::vector<char> fits((pieces.size() + 1) * columns);
+  const auto at = [&](std::size_t p, std::size_t n) -> char& { return fits[p * columns + n]; };
+  at(pieces.size(), letters) = 1;
+  for (std::size_t p = pieces.size(); p-- > 0;) {
+    const char wild = pieces[p].wild;
+    for (std::size_t n = columns; n-- > 0;) {
+      const bool more = n < letters;
+      if (wild == '*') at(p, n) = at(p + 1, n) || (more && at(p, n + 1));
+      if (wild == '{') at(p, n) = more && (at(p + 1, n + 1) || at(p, n + 1));
+      if (wild == '?') at(p, n) = more && at(p + 1, n + 1);
+      if (wild == 0) at(p, n) = more && pieces[p].letter == name[n] && at(p + 1, n + 1);
+    }
+  }
+  if (!at(0, 0)) return std::nullopt;
+  std::vector<std::string> texts;
+  for (std::size_t p = 0, n = 0; p < pieces.size(); ++p) {
+    std::size_t end = pieces[p].wild == '*' ? letters : n + 1;
+    while (!at(p + 1, end)) pieces[p].wild == '*' ? --end : ++end;
+    if (pieces[p].wild == '{') texts.push_back(name.substr(n, end - n));
+    n = end;
+  }
+  return texts;
 }
 
 using Texts = std::map<std::string, std::string>;
@@ -53,19 +85,22 @@ void MatchBelow(const fs::path& folder, fs::path::iterator part, const fs::path:
   const std::string pattern = part->string();
   const auto next = std::next(part);
   if (!IsWild(pattern)) return MatchBelow(folder / pattern, next, end, texts, found);
-  std::vector<std::string> names;
-  const std::regex expression = PartExpression(pattern, &names);
+  const std::vector<Piece> pieces = PiecesOf(pattern);
   std::vector<std::string> entries;
   for (fs::directory_iterator entry(folder, failure), last; !failure && entry != last; entry.increment(failure))
     entries.push_back(entry->path().filename().string());
   std::sort(entries.begin(), entries.end());
   for (const auto& entry : entries) {
-    std::smatch match;
-    if (!std::regex_match(entry, match, expression)) continue;
+    const auto found_texts = TextsOf(pieces, entry);
+    if (!found_texts) continue;
     Texts known = texts;
     bool same = true;
-    for (std::size_t i = 0; i < names.size(); ++i)
-      same = same && known.emplace(names[i], match[i + 1].str()).first->second == match[i + 1].str();
+    std::size_t i = 0;
+    for (const Piece& piece : pieces) {
+      if (piece.wild != '{') continue;
+      const std::string& text = (*found_texts)[i++];
+      same = same && known.emplace(piece.name, text).first->second == text;
+    }
     if (same) MatchBelow(folder / entry, next, end, known, found);
   }
 }
@@ -141,7 +176,8 @@ Status ReadOptions(YamlMap& map, const fs::path& folder, Plan* plan) {
   const double starts = map.Number("starts", 1), seed = map.Number("seed", 0);
   const std::size_t effort = map.Choice("effort", efforts, 1);
   const auto whole = [](double x, double low, double high) { return x == std::floor(x) && x >= low && x <= high; };
-  if (!map.failed() && !(whole(starts, 1, 1000) && whole(seed, 0, 1e15)))
+  if (map.failed()) return Ok();  // Finish() says why; the numbers may be any
+  if (!(whole(starts, 1, 1000) && whole(seed, 0, 1e15)))
     return Error{.what = "not a whole number in its range",
                  .where = map.file(),
                  .actual = whole(starts, 1, 1000) ? "seed" : "starts",
@@ -168,6 +204,12 @@ bool TextBefore(const std::string& a, const std::string& b) {
 }
 
 Result<std::vector<std::string>> PatternColumns(const std::string& pattern) {
+  constexpr std::size_t kLongest = 4096;  // of a path, too
+  if (pattern.size() > kLongest)
+    return Error{.what = "a pattern too long for a path",
+                 .where = Quoted(pattern),
+                 .actual = std::to_string(pattern.size()) + " characters",
+                 .allowed = "at most " + std::to_string(kLongest)};
   std::vector<std::string> columns;
   for (std::size_t at = pattern.find('{'); at != std::string::npos; at = pattern.find('{', at + 1)) {
     const std::size_t end = pattern.find_first_of("}/", at);

@@ -24,7 +24,8 @@ struct MatchedLog {
 // "logs/{robot}/{day}_*.csv": {NAME} and * stand for any text between slashes, ? for any letter. A name that comes
 // twice is the same text twice. In the order of their paths; of folders that cannot be read nothing.
 std::vector<MatchedLog> MatchLogs(const std::string& pattern, const std::vector<std::string>& columns);
-// The names of a pattern, each once. Error: a brace that does not close, or a name that is not letters, digits and _.
+// The names of a pattern, each once. Errors: a brace that does not close, a name that is not letters, digits and _, a
+// pattern too long for a path.
 Result<std::vector<std::string>> PatternColumns(const std::string& pattern);
 
 // Numbers by their value, other texts by letters.

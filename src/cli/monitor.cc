@@ -18,6 +18,7 @@
 #include "src/log/foreign.h"
 #include "src/report/json.h"
 #include "src/report/read_diagnosis.h"
+#include "src/report/read_json.h"
 #include "src/report/read_run.h"
 #include "src/report/robot_changes.h"
 
@@ -78,7 +79,7 @@ Result<ResultLogs> LogsOf(const ordered_json& json, const std::string& where) {
     if (held_out) logs.held_out.push_back(path);
     if (std::find(logs.all.begin(), logs.all.end(), path) == logs.all.end()) logs.all.push_back(path);
   };
-  if (json.value("schema", "") == kTuneSchema) {
+  if (TextIn(json, "schema") == kTuneSchema) {
     GS_ASSIGN(const TuneRun run, ReadTuneRun(json, where));
     for (const auto& log : run.train) add(log.log, false);
     for (const auto& log : run.held_out) add(log.log, true);

@@ -4,6 +4,7 @@
 
 #include "src/cli/print.h"
 #include "src/core/file.h"
+#include "src/log/text.h"
 #include "src/report/json.h"
 #include "src/report/read_json.h"
 #include "src/report/read_run.h"
@@ -17,15 +18,25 @@ using nlohmann::ordered_json;
 
 std::string Hex(std::uint64_t number) { return fmt::format("{:016x}", number); }
 
+// The options that ModelOf and `run` read; throws where one is missing or another kind of value.
+void ReadOptions(const ordered_json& options, const std::string& what) {
+  for (const char* list : {"with", "set", "params"}) options.at(list).get<std::vector<std::string>>();
+  options.at("while").get<std::string>();
+  WholeFrom<std::uint64_t>(options.at("seed"));
+  if (what == "tune") WholeFrom<int>(options.at("starts"));
+  if (what == "diagnose") options.at("effort").get<std::string>();
+}
+
 Plan PlanFrom(const ordered_json& json) {
   Plan plan{.experiment = json.at("experiment"),
             .what = json.at("what"),
             .options = json.at("options"),
             .reports = json.at("reports"),
-            .shards = json.at("shards"),
+            .shards = WholeFrom<int>(json.at("shards")),
             .columns = json.at("columns"),
             .time = json.at("time"),
             .units = {}};
+  ReadOptions(plan.options, plan.what);
   for (const auto& task : json.at("tasks")) {
     PlanUnit unit{.id = task.at("task"), .group = {}, .logs = {}};
     if (task.contains("log")) {
@@ -39,19 +50,24 @@ Plan PlanFrom(const ordered_json& json) {
   return plan;
 }
 
+constexpr char kCure[] = "write it with gapscope plan or gapscope fleet plan";
+
 // An id names files in the plan's folder.
-bool IsId(const std::string& text) {
-  return text.size() == Hex(0).size() && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+bool IsId(const std::string& id) {
+  return id.size() == Hex(0).size() && id.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-Status CheckUnits(const Plan& plan, const std::string& path) {
-  for (const auto& unit : plan.units) {
-    if (IsId(unit.id) && !unit.logs.empty()) continue;
-    return Error{.what = IsId(unit.id) ? "a task without a log" : "not the name of a task",
-                 .where = path,
-                 .actual = "'" + unit.id + "'",
-                 .allowed = IsId(unit.id) ? "one log or more" : "16 hexadecimal digits",
-                 .cure = "write the plan again"};
+// What the commands take for granted.
+Status CheckPlan(const Plan& plan, const std::string& where) {
+  const auto broken = [&](const char* what, const std::string& actual, const std::string& allowed) {
+    return Error{.what = what, .where = where, .actual = Quoted(actual), .allowed = allowed, .cure = kCure};
+  };
+  if (plan.what != "tune" && plan.what != "diagnose") return broken("no such work", plan.what, "tune, diagnose");
+  if (plan.shards < 1) return broken("no number of shards", std::to_string(plan.shards), "1 or more");
+  if (plan.units.empty()) return broken("a plan without units", "", "a task or more");
+  for (const PlanUnit& unit : plan.units) {
+    if (!IsId(unit.id)) return broken("not the name of a task", unit.id, "16 hexadecimal digits");
+    if (unit.logs.empty()) return broken("a task without a log", unit.id, "one log or more");
   }
   return Ok();
 }
@@ -87,17 +103,18 @@ ordered_json ToJson(const Plan& plan) {
   return json;
 }
 
+Result<Plan> PlanOf(const ordered_json& json, const std::string& where) {
+  if (TextIn(json, "schema") != kPlanSchema)
+    return Error{.what = "not a plan", .where = where, .allowed = kPlanSchema, .cure = kCure};
+  GS_ASSIGN(Plan plan, ReadGuarded([&] { return PlanFrom(json); }, where, kPlanSchema));
+  GS_RETURN_IF_ERROR(CheckPlan(plan, where));
+  return plan;
+}
+
 Result<Plan> ReadPlan(const std::filesystem::path& folder) {
   const std::string path = (folder / "plan.json").string();
   GS_ASSIGN(const ordered_json json, ReadJson(path));
-  if (!json.is_object() || json.value("schema", ordered_json()) != kPlanSchema)
-    return Error{.what = "not a plan",
-                 .where = path,
-                 .allowed = kPlanSchema,
-                 .cure = "write it with gapscope plan or gapscope fleet plan"};
-  GS_ASSIGN(Plan plan, ReadGuarded([&] { return PlanFrom(json); }, path, kPlanSchema));
-  GS_RETURN_IF_ERROR(CheckUnits(plan, path));
-  return plan;
+  return PlanOf(json, path);
 }
 
 std::filesystem::path ResultPath(const std::filesystem::path& folder, const PlanUnit& unit) {

@@ -41,7 +41,10 @@ nlohmann::ordered_json ToJson(const Plan& plan);
 // What names a unit in the files: its log, or its group and logs; its id.
 nlohmann::ordered_json JsonUnit(const Plan& plan, const PlanUnit& unit);
 
-// Error: no such file, or not a plan.
+// `json`: what the file `where` holds. Error: not a plan, or one that this program would not have written: a task that
+// is not 16 hexadecimal digits (results are named by it), a unit without logs, an option that is not there.
+Result<Plan> PlanOf(const nlohmann::ordered_json& json, const std::string& where);
+// Error: no such file; as PlanOf.
 Result<Plan> ReadPlan(const std::filesystem::path& folder);
 std::filesystem::path ResultPath(const std::filesystem::path& folder, const PlanUnit& unit);
 std::filesystem::path ReportFolder(const std::filesystem::path& folder, const PlanUnit& unit);

@@ -6,6 +6,7 @@
 
 #include "src/core/names.h"
 #include "src/report/diagnose_report.h"
+#include "src/report/read_json.h"
 #include "src/report/read_run.h"
 #include "src/report/replay_report.h"
 #include "src/report/tune_report.h"
@@ -63,7 +64,7 @@ std::vector<std::string> JudgedBy(const nlohmann::ordered_json& json) {
     if (!logs.is_array()) return;
     for (const auto& log : logs) {
       if (log.is_string()) paths.push_back(log.get<std::string>());
-      if (log.is_object() && log.contains("log")) paths.push_back(log["log"].get<std::string>());
+      if (const std::string path = TextIn(log, "log"); !path.empty()) paths.push_back(path);
     }
   };
   if (json.contains("logs") && json["logs"].is_object()) add(json["logs"].value("held_out", nlohmann::ordered_json()));

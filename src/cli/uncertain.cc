@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "src/core/dense.h"
+#include "src/report/read_json.h"
 #include "src/report/read_run.h"
 
 namespace gapscope::cli {
@@ -118,11 +119,12 @@ void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
 Result<Uncertain> UncertainOf(const Model& model, const std::vector<double>& values, const nlohmann::ordered_json& json,
                               const std::string& where) {
   constexpr char kCure[] = "run `gapscope tune` (--from DIR takes over what a diagnosis found), and export its result";
-  if (json.value("schema", "") != kTuneSchema)
+  if (TextIn(json, "schema") != kTuneSchema)
     return Error{.what = "only a result of tune says how its parameters vary together", .where = where, .cure = kCure};
   GS_ASSIGN(const TuneRun run, ReadTuneRun(json, where));
   if (run.spread.logarithmic.size() != run.parameters.size())
     return Error{.what = "a result of an earlier version, without its covariance", .where = where, .cure = kCure};
+  for (const TuneRun::Parameter& p : run.parameters) GS_RETURN_IF_ERROR(model.Find(p.name, where));
   Uncertain uncertain;
   uncertain.values = values;
   if (run.per_log.size() >= kEnoughLogs) {

@@ -4,6 +4,7 @@
 
 #include "src/core/collect.h"
 #include "src/model/add_actuators.h"
+#include "src/model/claimed_sizes.h"
 #include "src/model/element_names.h"
 #include "src/model/own_candidates.h"
 #include "src/model/pseudo_inertia.h"
@@ -41,6 +42,7 @@ Result<SpecPtr> ReadSpec(Experiment* experiment) {
   char message[1024] = "";
   SpecPtr spec(mj_parseXML(experiment->model_path.c_str(), nullptr, message, sizeof message));
   if (!spec) return Error{.what = "cannot read the MJCF: " + OneLine(message), .where = experiment->model_path};
+  GS_RETURN_IF_ERROR(CheckClaimedSizes(*spec, experiment->model_path));
   GS_RETURN_IF_ERROR(AddToSpec(experiment, spec.get()));
   return spec;
 }

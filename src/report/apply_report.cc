@@ -27,7 +27,7 @@ struct Interval {
 const ordered_json* EntryOf(const ordered_json& result, const char* list, const EffectUse& use) {
   if (!result.contains(list)) return nullptr;
   for (const auto& entry : result[list]) {
-    if (entry.value("name", "") == use.effect && entry.value("on", "") == use.on) return &entry;
+    if (TextIn(entry, "name") == use.effect && TextIn(entry, "on") == use.on) return &entry;
   }
   return nullptr;
 }
@@ -36,7 +36,7 @@ const ordered_json* EntryOf(const ordered_json& result, const char* list, const 
 Interval TunedInterval(const ordered_json& result, const std::string& name) {
   if (!result.contains("parameters") || !result["parameters"].is_array()) return {};
   for (const auto& entry : result["parameters"]) {
-    if (entry.value("name", "") == name) return {NumberIn(entry, "low"), NumberIn(entry, "high")};
+    if (TextIn(entry, "name") == name) return {NumberIn(entry, "low"), NumberIn(entry, "high")};
   }
   return {};
 }
@@ -52,9 +52,10 @@ std::string Quantity(double value, const std::string& unit, const Interval& inte
 std::vector<std::string> Rivals(const ordered_json& result, const ordered_json& statement, const EffectUse& use) {
   std::vector<std::string> rivals;
   if (!statement.contains("group") || statement["group"].is_null()) return rivals;
+  if (!result.contains("statements")) return rivals;
   for (const auto& other : result["statements"]) {
-    const EffectUse rival{other.value("name", ""), other.value("on", "")};
-    if (rival != use && other.value("answer", "") == "present" && other.contains("group") &&
+    const EffectUse rival{TextIn(other, "name"), TextIn(other, "on")};
+    if (rival != use && TextIn(other, "answer") == "present" && other.contains("group") &&
         other["group"] == statement["group"])
       rivals.push_back(rival.Text());
   }

@@ -50,7 +50,7 @@ Statement StatementFrom(const ordered_json& json) {
                       .probability = json.at("probability"),
                       .prior = json.at("prior"),
                       .evidence = json.at("evidence"),
-                      .group = json.at("group").is_null() ? -1 : json.at("group").get<int>(),
+                      .group = json.at("group").is_null() ? -1 : WholeFrom<int>(json.at("group")),
                       .rule = json.at("rule"),
                       .caveat = json.value("caveat", "")};
   for (const auto& [key, size] : json.at("parameters").items())
@@ -81,7 +81,7 @@ EarlierDiagnosis DiagnosisFrom(const ordered_json& json) {
 
 Result<EarlierDiagnosis> ReadDiagnosis(const ordered_json& json, const std::string& where) {
   constexpr char kAllowed[] = "the folder that gapscope diagnose --out wrote, or its result.json";
-  const std::string schema = json.is_object() ? json.value("schema", "") : "";
+  const std::string schema = TextIn(json, "schema");
   if (schema != kDiagnosisSchema)
     return Error{.what = "not a diagnosis", .where = where, .actual = Quoted(schema), .allowed = kAllowed};
   const nlohmann::json policy = json.value("policy", ordered_json());  // whatever the order of its keys

@@ -1,5 +1,6 @@
 #include "src/report/read_run.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -11,6 +12,8 @@ namespace gapscope {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr int kDeepest = 64;  // of the brackets in a file
 
 double NumberAt(const ordered_json& json, const char* key) { return NumberFrom(json.at(key)); }
 
@@ -55,9 +58,14 @@ Spread SpreadFrom(const ordered_json& json) {
   if (!json.contains("spread")) return {};
   const auto& from = json["spread"];
   Spread spread{.logarithmic = from.at("logarithmic").get<std::vector<bool>>(), .covariance = {}};
-  const auto n = static_cast<Eigen::Index>(spread.logarithmic.size());
+  const auto& rows = from.at("covariance");
+  const std::size_t count = spread.logarithmic.size();
+  // Before room is made for a matrix that the file does not hold.
+  if (rows.size() != count || std::ranges::any_of(rows, [&](const auto& row) { return row.size() != count; }))
+    throw ordered_json::out_of_range::create(401, "a covariance of another size than 'logarithmic'", &from);
+  const auto n = static_cast<Eigen::Index>(count);
   spread.covariance = Eigen::MatrixXd::NullaryExpr(n, n, [&](Eigen::Index a, Eigen::Index b) {
-    return NumberFrom(from.at("covariance").at(static_cast<std::size_t>(a)).at(static_cast<std::size_t>(b)));
+    return NumberFrom(rows.at(static_cast<std::size_t>(a)).at(static_cast<std::size_t>(b)));
   });
   return spread;
 }
@@ -85,14 +93,16 @@ TuneRun TuneRunFrom(const ordered_json& json) {
   const auto& error = json.at("error");
   const auto& versions = json.at("versions");
   TuneRun run{
-      .info = {.seed = json.at("seed"), .gapscope = versions.at("gapscope"), .mujoco = versions.at("mujoco")},
+      .info = {.seed = WholeFrom<std::uint64_t>(json.at("seed")),
+               .gapscope = versions.at("gapscope"),
+               .mujoco = versions.at("mujoco")},
       .optimizer = json.at("optimizer"),
       .termination = json.at("termination"),
       .starts_agree = json.at("starts_agree"),
-      .starts = json.at("starts"),
+      .starts = WholeFrom<std::size_t>(json.at("starts")),
       .cost = json.contains("cost") ? NumberAt(json, "cost") : kNaN,
-      .evaluations = json.at("evaluations"),
-      .replays = json.at("replays"),
+      .evaluations = WholeFrom<std::size_t>(json.at("evaluations")),
+      .replays = WholeFrom<std::size_t>(json.at("replays")),
       .wall_s = json.value("wall_s", kNaN),
       .solve_s = json.value("solve_s", kNaN),
       .error_nominal = NumberAt(error, "nominal"),
@@ -130,8 +140,15 @@ Result<ordered_json> ReadJson(const std::string& path) {
   const std::string file =
       std::filesystem::is_directory(path, failure) ? (std::filesystem::path(path) / "result.json").string() : path;
   GS_ASSIGN(const std::string text, ReadFile(file));
-  ordered_json json = ordered_json::parse(text, nullptr, false);
+  // Copying recurses on what is nested, and an object that grows copies: what is too deep is not even built.
+  bool too_deep = false;
+  const auto watch = [&](int depth, ordered_json::parse_event_t, const ordered_json&) {
+    too_deep = too_deep || depth > kDeepest;
+    return depth <= kDeepest;
+  };
+  ordered_json json = ordered_json::parse(text, watch, false);
   if (json.is_discarded()) return Error{.what = "not JSON", .where = file};
+  if (too_deep) return Error{.what = "nested too deep", .where = file, .allowed = std::to_string(kDeepest) + " levels"};
   return json;
 }
 

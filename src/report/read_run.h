@@ -11,7 +11,8 @@
 
 namespace gapscope {
 
-// `path`: the file, or the folder that a command wrote with --out. Errors: unreadable, not JSON.
+// `path`: the file, or the folder that a command wrote with --out. Errors: unreadable, not JSON, nested deeper than
+// 64.
 Result<nlohmann::ordered_json> ReadJson(const std::string& path);
 
 // `json`: a result of replay, tune or diagnose; `where` it comes from, for errors. Error: it has no such model.

@@ -129,6 +129,41 @@ TEST_F(FleetTest, AFleetFileThatCannotBeMeantIsRefused) {
   ExpectRefused("fleet merge '" + Work() + "'", {"a task without a log"});
 }
 
+// Files of strangers: a task's name is part of a path, and patterns and numbers are as large as they like.
+TEST_F(FleetTest, APlanThatNoPlanWroteIsRefused) {
+  const std::string out = " --out '" + Work() + "'", work = "'" + Work() + "'";
+  std::filesystem::create_directories(scratch_.Path("long"));
+  scratch_.Write("long/" + std::string(200, '1') + ".csv", "");
+  std::string pattern = "\"long/";
+  for (int i = 0; i < 40; ++i) pattern += "*1";
+  ExpectRefused("fleet plan " + Fleet(pattern + "y\"") + out, {"no log fits"});
+  ASSERT_EQ(Run("plan " + Joint() + " '" + Log("a", "2") + "'" + out).status, 0);
+  const auto good = Json("plan.json");
+  const std::string task = good["tasks"][0]["task"];
+  const std::vector<std::pair<const char*, nlohmann::json>> broken = {
+      {"/tasks/0/task", "../../elsewhere"},
+      {"/tasks/0/task", 7},
+      {"/tasks/0", {{"task", task}, {"logs", nlohmann::json::array()}, {"group", nlohmann::json::object()}}},
+      {"/tasks", nlohmann::json::array()},
+      {"/options", nlohmann::json::object()},
+      {"/options/with", "coulomb_friction"},
+      {"/what", "anything"},
+      {"/shards", 1e300},
+      {"/schema", 3}};
+  for (const auto& [place, value] : broken) {
+    auto plan = good;
+    plan[nlohmann::json::json_pointer(place)] = value;
+    scratch_.Write("work/plan.json", plan.dump());
+    ExpectRefused("run --shard 1/1 " + work, {"plan.json"});
+    ExpectRefused("merge " + work, {"plan.json"});
+  }
+  scratch_.Write("work/plan.json", good.dump());
+  // Whoever copies this recurses, and an object that grows copies.
+  const std::string deep = std::string(200'000, '[') + std::string(200'000, ']');
+  scratch_.Write("work/results/" + task + ".json", R"({"a": )" + deep + R"(, "result": )" + deep + "}");
+  EXPECT_EQ(Run("merge " + work).status, 1);
+}
+
 TEST_F(FleetTest, ANewLogIsTheSameAsBeforeOrIsNot) {
   const std::string same = "'" + Log("b", "2") + "'", found = "'" + scratch_.Path("tuned") + "'";
   ASSERT_EQ(Run("tune " + Joint() + " '" + Log("a", "2") + "' --starts 1 --quiet --out " + found).status, 0);

@@ -60,6 +60,11 @@ TEST(ReadDiagnosisTest, IsWhatWasWritten) {
   EXPECT_EQ(d.statements[1].bounds[0].value, 0.01);
 }
 
+TEST(ReadDiagnosisTest, ASchemaThatIsNoTextIsRefused) {
+  EXPECT_FALSE(ReadDiagnosis({{"schema", 3}}, "here").ok());
+  EXPECT_FALSE(ReadDiagnosis({{"schema", nullptr}}, "here").ok());
+}
+
 TEST(ReadDiagnosisTest, AStatementIsNamedByItsNumberOrItsEffect) {
   const EarlierDiagnosis d = ReadDiagnosis(Written(), "here").value();
   EXPECT_EQ(FindStatement(d, "2", "").value(), 1u);

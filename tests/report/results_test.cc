@@ -193,6 +193,12 @@ TEST(TuneRunTest, ReaderSaysWhatIsWrong) {
   EXPECT_EQ(lacking.error().where, "r.json");
   EXPECT_NE(lacking.error().actual.find("train"), std::string::npos) << lacking.error().actual;
   EXPECT_EQ(lacking.error().allowed, "gapscope.tune/1");
+  // Numbers that fit nowhere, and a matrix that is not there.
+  ordered_json large = ToJson(MadeTune()), sizes = large;
+  large["starts"] = 1e300;
+  EXPECT_FALSE(ReadTuneRun(large, "r.json").ok());
+  sizes["spread"] = {{"logarithmic", std::vector<bool>(1'000'000)}, {"covariance", ordered_json::array()}};
+  EXPECT_FALSE(ReadTuneRun(sizes, "r.json").ok());
   for (const char* text : {"[]", "3", "null", R"({"parameters": 5})", R"({"error": "none"})"})
     EXPECT_FALSE(ReadTuneRun(ordered_json::parse(text), "r.json").ok()) << text;
   for (const char* text : {"[]", R"({"model": 1})", R"({"model": {"effects": [{"name": "x"}], "values": {}}})",

@@ -1,0 +1,12 @@
+// A file of --params.
+#include "src/experiment/experiment.h"
+#include "tests/fuzz/fuzz.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace gapscope;
+  const std::string& path = fuzz::FileOf(fuzz::Text(data, size));
+  const auto values = LoadParameterValues(path);
+  if (!values.ok()) fuzz::CheckRefusal(values.error(), path + ":");
+  fuzz::whole = values.ok();
+  return 0;
+}

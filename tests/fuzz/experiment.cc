@@ -4,7 +4,7 @@
 #include "replay/controller.h"
 #include "tests/fuzz/bound_log.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(experiment) {
   using namespace gapscope;
   const std::string& path = fuzz::FileOf(fuzz::Text(data, size));
   const auto experiment = LoadExperiment(path);

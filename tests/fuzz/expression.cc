@@ -4,7 +4,7 @@
 #include "src/experiment/formula_units.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(expression) {
   using namespace gapscope;
   static const std::map<std::string, std::string> units = {
       {"angle", "rad"}, {"speed", "rad/s"}, {"command", "V"}, {"log.kp", ""}, {"gear@the arm.gain", "N m/V"}};

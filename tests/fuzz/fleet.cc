@@ -2,7 +2,7 @@
 #include "src/cli/fleet_file.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(fleet) {
   using namespace gapscope;
   const std::string_view text = fuzz::Text(data, size);
   // Not the whole disk.

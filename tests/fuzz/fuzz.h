@@ -1,5 +1,5 @@
-// What the fuzz targets share. A target is one file here with LLVMFuzzerTestOneInput alone: libFuzzer gives it inputs
-// (scripts/fuzz), and fuzz_corpus those that are kept in corpus/.
+// What the fuzz targets share. A target is one file here, FUZZ_TARGET(its name) { ... } of `data` and `size`: libFuzzer
+// gives it inputs (scripts/fuzz), and fuzz_corpus those that are kept in corpus/.
 #ifndef GAPSCOPE_TESTS_FUZZ_FUZZ_H_
 #define GAPSCOPE_TESTS_FUZZ_FUZZ_H_
 
@@ -13,6 +13,12 @@
 #include <string_view>
 
 #include "src/core/result.h"
+
+#ifdef GAPSCOPE_FUZZER
+#define FUZZ_TARGET(name) extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
+#else
+#define FUZZ_TARGET(name) extern "C" int Fuzz_##name(const std::uint8_t* data, std::size_t size)
+#endif
 
 namespace gapscope::fuzz {
 

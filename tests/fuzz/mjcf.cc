@@ -4,7 +4,7 @@
 #include "src/model/model.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(mjcf) {
   using namespace gapscope;
   Experiment experiment;
   experiment.path = "experiment.yaml";

@@ -18,7 +18,7 @@ constexpr const char* kRobot = R"(<mujoco>
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(model) {
   using namespace gapscope;
   static const std::string robot = [] {
     const int file = memfd_create("robot", 0);

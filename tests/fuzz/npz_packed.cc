@@ -4,7 +4,7 @@
 #include "tests/fuzz/log_way.h"
 #include "tests/log/npz_fixture.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(npz_packed) {
   using namespace gapscope;
   constexpr std::string_view kBetween = "|||";
   std::string_view rest = fuzz::Text(data, size);

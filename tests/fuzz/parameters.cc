@@ -2,7 +2,7 @@
 #include "src/experiment/experiment.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(parameters) {
   using namespace gapscope;
   const std::string& path = fuzz::FileOf(fuzz::Text(data, size));
   const auto values = LoadParameterValues(path);

@@ -3,7 +3,7 @@
 #include "src/report/read_run.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(plan) {
   using namespace gapscope;
   const std::string& path = fuzz::FileOf(fuzz::Text(data, size));
   const auto json = ReadJson(path);

@@ -8,7 +8,7 @@
 #include "src/report/unit_result.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(result) {
   using namespace gapscope;
   const std::string& path = fuzz::FileOf(fuzz::Text(data, size));
   auto json = ReadJson(path);

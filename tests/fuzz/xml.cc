@@ -2,7 +2,7 @@
 #include "src/model/xml_text.h"
 #include "tests/fuzz/fuzz.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZ_TARGET(xml) {
   using namespace gapscope;
   auto parsed = XmlText::Parse(std::string(fuzz::Text(data, size)), "robot.xml");
   if (!parsed.ok()) {

@@ -49,9 +49,9 @@ std::optional<std::vector<std::string>> TextsOf(const std::vector<Piece>& pieces
   const auto stars = std::ranges::count(pieces, '*', &Piece::wild);
   if (pieces.size() - static_cast<std::size_t>(stars) > letters) return std::nullopt;
   // Whether the pieces from p on can be what the name holds from its n-th letter on.
-  std::vector<char> fits((pieces.size() + 1) * columns);
-  const auto at = [&](std::size_t p, std::size_t n) -> char& { return fits[p * columns + n]; };
-  at(pieces.size(), letters) = 1;
+  std::vector<bool> fits((pieces.size() + 1) * columns);
+  const auto at = [&](std::size_t p, std::size_t n) { return fits[p * columns + n]; };
+  at(pieces.size(), letters) = true;
   for (std::size_t p = pieces.size(); p-- > 0;) {
     const char wild = pieces[p].wild;
     for (std::size_t n = columns; n-- > 0;) {

@@ -50,7 +50,7 @@ Plan PlanFrom(const ordered_json& json) {
   return plan;
 }
 
-constexpr char kCure[] = "write it with gapscope plan or gapscope fleet plan";
+constexpr char kWriteIt[] = "write it with gapscope plan or gapscope fleet plan";
 
 // An id names files in the plan's folder.
 bool IsId(const std::string& id) {
@@ -60,7 +60,7 @@ bool IsId(const std::string& id) {
 // What the commands take for granted.
 Status CheckPlan(const Plan& plan, const std::string& where) {
   const auto broken = [&](const char* what, const std::string& actual, const std::string& allowed) {
-    return Error{.what = what, .where = where, .actual = Quoted(actual), .allowed = allowed, .cure = kCure};
+    return Error{.what = what, .where = where, .actual = Quoted(actual), .allowed = allowed, .cure = kWriteIt};
   };
   if (plan.what != "tune" && plan.what != "diagnose") return broken("no such work", plan.what, "tune, diagnose");
   if (plan.shards < 1) return broken("no number of shards", std::to_string(plan.shards), "1 or more");
@@ -105,7 +105,7 @@ ordered_json ToJson(const Plan& plan) {
 
 Result<Plan> PlanOf(const ordered_json& json, const std::string& where) {
   if (TextIn(json, "schema") != kPlanSchema)
-    return Error{.what = "not a plan", .where = where, .allowed = kPlanSchema, .cure = kCure};
+    return Error{.what = "not a plan", .where = where, .allowed = kPlanSchema, .cure = kWriteIt};
   GS_ASSIGN(Plan plan, ReadGuarded([&] { return PlanFrom(json); }, where, kPlanSchema));
   GS_RETURN_IF_ERROR(CheckPlan(plan, where));
   return plan;

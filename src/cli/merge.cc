@@ -164,7 +164,9 @@ class Merger {
     if (!file.ok()) return Failed(unit, file.error().Text());
     const ordered_json& json = file.value();
     if (const auto error = json.find("error"); error != json.end() && error->is_string()) return Failed(unit, *error);
-    const ordered_json result = json.contains("result") ? json["result"] : ordered_json();
+    const auto at = json.find("result");
+    const ordered_json none;
+    const ordered_json& result = at == json.end() ? none : *at;
     auto known = ReadUnitResult(result, path);
     const auto parts = MergedParts(result, path);
     if (!known.ok() || !parts.ok()) return Failed(unit, (known.ok() ? parts.error() : known.error()).Text());

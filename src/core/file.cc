@@ -69,6 +69,15 @@ Result<std::string> ReadOpened(int file, const std::string& path) {
   return bytes;
 }
 
+// The folder that `path` is to stand in. Where it cannot be made, opening the file says why.
+std::string MakeFolderOf(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  if (folder.empty()) return ".";
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  return folder.string();
+}
+
 }  // namespace
 
 Result<std::string> ReadFile(const std::string& path) {
@@ -117,9 +126,7 @@ void EndWhereMappedFileIsCut() {
 }
 
 Result<std::string> TemporaryBeside(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::error_code failure;
-  if (!folder.empty()) std::filesystem::create_directories(folder, failure);
+  MakeFolderOf(path);
   std::string name = path + ".XXXXXX";
   const Descriptor file(mkostemp(name.data(), O_CLOEXEC));
   if (file.get() < 0) return SystemError("cannot write the file", path);
@@ -131,12 +138,10 @@ PartWriter::PartWriter(std::string path, std::string temporary, FILE* file)
     : path_(std::move(path)), temporary_(std::move(temporary)), file_(file, &std::fclose) {}
 
 Result<PartWriter> PartWriter::Open(const std::string& path) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::error_code failure;
-  if (!folder.empty()) std::filesystem::create_directories(folder, failure);
+  const std::string folder = MakeFolderOf(path);
   // Without a name, so that whatever ends the program leaves nothing; not every file system has that.
   if (access(kOwnFiles, X_OK) == 0) {
-    const int nameless = open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0644);
+    const int nameless = open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0644);
     if (FILE* file = nameless >= 0 ? fdopen(nameless, "w") : nullptr) return PartWriter(path, "", file);
   }
   GS_ASSIGN(std::string temporary, TemporaryBeside(path));

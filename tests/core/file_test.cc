@@ -26,9 +26,19 @@ TEST(MappedFileTest, EndsWithAMessageWhereTheFileIsCut) {
   std::filesystem::remove(path);
 }
 
-TEST(PartWriterTest, WhatIsKilledLeavesTheOldFileAlone) {
-  const std::filesystem::path folder = testing::TempDir() + "/killed." + std::to_string(getpid());
-  ASSERT_TRUE(WriteFile(folder / "a", "old").ok());
+class PartWriterTest : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(WriteFile(folder / "a", "old").ok()); }
+  ~PartWriterTest() override { std::filesystem::remove_all(folder); }
+  // No other file is there, and it says this.
+  void ExpectAlone(const std::string& text) const {
+    EXPECT_EQ(ReadFile(folder / "a").value(), text);
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  }
+  const std::filesystem::path folder = testing::TempDir() + "/parts." + std::to_string(getpid());
+};
+
+TEST_F(PartWriterTest, WhatIsKilledLeavesTheOldFileAlone) {
   const int nameless = open(folder.c_str(), O_TMPFILE | O_WRONLY, 0600);
   if (nameless < 0) GTEST_SKIP() << "this file system has no files without a name";
   close(nameless);
@@ -38,19 +48,19 @@ TEST(PartWriterTest, WhatIsKilledLeavesTheOldFileAlone) {
     raise(SIGKILL);
   };
   EXPECT_EXIT(killed(), testing::KilledBySignal(SIGKILL), "");
-  EXPECT_EQ(ReadFile(folder / "a").value(), "old");
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  ExpectAlone("old");
+}
+
+TEST_F(PartWriterTest, WhatIsNotFinishedLeavesTheOldFileAlone) {
   {
     auto half = PartWriter::Open(folder / "a");
     half.value().Write("half");
   }
-  EXPECT_EQ(ReadFile(folder / "a").value(), "old");
+  ExpectAlone("old");
   auto whole = PartWriter::Open(folder / "a");
   whole.value().Write("new");
   ASSERT_TRUE(whole.value().Finish().ok());
-  EXPECT_EQ(ReadFile(folder / "a").value(), "new");
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
-  std::filesystem::remove_all(folder);
+  ExpectAlone("new");
 }
 
 TEST(MappedFileTest, AnotherBusErrorStaysOne) {

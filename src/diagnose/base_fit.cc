@@ -49,9 +49,13 @@ Status Fit(const Workbench& bench, const Say& say, SearchResult* result) {
   }
   ScoreCandidate(bench, result->base);
   result->chosen = result->base;
+  const std::set<std::string> out_of_sight = JointsOutOfSight(*result->base->model, bench.data->train);
   for (const auto& use : AllUses(*bench.rig)) {
     if (Has(bench.known, use) || IsOfMissingSensor(use, *bench.rig, result->logged)) continue;
-    if (IsFinding(use, *result->base->model)) result->uses.push_back(use);
+    if (!IsFinding(use, *result->base->model)) continue;
+    const EffectPlace place = EffectOf(use, *bench.rig).place;
+    const bool of_joint = place == EffectPlace::kJoint || place == EffectPlace::kSpringJoint;
+    (of_joint && out_of_sight.contains(use.on) ? result->out_of_sight : result->uses).push_back(use);
   }
   return Ok();
 }

@@ -102,6 +102,8 @@ struct ShareOfGap {
 
 // The rule of an effect that no replay ran through with.
 inline constexpr char kNotSimulated[] = "the model with it cannot be simulated at this time step";
+// The rule of an effect on a joint that is out of sight (JointsOutOfSight).
+inline constexpr char kOutOfSight[] = "nothing that is measured follows the joint or what it carries; log its angle";
 
 // What is said of one effect.
 struct Statement {

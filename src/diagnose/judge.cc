@@ -361,6 +361,8 @@ class Judging {
                                        : kNotSimulated;
       result->statements.push_back(std::move(statement));
     }
+    for (const EffectUse& use : found_.out_of_sight)
+      result->statements.push_back({.use = use, .answer = Answer::kUnseen, .prior = PriorOf(use), .rule = kOutOfSight});
   }
 
   void Conclude(Judgement* result) {

@@ -60,6 +60,47 @@ Clocks ClocksOf(const std::vector<Recording>& recordings) {
   return worst;
 }
 
+// The body whose motion a signal follows; -1: it may be several bodies' or the whole model's.
+int BodyOf(const SignalSource& source, const mjModel& m) {
+  if (source.joint >= 0) return m.jnt_bodyid[source.joint];
+  for (int s = 0; s < m.nsensor; ++s) {
+    if (source.sensor < m.sensor_adr[s] || source.sensor >= m.sensor_adr[s] + m.sensor_dim[s]) continue;
+    const int object = m.sensor_objid[s];
+    switch (m.sensor_objtype[s]) {
+      case mjOBJ_SITE:
+        return m.site_bodyid[object];
+      case mjOBJ_GEOM:
+        return m.geom_bodyid[object];
+      case mjOBJ_JOINT:
+        return m.jnt_bodyid[object];
+      case mjOBJ_BODY:
+      case mjOBJ_XBODY:
+        return object;
+      default:
+        return -1;
+    }
+  }
+  return -1;
+}
+
+// Joints that are driven, also by a tendon, or that an equality ties to another.
+std::vector<char> AreLed(const mjModel& m) {
+  std::vector<char> led(static_cast<std::size_t>(m.njnt), 0);
+  const DataPtr data(mj_makeData(&m));
+  mj_forward(&m, data.get());
+  for (int out = 0; out < m.nout; ++out) {
+    for (int k = 0; k < data->moment_rownnz[out]; ++k)
+      led[static_cast<std::size_t>(m.dof_jntid[data->moment_colind[data->moment_rowadr[out] + k]])] = 1;
+  }
+  for (int e = 0; e < m.neq; ++e) {
+    if (m.eq_type[e] != mjEQ_JOINT) continue;
+    for (const int joint : {m.eq_obj1id[e], m.eq_obj2id[e]}) {
+      if (joint >= 0) led[static_cast<std::size_t>(joint)] = 1;
+    }
+  }
+  return led;
+}
+
 // What the catalogue says of an effect in a richer one; null: it does not hold it. On the same place: a motor's
 // direction asymmetry is no joint's friction.
 const Contained* HeldBy(const EffectUse& richer, const EffectUse& simpler, const Rig& rig) {
@@ -133,6 +174,26 @@ LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings) {
 
 bool IsOfMissingSensor(const EffectUse& use, const Rig& rig, const LoggedSignals& logged) {
   return EffectOf(use, rig).place == EffectPlace::kSignal && use.on != kOnAll && !logged.signals.contains(use.on);
+}
+
+std::set<std::string> JointsOutOfSight(const Model& base, const std::vector<Recording>& recordings) {
+  const mjModel& m = base.compiled();
+  std::vector<char> followed(static_cast<std::size_t>(m.nbody), 0);  // it or what it carries
+  for (const Recording& recording : recordings) {
+    for (const auto& measured : recording.measured) {
+      int body = BodyOf(base.source(measured.index), m);
+      if (body < 0) return {};
+      for (; body > 0; body = m.body_parentid[body]) followed[static_cast<std::size_t>(body)] = 1;
+    }
+  }
+  const std::vector<char> led = AreLed(m);
+  std::set<std::string> joints;
+  for (int j = 0; j < m.njnt; ++j) {
+    const char* name = mj_id2name(&m, mjOBJ_JOINT, j);
+    if (name && !led[static_cast<std::size_t>(j)] && !followed[static_cast<std::size_t>(m.jnt_bodyid[j])])
+      joints.insert(name);
+  }
+  return joints;
 }
 
 bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, const LoggedSignals& logged) {

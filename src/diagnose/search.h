@@ -33,6 +33,7 @@ struct SearchResult {
   std::vector<Member> members;         // of it
   ColumnTable columns;                 // at the base
   std::vector<EffectUse> uses;         // all that were tried
+  std::vector<EffectUse> out_of_sight;
   LoggedSignals logged;
   bool uneven = false;           // training and held-out logs show the gap very differently
   std::vector<std::string> cut;  // what the budget left out

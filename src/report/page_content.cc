@@ -1,6 +1,10 @@
 #include "src/report/page_content.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 
 #include "src/core/collect.h"
 
@@ -12,6 +16,24 @@ constexpr std::size_t kMostConditions = 10;
 std::vector<ConditionShare> First(std::vector<ConditionShare> shares) {
   shares.resize(std::min(shares.size(), kMostConditions));
   return shares;
+}
+
+// What is left on each log, the most first.
+PageContent::Table ByLogTable(std::vector<LogGap> gaps) {
+  PageContent::Table table{.title = "What is left on each log",
+                           .heads = {"log", "from, s", "to, s", "retuned", "with what was found", "noise", "closed"},
+                           .note =
+                               "Errors over each signal's own spread, by parameters fitted without that log or "
+                               "part. Noise: what the sensors' own is of it."};
+  std::ranges::stable_sort(gaps, std::ranges::greater{}, &LogGap::final);
+  for (const LogGap& gap : gaps) {
+    const double closed = ClosedShare(gap.refit, gap.final, gap.floor);
+    table.rows.push_back({std::filesystem::path(gap.log).filename().string(), ShortNumber(gap.from_s, 4),
+                          ShortNumber(gap.until_s, 4), ShortNumber(gap.refit, 3), ShortNumber(gap.final, 3),
+                          ShortNumber(gap.floor, 3),
+                          std::isfinite(gap.refit) ? fmt::format("{:.0f} %", 100 * closed) : "–"});
+  }
+  return table;
 }
 
 // Every effect that was looked at, the most probable first.
@@ -58,6 +80,7 @@ PageContent PageOf(const DiagnoseRun& run) {
   // The headline says how it went in windows.
   const std::string by_log = GapByLog(d), free = GapInFreeRuns(d);
   page.gap = by_log + (by_log.empty() || free.empty() ? "" : "; ") + free;
+  if (!d.effects.empty() && d.by_log.size() > 1) page.tables.push_back(ByLogTable(d.by_log));
   page.remainder = PartsOf(d.remainder);
   page.reachable = d.remainder.reachable;
   AddStatements(d, &page);

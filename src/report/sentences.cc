@@ -82,7 +82,8 @@ std::string Sentence::Text() const {
 }
 
 std::string WhyOf(const Statement& s) {
-  const std::string input = s.answer == Answer::kUnseen && s.rule != kNotSimulated ? InputThatTells(s.use) : "";
+  const bool by_input = s.answer == Answer::kUnseen && s.rule != kNotSimulated && s.rule != kOutOfSight;
+  const std::string input = by_input ? InputThatTells(s.use) : "";
   return s.rule + (input.empty() ? "" : "; what would show it: " + input);
 }
 

@@ -9,6 +9,7 @@
 
 #include "src/diagnose/candidate.h"
 #include "tests/experiment/scratch.h"
+#include "tests/model/synthetic.h"
 #include "tests/tune/fixture.h"
 
 namespace gapscope::testing {
@@ -185,6 +186,34 @@ TEST(RulesTest, ASensorThatIsNotLoggedHasNoEffect) {
   EXPECT_TRUE(IsOfMissingSensor({"sensor_delay", "velocity_rad_per_s"}, known, logged));
   EXPECT_TRUE(IsOfMissingSensor({"sensor_delay", "torque_n_m"}, known, logged)) << "not scored";
   EXPECT_FALSE(IsOfMissingSensor({"command_delay", "motor"}, known, logged));
+}
+
+// A servo's arm with a gripper whose one finger is tied to the other and the third is free, and a loose tip.
+TEST(RulesTest, JointsThatNothingMeasuredFollowsAreOutOfSight) {
+  const auto slide = [](const std::string& name) {
+    return "<body><joint name='" + name + "' type='slide'/><geom size='0.01'/></body>";
+  };
+  const std::string tip = "<body name='tip'><joint name='tip'/><geom size='0.01'/><site name='imu'/></body>";
+  const std::string mjcf =
+      "<mujoco><worldbody><body><joint name='base'/><geom size='0.1'/><body><joint name='arm'/><geom size='0.1'/>" +
+      slide("left") + slide("right") + slide("free") + tip +
+      "</body></body></worldbody><equality><joint joint1='left' joint2='right'/></equality>"
+      "<tendon><fixed name='cord'><joint joint='right' coef='1'/></fixed></tendon>"
+      "<actuator><motor name='arm' joint='arm'/><motor name='grip' tendon='cord'/></actuator>"
+      "<sensor><gyro name='imu' site='imu'/></sensor></mujoco>";
+  const auto out_of_sight = [&](const std::string& measured) {
+    const Scratch scratch;
+    const Experiment experiment = MakeExperiment(scratch, mjcf, "measured: [" + measured + "]\n");
+    const auto model = MakeModel(experiment);
+    return JointsOutOfSight(*model, {MakeRecording(experiment, 10, 0.01, {})});
+  };
+  using Joints = std::set<std::string>;
+  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: arm, unit: rad}"), (Joints{"free", "tip"}))
+      << "the base carries the arm, the fingers are driven or tied to one that is";
+  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: base, unit: rad}"), (Joints{"free", "tip"}));
+  EXPECT_EQ(out_of_sight("{signal: w, columns_of_elements: [x, y, z], sensor: imu, unit: rad/s}"), (Joints{"free"}));
+  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: tip, unit: rad}, {signal: f, column: f, joint: free, unit: m}"),
+            Joints{});
 }
 
 TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {

@@ -171,7 +171,7 @@ def linked_zoom(driver, path):
     check(narrower(before, all_of_it) and same(after) and after[0][0] > before[0][0], f"keys: {before} {after}")
     # Every control can be reached by the keyboard alone, and shows that it has the focus.
     reached = set()
-    for _ in range(60):
+    for _ in range(120):
         ActionChains(driver).send_keys(Keys.TAB).perform()
         reached.add(driver.execute_script("const e = document.activeElement; "
                                           "return e.id || e.dataset?.zoom || e.textContent.trim();"))
@@ -224,6 +224,19 @@ def fleet(driver, path):
     check(len(links) == 9 and links[0].get_attribute("href").endswith("reports/0/report.html"), "links to its pages")
 
 
+def meaning_shown(driver, word):
+    """What stands beside a word of the glossary that has the keyboard's focus, and nothing before; it fits in the
+    page."""
+    shown = "return getComputedStyle(arguments[0], '::after').content"
+    check(driver.execute_script(shown, word) == "none", f"nothing beside '{word.text}' without focus")
+    driver.execute_script("arguments[0].focus()", word)
+    width = driver.execute_script("return [document.documentElement.scrollWidth, innerWidth]")
+    check(width[0] <= width[1], f"the meaning of '{word.text}' makes the page {width[0]} wide, of {width[1]}")
+    meaning = driver.execute_script(shown, word)
+    driver.execute_script("arguments[0].blur()", word)
+    return meaning
+
+
 def main():
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([sys.argv[1], folder], check=True)
@@ -251,11 +264,14 @@ def main():
                 check(part in text, f"the diagnosis does not say '{part}'")
             check(driver.execute_script("return document.querySelectorAll('.map canvas').length") == 2,
                   "two maps of the missing torque")
+            rows = driver.find_element(By.ID, "tables").text.splitlines()
+            check(rows[-3:-1] == ["two.csv 0 20 – 0.3 0.05 –", "one.csv 0 20 1.2 0.1 0.05 96 %"],
+                  f"what is left on each log, the most first, got {rows}")
             curves = driver.find_elements(By.CSS_SELECTOR, "#curves .plot")
             check(len(curves) == 1 and "torque over arm angle" in text, "the curve of the effect that has one")
             marked = driver.find_elements(By.CSS_SELECTOR, "#statements abbr")
-            words = {e.text: e.get_attribute("title") for e in marked}
-            check("before the logs were seen" in words.get("prior", ""), f"the glossary on hover, got {words}")
+            words = {e.text: meaning_shown(driver, e) for e in marked}
+            check("before the logs were seen" in words.get("prior", ""), f"the glossary by keyboard, got {words}")
             open_page(driver, Path(folder) / "explained.html", 1440, 900)
             cells = driver.find_element(By.ID, "tables").text
             for part in ["largest gain", "says nothing", "80.0 %", "gravity offset on arm", "it explains less"]:

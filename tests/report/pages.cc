@@ -55,6 +55,7 @@ DiagnoseRun MadeDiagnosis(Verdict verdict) {
   d.verdict = verdict;
   d.probability = 0.91;
   d.nominal = 1.77, d.refit = 1.2, d.final = 0.01, d.floor = 0.008, d.closed = 0.998;
+  d.by_log = {{"logs/one.csv", 1.2, 0.1, 0.05, 0, 20}, {"logs/two.csv", kInfinity, 0.3, 0.05, 0, 20}};
   if (verdict != Verdict::kEffects && verdict != Verdict::kAmbiguous) {
     d.final = d.refit;
   } else {

@@ -1,5 +1,5 @@
 "use strict";
-// The glossary: as a list, and on hover where a word stands first in a section.
+// The glossary: as a list, and where a word stands first in a section, under the pointer, a finger or the keyboard.
 
 const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 
@@ -18,7 +18,8 @@ function markWords(section, pattern, meanings) {
       const word = rest.splitText(found.index);
       rest = word.splitText(found[0].length);
       seen.add(found[1].toLowerCase());
-      word.replaceWith(element("abbr", {title: meanings.get(found[1].toLowerCase())}, word.data));
+      const means = meanings.get(found[1].toLowerCase());
+      word.replaceWith(element("abbr", {tabindex: 0, "data-means": means, "aria-description": means}, word.data));
     }
   }
 }

@@ -13,10 +13,12 @@ from gapscope._bar import bar
 from gapscope._commands import design, diagnose, identify, inspect, render, replay, tune
 from gapscope._errors import Bug, InputError, Interrupted, MissingLibrary
 from gapscope._experiment import Experiment
+from gapscope._keyed import Applied, Explanation, FeedbackDesign, Identification, InputDesign, OptimalDesign
 from gapscope._log import Log, read, read_all
 from gapscope._many import diagnose_many
 from gapscope._parts import (
     Channel,
+    Estimate,
     Exported,
     ExportedEffect,
     ExportError,
@@ -35,14 +37,20 @@ from gapscope._results import Diagnosis, Inspection, Model, Replay, Report, Tune
 from gapscope._traces import Trace, Traces
 
 __all__ = [
+    "Applied",
     "Bug",
     "Channel",
     "Diagnosis",
+    "Estimate",
     "Experiment",
+    "Explanation",
     "ExportError",
     "Exported",
     "ExportedEffect",
+    "FeedbackDesign",
     "FoundEffect",
+    "Identification",
+    "InputDesign",
     "InputError",
     "Inspection",
     "Interrupted",
@@ -52,6 +60,7 @@ __all__ = [
     "LogResult",
     "MissingLibrary",
     "Model",
+    "OptimalDesign",
     "Parameter",
     "Progress",
     "Replay",

@@ -9,11 +9,12 @@ import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar, overload
+from typing import Any, Literal, TypeAlias, TypeVar, overload
 
 from gapscope._errors import InputError, Interrupted
 from gapscope._experiment import Experiment
 from gapscope._json import from_json
+from gapscope._keyed import FeedbackDesign, Identification, InputDesign, Keyed, OptimalDesign, keyed
 from gapscope._log import Log, read_all
 from gapscope._program import Finished, ProgressCallback, option_words, run
 from gapscope.formats import format_of
@@ -28,7 +29,14 @@ Folder: TypeAlias = str | os.PathLike[str] | None
 # Any other option of the program's command (docs/reference/options.md), without its dashes:
 # {"huber": 2, "no-next-experiment": True}.
 Options: TypeAlias = Mapping[str, object] | None
+Shape: TypeAlias = Literal["multisine", "square", "steps", "sweep", "triangle"]
+Feedback: TypeAlias = Literal["lqr", "poles"]
 R = TypeVar("R", bound=Run)
+_DESIGNS: dict[str, type[Keyed]] = {
+    "gapscope.design.input/1": InputDesign,
+    "gapscope.design.optimal/1": OptimalDesign,
+    "gapscope.design.feedback/1": FeedbackDesign,
+}
 
 
 @dataclass
@@ -297,25 +305,43 @@ def render(
     return Video.of(job.json(finished.stdout))
 
 
-def identify(method: str, exp: Source, logs: Logs, *, out: Folder = None, options: Options = None) -> dict[str, Any]:
+def identify(method: str, exp: Source, logs: Logs, *, out: Folder = None, options: Options = None) -> Identification:
     """Parameters straight from logs: ``method`` is "pd", "friction", "inertia" ... (docs/reference/identify.md).
 
-    The result as the program writes it: values with 95 % intervals, SI.
+    ``out`` is a folder for the points behind them.
+
+    >>> found = identify("cable", "models/qube/experiment.yaml", "demo/qube.csv")
+    >>> rest = found.parameters["rest"]
+    >>> print(f"{rest.value:.2f} {rest.unit}, 95 % from {rest.low:.2f} to {rest.high:.2f}")
+    -0.40 rad, 95 % from -0.44 to -0.37
     """
     job = _job("identify", exp, out)
     job.arguments.insert(1, method)
     job.arguments += _files(job, logs)
-    return _plain(job, out, options)
+    return keyed(Identification, _plain(job, out, options))
 
 
-def design(what: str, exp: Source, *, out: Folder = None, options: Options = None) -> dict[str, Any]:
+@overload
+def design(what: Shape, exp: Source, *, out: Folder = None, options: Options = None) -> InputDesign: ...
+@overload
+def design(what: Literal["optimal"], exp: Source, *, out: Folder = None, options: Options = None) -> OptimalDesign: ...
+@overload
+def design(what: Feedback, exp: Source, *, out: Folder = None, options: Options = None) -> FeedbackDesign: ...
+@overload
+def design(what: str, exp: Source, *, out: Folder = None, options: Options = None) -> Keyed: ...
+def design(what: str, exp: Source, *, out: Folder = None, options: Options = None) -> Keyed:
     """An input for the next experiment ("sweep", "steps", "optimal" ...), or a controller ("lqr", "poles").
 
-    ``out`` is the input's CSV file; a controller has none. The result as the program writes it.
+    ``out`` is the input's CSV file; a controller has none.
+
+    >>> upright = {"at": "pendulum=3.14159", "q": "10,10,1,10"}
+    >>> design("lqr", "models/qube/experiment.yaml", options=upright).states
+    ('arm', 'pendulum', 'arm speed', 'pendulum speed')
     """
     job = _job("design", exp, None)
     job.arguments.insert(1, what)
-    return _plain(job, out, options)
+    data = _plain(job, out, options)
+    return keyed(_DESIGNS.get(data["schema"], Keyed), data)
 
 
 def _plain(job: _Job, out: Folder, options: Options) -> dict[str, Any]:

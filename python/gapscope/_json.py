@@ -22,10 +22,15 @@ class Open:
 def from_json(kind: Callable[..., T], data: Mapping[str, Any], **given: Any) -> T:
     """A dataclass of the program's JSON; ``given`` are fields that it does not hold."""
     hints = typing.get_type_hints(kind)
-    names = {f.name for f in dataclasses.fields(kind)} - {"extra"} - set(given)  # type: ignore[arg-type]
-    known = {name: _convert(hints[name], data[name]) for name in names if name in data}
-    extra = {key: value for key, value in data.items() if key not in names}
+    keys = {name: key for name, key in keys_of(kind).items() if name not in ("extra", *given)}
+    known = {name: _convert(hints[name], data[key]) for name, key in keys.items() if key in data}
+    extra = {key: value for key, value in data.items() if key not in keys.values()}
     return kind(**given, **known, extra=extra)
+
+
+def keys_of(kind: Any) -> dict[str, str]:
+    """The JSON's key of each field of a dataclass: the field's name where its metadata has no "key"."""
+    return {f.name: f.metadata.get("key", f.name) for f in dataclasses.fields(kind)}
 
 
 def _convert(hint: Any, value: Any) -> Any:

@@ -264,6 +264,119 @@ class Finding(Open):
     text: str = ""
 
 
+@dataclass(frozen=True)
+class Estimate(Interval):
+    """A value that `identify` found in its ``unit``, and its 95 % interval."""
+
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Fit(Open):
+    """How well a relation holds on the ``rows`` used: ``r2`` at most 1, ``rmse`` in ``unit``."""
+
+    r2: float
+    rmse: float
+    unit: str
+    rows: int
+
+
+@dataclass(frozen=True)
+class Table(Open):
+    """Points behind estimates: ``numpy.array(table.rows)`` is of shape (rows, columns).
+
+    A column is in the unit that its name ends in, else in that of the estimate of its name.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Effect(Open):
+    """An effect where it acts: ``on`` is a joint, an actuator or a measured signal; empty: the model."""
+
+    name: str
+    on: str
+
+
+@dataclass(frozen=True)
+class Rival(Effect):
+    """An effect that was tried in the place of another. ``behind``: log of the cost with it over that of the set."""
+
+    behind: float
+
+
+@dataclass(frozen=True)
+class Term(Open):
+    """What a probability is summed from: ``adds``, to the logarithm of the odds, is ``weight`` times ``counted``.
+
+    ``counted`` is the ``value`` after its transformation.
+    """
+
+    name: str
+    value: float
+    counted: float
+    weight: float
+    adds: float
+
+
+@dataclass(frozen=True)
+class Block(Open):
+    """A part of a held-out log, and the ``share`` of its squared error that the effect takes away; negative: adds."""
+
+    log: str
+    from_s: float
+    to_s: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Change(Open):
+    """An attribute of an MJCF's element, "" where there is none; without ``attribute`` a new element."""
+
+    element: str
+    attribute: str = ""
+    before: str = ""
+    after: str = ""
+
+
+@dataclass(frozen=True)
+class Limit(Open):
+    """A limit of the rig, and what an input reaches on the nominal model; both in ``unit``."""
+
+    name: str
+    unit: str
+    reached: float
+    limit: float
+
+
+@dataclass(frozen=True)
+class Waveform(Open):
+    """An input: ``amplitude`` in ``unit``, frequencies in Hz, and how near it comes to the rig's ``limits``."""
+
+    shape: str
+    amplitude: float
+    unit: str
+    duration_s: float
+    low_hz: float
+    high_hz: float
+    seed: int
+    limits: tuple[Limit, ...]
+
+
+@dataclass(frozen=True)
+class RankedInput(Waveform):
+    """An input of an `OptimalDesign`: its measure ``per_target``, and the ``score`` of them all, the larger the better.
+
+    Not ``fitted_in_full``: both are rough.
+    """
+
+    per_target: tuple[float, ...]
+    score: float
+    fitted_in_full: bool
+
+
 def by_name(items: tuple[Parameter, ...], name: str) -> Parameter:
     for item in items:
         if item.name == name:

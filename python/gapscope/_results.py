@@ -17,6 +17,7 @@ import numpy as np
 from gapscope import _html
 from gapscope._errors import InputError, Interrupted
 from gapscope._json import Open, from_json
+from gapscope._keyed import Applied, Explanation, keyed
 from gapscope._log import Floats
 from gapscope._parts import (
     Channel,
@@ -217,9 +218,9 @@ class _WithModel(Run):
         options = {"timestep": timestep, "draws": draws, "seed": seed, "experiment": experiment}
         return from_json(Exported, self._go_on("export", to=target, out=out, **options))
 
-    def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> dict[str, Any]:
+    def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> Applied:
         """Writes the result into the text of the experiment's own MJCF (docs/how-to/apply.md); what changed there."""
-        return self._go_on("apply", out=out, experiment=experiment)
+        return keyed(Applied, self._go_on("apply", out=out, experiment=experiment))
 
     def mcap(self, out: str | os.PathLike[str]) -> tuple[Path, ...]:
         """Measured and predicted joint states for PlotJuggler, Foxglove and Rerun: OUT/LOG.mcap of each log.
@@ -342,9 +343,9 @@ class Diagnosis(_WithModel):
     termination: str = ""
     wall_s: float = math.nan
 
-    def explain(self, statement: str) -> dict[str, Any]:
+    def explain(self, statement: str) -> Explanation:
         """The evidence of one statement ("coulomb_friction@arm") in full: terms, blocks of time, rivals."""
-        return self._go_on("explain", statement)
+        return keyed(Explanation, self._go_on("explain", statement))
 
     def _repr_html_(self) -> str:
         return _html.diagnosis(self)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import json
 import re
 import subprocess
@@ -17,6 +16,7 @@ from typing import Any
 import gapscope as gs
 import jsonschema
 import pytest
+from gapscope._json import keys_of
 from gapscope._program import program
 from gapscope._results import Open
 from referencing import Registry, Resource
@@ -196,7 +196,7 @@ def test_what_is_not_as_described_is_seen(experiment: str, demo: str) -> None:
 
 
 # What the dataclasses leave in `extra`: of the search and of files, for programs rather than for people.
-OWN = {"out", "messages", "_keep", "extra"}  # not of the JSON
+OWN = {"out", "messages", "_keep", "extra", "json"}  # not of the JSON
 MADE_BY = {"experiment", "seed", "versions"}
 EXTRA = {
     "Replay": {*MADE_BY, "cost", "effects", "error_free_run", "error_nominal", "model"},
@@ -213,20 +213,37 @@ EXTRA = {
     "Exported": {"logs", "of_each_log", "result", "schema", "versions"},
     "Inspection": {"coverage", "delays", "excitation"},
     "Finding": {"first_row"},
+    "Applied": {"result", "versions"},
+    "Explanation": {"diagnosis", "versions", "with", "without"},
+    "FeedbackDesign": {"versions"},
+    "Identification": {"versions"},
+    "InputDesign": {"versions"},
+    "OptimalDesign": {"versions"},
+}
+KINDS: dict[str, type[Open]] = {
+    "replay": gs.Replay,
+    "tune": gs.Tune,
+    "diagnosis": gs.Diagnosis,
+    "fidelity": gs.Exported,
+    "apply": gs.Applied,
+    "explain": gs.Explanation,
+    "identify": gs.Identification,
+    "design.input": gs.InputDesign,
+    "design.optimal": gs.OptimalDesign,
+    "design.feedback": gs.FeedbackDesign,
 }
 
 
 def test_the_dataclasses_know_what_is_described() -> None:
     known: dict[type[Open], set[str]] = {}
-    kinds = {"replay": gs.Replay, "tune": gs.Tune, "diagnosis": gs.Diagnosis, "fidelity": gs.Exported}
-    for name, kind in kinds.items():
+    for name, kind in KINDS.items():
         whole = read(f"{name}.schema.json")
         gather(kind, whole, whole, known)
     inspect = read("inspect.schema.json")
     gather(gs.Inspection, inspect["$defs"]["log"], inspect, known)
     left = {}
     for kind, keys in known.items():
-        fields = {field.name for field in dataclasses.fields(kind)} - OWN
+        fields = set(keys_of(kind).values()) - (OWN - keys)
         assert fields <= keys, kind
         left[kind.__name__] = keys - fields
     assert {name: keys for name, keys in left.items() if keys} == EXTRA
@@ -237,10 +254,11 @@ def gather(kind: type[Open], described: Schema, whole: Schema, known: dict[type[
     described, whole = resolved(described, whole)
     properties = described["properties"]
     known.setdefault(kind, set()).update(properties)
-    for name, hint in typing.get_type_hints(kind).items():
-        for inner in (hint, *typing.get_args(hint)):
-            if isinstance(inner, type) and issubclass(inner, Open) and name in properties:
-                value, place = resolved(properties[name], whole)
+    hints = typing.get_type_hints(kind)
+    for name, key in keys_of(kind).items():
+        for inner in (hints[name], *typing.get_args(hints[name])):
+            if isinstance(inner, type) and issubclass(inner, Open) and key in properties:
+                value, place = resolved(properties[key], whole)
                 gather(inner, value.get("items") or value.get("additionalProperties") or value, place, known)
 
 

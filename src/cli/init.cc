@@ -68,7 +68,8 @@ class Removed {
   std::string path_;
 };
 
-constexpr double kTried_s = 1;  // of the first log is replayed
+constexpr std::size_t kLookedAt = 8;  // logs, for the gains of servos
+constexpr double kTried_s = 1;        // of the first log is replayed
 
 // The first second of a recording.
 Recording Beginning(Recording recording) {
@@ -81,12 +82,13 @@ Recording Beginning(Recording recording) {
 }
 
 // The draft must hold for every log that was given, and move.
-Status Try(const std::string& experiment_path, const Log& log, const std::vector<std::string>& logs) {
+Status Try(const std::string& experiment_path, const std::vector<DraftLog>& read,
+           const std::vector<std::string>& logs) {
   GS_ASSIGN(const Experiment experiment, LoadExperiment(experiment_path));
   GS_ASSIGN(const std::shared_ptr<const Model> model, Model::Load(experiment));
-  GS_ASSIGN(Recording first, BindLog(experiment, log));
+  GS_ASSIGN(Recording first, BindLog(experiment, read.front().log));
   for (std::size_t i = 1; i < logs.size(); ++i) {
-    const auto loads = LoadRecording(experiment, logs[i]);
+    const auto loads = i < read.size() ? BindLog(experiment, read[i].log) : LoadRecording(experiment, logs[i]);
     if (!loads.ok()) return loads.error();
   }
   ThreadPool pool(1);
@@ -98,12 +100,12 @@ Status Try(const std::string& experiment_path, const Log& log, const std::vector
                .cure = "are units and signs right? Where gains are made up: say them by --servo kp=K,kd=D"};
 }
 
-Status TryDraft(const Draft& draft, const Log& log, const InitFlags& flags) {
+Status TryDraft(const Draft& draft, const std::vector<DraftLog>& logs, const InitFlags& flags) {
   GS_ASSIGN(const std::string path,
             TemporaryBeside((std::filesystem::temp_directory_path() / "gapscope-init").string()));
   const Removed removed(path);
   GS_RETURN_IF_ERROR(WriteFile(path, draft.Yaml(std::filesystem::absolute(flags.model).string())));
-  const Status tried = Try(path, log, flags.logs);
+  const Status tried = Try(path, logs, flags.logs);
   if (tried.ok()) return Ok();
   Error error = tried.error();
   error.what = "the draft does not replay: " + error.what;
@@ -118,10 +120,15 @@ Result<int> RunInit(const InitFlags& flags) {
   if (!flags.servo.empty()) {
     GS_ASSIGN(options.servo, ParseServo(flags.servo));
   }
-  GS_ASSIGN(const Log log, ReadLog(flags.logs.front(), {}));
-  GS_ASSIGN(const Timeline timeline, BuildTimeline(log, {}));
-  GS_ASSIGN(const Draft draft, DraftExperiment(flags.model, log, timeline, options));
-  GS_RETURN_IF_ERROR(TryDraft(draft, log, flags));
+  std::vector<DraftLog> logs;
+  for (const std::string& path : flags.logs) {
+    if (logs.size() == kLookedAt) break;
+    GS_ASSIGN(Log log, ReadLog(path, {}));
+    GS_ASSIGN(Timeline timeline, BuildTimeline(log, {}));
+    logs.push_back({std::move(log), std::move(timeline)});
+  }
+  GS_ASSIGN(const Draft draft, DraftExperiment(flags.model, logs, options));
+  GS_RETURN_IF_ERROR(TryDraft(draft, logs, flags));
   // The experiment names the model as seen from its own folder.
   const std::filesystem::path folder =
       flags.out.empty() ? std::filesystem::current_path() : std::filesystem::absolute(flags.out).parent_path();
@@ -154,7 +161,7 @@ Command InitCommand() {
                        .value = &flags->logs,
                        .stands_for = LogsNamed,
                        .required = true,
-                       .help = "Hardware logs; the first one is looked at",
+                       .help = "Hardware logs; the first one is looked at, for the gains of servos the first eight",
                        .more = "The draft is then tried on all of them. docs/reference/init.md tells how columns are "
                                "paired"},
                       {.flag = "--servo",

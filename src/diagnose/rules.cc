@@ -83,22 +83,28 @@ int BodyOf(const SignalSource& source, const mjModel& m) {
   return -1;
 }
 
-// Joints that are driven, also by a tendon, or that an equality ties to another.
-std::vector<char> AreLed(const mjModel& m) {
-  std::vector<char> led(static_cast<std::size_t>(m.njnt), 0);
+// Joints that are driven, also by a tendon.
+std::vector<char> AreDriven(const mjModel& m) {
+  std::vector<char> driven(static_cast<std::size_t>(m.njnt), 0);
   const DataPtr data(mj_makeData(&m));
   mj_forward(&m, data.get());
   for (int out = 0; out < m.nout; ++out) {
     for (int k = 0; k < data->moment_rownnz[out]; ++k)
-      led[static_cast<std::size_t>(m.dof_jntid[data->moment_colind[data->moment_rowadr[out] + k]])] = 1;
+      driven[static_cast<std::size_t>(m.dof_jntid[data->moment_colind[data->moment_rowadr[out] + k]])] = 1;
   }
-  for (int e = 0; e < m.neq; ++e) {
-    if (m.eq_type[e] != mjEQ_JOINT) continue;
-    for (const int joint : {m.eq_obj1id[e], m.eq_obj2id[e]}) {
-      if (joint >= 0) led[static_cast<std::size_t>(joint)] = 1;
+  return driven;
+}
+
+// Of two joints that an equality ties, one is known by the other; one that is tied to nothing else stands still.
+void AddTied(const mjModel& m, std::vector<char>* known) {
+  for (int round = 0; round < m.neq; ++round) {
+    for (int e = 0; e < m.neq; ++e) {
+      if (m.eq_type[e] != mjEQ_JOINT) continue;
+      char &first = (*known)[static_cast<std::size_t>(m.eq_obj1id[e])], still = 1;
+      char& second = m.eq_obj2id[e] < 0 ? still : (*known)[static_cast<std::size_t>(m.eq_obj2id[e])];
+      first = second = static_cast<char>(first || second);
     }
   }
-  return led;
 }
 
 // What the catalogue says of an effect in a richer one; null: it does not hold it. On the same place: a motor's
@@ -186,12 +192,15 @@ std::set<std::string> JointsOutOfSight(const Model& base, const std::vector<Reco
       for (; body > 0; body = m.body_parentid[body]) followed[static_cast<std::size_t>(body)] = 1;
     }
   }
-  const std::vector<char> led = AreLed(m);
+  std::vector<char> known = AreDriven(m);
+  for (int j = 0; j < m.njnt; ++j) {
+    if (followed[static_cast<std::size_t>(m.jnt_bodyid[j])]) known[static_cast<std::size_t>(j)] = 1;
+  }
+  AddTied(m, &known);
   std::set<std::string> joints;
   for (int j = 0; j < m.njnt; ++j) {
     const char* name = mj_id2name(&m, mjOBJ_JOINT, j);
-    if (name && !led[static_cast<std::size_t>(j)] && !followed[static_cast<std::size_t>(m.jnt_bodyid[j])])
-      joints.insert(name);
+    if (name && !known[static_cast<std::size_t>(j)]) joints.insert(name);
   }
   return joints;
 }

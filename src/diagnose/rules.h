@@ -39,8 +39,9 @@ struct LoggedSignals {
 LoggedSignals WhatIsLogged(const std::vector<Recording>& recordings);
 // Whether the effect is a sensor's whose signal no log has, or none that is scored.
 bool IsOfMissingSensor(const EffectUse& use, const Rig& rig, const LoggedSignals& logged);
-// Joints that nothing drives or ties to another joint, where neither their own motion nor that of anything they carry
-// is measured in any log. Where such a joint is when a window begins is a guess, which an effect on it would only mend.
+// Joints that nothing drives or ties to one that is known, where neither their own motion nor that of anything they
+// carry is measured in any log. Where such a joint is when a window begins is a guess, which an effect on it would only
+// mend.
 std::set<std::string> JointsOutOfSight(const Model& base, const std::vector<Recording>& recordings);
 // Whether the two are the same motion on such logs, whatever their fits cost: a late command and a late sensor where
 // that sensor is all that is measured, or where all commands, and all sensors, are late alike; Coulomb friction and

@@ -1,6 +1,7 @@
 #include "src/draft/draft.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <string_view>
 
@@ -31,11 +32,23 @@ std::vector<std::string> FloatingBases(const mjModel& m) {
   return names;
 }
 
+// Whether rows of the two can be taken together.
+bool AreAlike(const DraftLog& a, const DraftLog& b) {
+  constexpr double kAsFast = 0.01;  // of a step
+  const double step_s = a.timeline.median_step_s;
+  return std::ranges::equal(a.log.columns, b.log.columns, {}, &Column::name, &Column::name) &&
+         std::abs(b.timeline.median_step_s - step_s) <= kAsFast * step_s;
+}
+
 class Drafter {
  public:
-  Drafter(const mjModel& model, const Log& log, const Timeline& timeline, const DraftOptions& options)
-      : m_(model), timeline_(timeline), samples_(log, timeline), options_(options) {
-    guesses_ = GuessColumns(log, timeline, samples_);
+  Drafter(const mjModel& model, std::span<const DraftLog> logs, const DraftOptions& options)
+      : m_(model),
+        logs_(logs),
+        timeline_(logs.front().timeline),
+        samples_(logs.front().log, timeline_),
+        options_(options) {
+    guesses_ = GuessColumns(logs.front().log, timeline_, samples_);
     p_ = PairColumns(model, samples_, &guesses_);
     s_ = ScaleColumns(model, samples_, guesses_, p_);
     proposes_ = model.nactuator == 0 && !p_.actuators.empty();
@@ -84,7 +97,13 @@ class Drafter {
                             .certain = true};
       gains_.assign(p_.actuators.size(), said);
     } else {
-      gains_ = FitServos(m_, samples_, guesses_, p_, s_);
+      std::vector<Samples> further;
+      for (const DraftLog& other : logs_.subspan(1)) {
+        if (AreAlike(logs_.front(), other)) further.emplace_back(other.log, other.timeline);
+      }
+      std::vector<const Samples*> all{&samples_};
+      for (const Samples& samples : further) all.push_back(&samples);
+      gains_ = FitServos(m_, all, guesses_, p_, s_);
     }
     for (std::size_t a = 0; a < gains_.size(); ++a) {
       if (p_.actuators[a].wants != Quantity::kAngle) gains_[a].kp = 0;
@@ -212,6 +231,7 @@ class Drafter {
   }
 
   const mjModel& m_;
+  std::span<const DraftLog> logs_;
   const Timeline& timeline_;
   const Samples samples_;
   const DraftOptions& options_;
@@ -230,7 +250,7 @@ std::string Draft::Yaml(const std::string& model_text) const {
   return head + "model: " + Quote(model_text) + "\n" + body;
 }
 
-Result<Draft> DraftExperiment(const std::string& model_path, const Log& log, const Timeline& timeline,
+Result<Draft> DraftExperiment(const std::string& model_path, std::span<const DraftLog> logs,
                               const DraftOptions& options) {
   Experiment experiment;
   experiment.model_path = model_path;
@@ -245,7 +265,7 @@ Result<Draft> DraftExperiment(const std::string& model_path, const Log& log, con
                  .where = model_path,
                  .cure = "leave --servo out; their gains stand under 'parameters:'"};
   }
-  Result<Draft> draft = Drafter(rig->compiled(), log, timeline, options).Write(held);
+  Result<Draft> draft = Drafter(rig->compiled(), logs, options).Write(held);
   if (draft.ok()) return draft;
   Error error = draft.error();
   error.where = model_path;

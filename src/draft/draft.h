@@ -3,6 +3,7 @@
 #define GAPSCOPE_DRAFT_DRAFT_H_
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,11 @@ struct DraftOptions {
   std::optional<ServoSaid> servo;
 };
 
+struct DraftLog {
+  Log log;
+  Timeline timeline;
+};
+
 struct Draft {
   std::string head, body;           // of the YAML, before and after the model's path
   std::vector<std::string> unsure;  // one sentence per guess that the user should check; they stand in the file too
@@ -31,9 +37,10 @@ struct Draft {
 };
 
 // Pairs columns with joints and actuators (pairing.h), finds units and signs (scaling.h), proposes actuators for an
-// MJCF without any, holds floating bases, and proposes parameters with bounds. Errors: the MJCF does not load, it has
-// no hinge or slide joint, no column pairs with any joint.
-Result<Draft> DraftExperiment(const std::string& model_path, const Log& log, const Timeline& timeline,
+// MJCF without any, holds floating bases, and proposes parameters with bounds. The first log is looked at (`logs` must
+// outlive the call and have one); servos' gains are of all that have its columns and its step. Errors: the MJCF does
+// not load, it has no hinge or slide joint, no column pairs with any joint.
+Result<Draft> DraftExperiment(const std::string& model_path, std::span<const DraftLog> logs,
                               const DraftOptions& options);
 
 }  // namespace gapscope

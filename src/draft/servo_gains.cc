@@ -17,16 +17,20 @@ constexpr double kExplains = 0.8, kKnown = 0.2;
 constexpr double kLatest_s = 0.08, kLagStep_s = 0.004;  // of a command
 constexpr double kMadeUp_hz = 5, kDroop_rad = 0.1;
 
-// Angle, speed and acceleration of every joint of the pairing at the sampled rows, SI; empty: not measured.
+// Angle, speed and acceleration of every joint of the pairing at the sampled rows, log after log, SI; empty: not
+// measured.
 using Motions = std::vector<std::vector<Samples::Motion>>;
 
-Motions MotionsOf(const Samples& samples, const std::vector<Guess>& guesses, const Pairing& p, const Scalings& s) {
+Motions MotionsOf(const std::vector<const Samples*>& logs, const std::vector<Guess>& guesses, const Pairing& p,
+                  const Scalings& s) {
   Motions motions(p.joints.size());
   for (std::size_t j = 0; j < p.joints.size(); ++j) {
     if (p.positions[j].column < 0) continue;
-    motions[j] = samples.MotionOf(guesses[p.positions[j].column].column, kHalfWidth_s);
     const double factor = s.positions[j].factor;
-    for (auto& m : motions[j]) m = {factor * m.value, factor * m.slope, factor * m.curvature};
+    for (const Samples* log : logs) {
+      for (const auto& m : log->MotionOf(guesses[p.positions[j].column].column, kHalfWidth_s))
+        motions[j].push_back({factor * m.value, factor * m.slope, factor * m.curvature});
+    }
   }
   return motions;
 }
@@ -126,10 +130,10 @@ std::string Percent(double share) { return std::to_string(std::lround(100 * shar
 
 class Fitter {
  public:
-  Fitter(const mjModel& model, const Samples& samples, const std::vector<Guess>& guesses, const Pairing& pairing,
-         const Scalings& scalings)
-      : m_(model), samples_(samples), guesses_(guesses), p_(pairing), s_(scalings) {
-    motions_ = MotionsOf(samples, guesses, pairing, scalings);
+  Fitter(const mjModel& model, const std::vector<const Samples*>& logs, const std::vector<Guess>& guesses,
+         const Pairing& pairing, const Scalings& scalings)
+      : m_(model), logs_(logs), guesses_(guesses), p_(pairing), s_(scalings) {
+    motions_ = MotionsOf(logs, guesses, pairing, scalings);
     torques_ = TorquesOf(model, pairing, motions_);
   }
 
@@ -157,8 +161,11 @@ class Fitter {
  private:
   // `late`: as it was so many rows earlier.
   std::vector<double> InSi(const Pick& pick, const Scaling& scaling, int late = 0) const {
-    std::vector<double> values = samples_.values_before(guesses_[pick.column].column, late);
-    for (double& v : values) v = scaling.factor * v + scaling.add;
+    std::vector<double> values;
+    for (const Samples* log : logs_) {
+      for (const double v : log->values_before(guesses_[pick.column].column, late))
+        values.push_back(scaling.factor * v + scaling.add);
+    }
     return values;
   }
 
@@ -193,7 +200,7 @@ class Fitter {
   // A command may act late; the lateness that explains most is taken.
   std::optional<Fit> Best(std::size_t a, const std::vector<double>& torque, const std::vector<Term>& terms) const {
     std::optional<Fit> best;
-    for (const int late : samples_.Lags(kLatest_s, kLagStep_s)) {
+    for (const int late : logs_.front()->Lags(kLatest_s, kLagStep_s)) {
       const auto fit = FitLaw(Of(a, torque, late), terms);
       if (!fit || (best && fit->explained <= best->explained)) continue;
       best = fit;
@@ -237,7 +244,7 @@ class Fitter {
   }
 
   const mjModel& m_;
-  const Samples& samples_;
+  const std::vector<const Samples*>& logs_;
   const std::vector<Guess>& guesses_;
   const Pairing& p_;
   const Scalings& s_;
@@ -247,9 +254,9 @@ class Fitter {
 
 }  // namespace
 
-std::vector<ServoGains> FitServos(const mjModel& model, const Samples& samples, const std::vector<Guess>& guesses,
-                                  const Pairing& pairing, const Scalings& scalings) {
-  const Fitter fitter(model, samples, guesses, pairing, scalings);
+std::vector<ServoGains> FitServos(const mjModel& model, const std::vector<const Samples*>& logs,
+                                  const std::vector<Guess>& guesses, const Pairing& pairing, const Scalings& scalings) {
+  const Fitter fitter(model, logs, guesses, pairing, scalings);
   std::vector<ServoGains> gains;
   gains.reserve(pairing.actuators.size());
   for (std::size_t a = 0; a < pairing.actuators.size(); ++a) gains.push_back(fitter.Gains(a));

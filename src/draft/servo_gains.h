@@ -26,9 +26,9 @@ struct ServoGains {
 // alone. torque = kp (target - angle) - kd speed + c is fitted by least squares; of the torque that the motion takes
 // friction and an armature are left to the servo. A fit counts that explains 80 % of the torque's variance with kp
 // known to a fifth. Else gains are made up: 5 Hz, critically damped, and stiff enough that gravity bends the joint by
-// less than 0.1 rad.
-std::vector<ServoGains> FitServos(const mjModel& model, const Samples& samples, const std::vector<Guess>& guesses,
-                                  const Pairing& pairing, const Scalings& scalings);
+// less than 0.1 rad. `logs`: one or more with the same columns and step.
+std::vector<ServoGains> FitServos(const mjModel& model, const std::vector<const Samples*>& logs,
+                                  const std::vector<Guess>& guesses, const Pairing& pairing, const Scalings& scalings);
 
 // A servo turns a rotor that an MJCF of bodies alone leaves out. Without it, light links under stiff servos are more
 // than a time step can follow: such joints get as much armature as makes them slow enough.

@@ -188,7 +188,8 @@ TEST(RulesTest, ASensorThatIsNotLoggedHasNoEffect) {
   EXPECT_FALSE(IsOfMissingSensor({"command_delay", "motor"}, known, logged));
 }
 
-// A servo's arm with a gripper whose one finger is tied to the other and the third is free, and a loose tip.
+// A servo's arm with a gripper whose one finger is tied to the other, two that are only tied to each other, one that is
+// free, and a loose tip.
 TEST(RulesTest, JointsThatNothingMeasuredFollowsAreOutOfSight) {
   const auto slide = [](const std::string& name) {
     return "<body><joint name='" + name + "' type='slide'/><geom size='0.01'/></body>";
@@ -196,8 +197,9 @@ TEST(RulesTest, JointsThatNothingMeasuredFollowsAreOutOfSight) {
   const std::string tip = "<body name='tip'><joint name='tip'/><geom size='0.01'/><site name='imu'/></body>";
   const std::string mjcf =
       "<mujoco><worldbody><body><joint name='base'/><geom size='0.1'/><body><joint name='arm'/><geom size='0.1'/>" +
-      slide("left") + slide("right") + slide("free") + tip +
-      "</body></body></worldbody><equality><joint joint1='left' joint2='right'/></equality>"
+      slide("left") + slide("right") + slide("a") + slide("b") + slide("free") + tip +
+      "</body></body></worldbody><equality><joint joint1='left' joint2='right'/><joint joint1='a' "
+      "joint2='b'/></equality>"
       "<tendon><fixed name='cord'><joint joint='right' coef='1'/></fixed></tendon>"
       "<actuator><motor name='arm' joint='arm'/><motor name='grip' tendon='cord'/></actuator>"
       "<sensor><gyro name='imu' site='imu'/></sensor></mujoco>";
@@ -208,12 +210,13 @@ TEST(RulesTest, JointsThatNothingMeasuredFollowsAreOutOfSight) {
     return JointsOutOfSight(*model, {MakeRecording(experiment, 10, 0.01, {})});
   };
   using Joints = std::set<std::string>;
-  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: arm, unit: rad}"), (Joints{"free", "tip"}))
+  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: arm, unit: rad}"), (Joints{"a", "b", "free", "tip"}))
       << "the base carries the arm, the fingers are driven or tied to one that is";
-  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: base, unit: rad}"), (Joints{"free", "tip"}));
-  EXPECT_EQ(out_of_sight("{signal: w, columns_of_elements: [x, y, z], sensor: imu, unit: rad/s}"), (Joints{"free"}));
+  EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: base, unit: rad}"), (Joints{"a", "b", "free", "tip"}));
+  EXPECT_EQ(out_of_sight("{signal: w, columns_of_elements: [x, y, z], sensor: imu, unit: rad/s}"),
+            (Joints{"a", "b", "free"}));
   EXPECT_EQ(out_of_sight("{signal: q, column: q, joint: tip, unit: rad}, {signal: f, column: f, joint: free, unit: m}"),
-            Joints{});
+            (Joints{"a", "b"}));
 }
 
 TEST(RulesTest, AConstantSupplyIsNoSecondCommand) {

@@ -75,9 +75,11 @@ inline std::vector<double> Times(std::vector<double> values, double factor, doub
 
 class DraftBench : public ::testing::Test {
  protected:
-  // The draft of a log with these columns, read back as an experiment. Fails the test when there is none.
-  Experiment Drafted(const std::string& mjcf, const std::vector<Named>& columns, const DraftOptions& options = {}) {
-    const auto draft = TryDraft(mjcf, columns, options);
+  // The draft of a log with these columns, and maybe of a second one, read back as an experiment. Fails the test when
+  // there is none.
+  Experiment Drafted(const std::string& mjcf, const std::vector<Named>& columns, const DraftOptions& options = {},
+                     const std::vector<Named>& second = {}) {
+    const auto draft = TryDraft(mjcf, columns, options, second);
     EXPECT_TRUE(draft.ok()) << (draft.ok() ? "" : draft.error().Text());
     if (!draft.ok()) return {};
     unsure_ = draft.value().unsure;
@@ -87,13 +89,19 @@ class DraftBench : public ::testing::Test {
     return loaded.ok() ? loaded.value() : Experiment{};
   }
 
-  Result<Draft> TryDraft(const std::string& mjcf, const std::vector<Named>& columns, const DraftOptions& options = {}) {
+  Result<Draft> TryDraft(const std::string& mjcf, const std::vector<Named>& first, const DraftOptions& options = {},
+                         const std::vector<Named>& second = {}) {
     const std::string model = scratch_.Write("robot.xml", mjcf);
-    Log log;
-    log.path = "log.csv";
-    for (const auto& [name, values] : columns) log.columns.push_back({name, "", values});
-    GS_ASSIGN(const Timeline timeline, BuildTimeline(log, {}));
-    return DraftExperiment(model, log, timeline, options);
+    std::vector<DraftLog> logs;
+    for (const std::vector<Named>& columns : {first, second}) {
+      if (columns.empty()) continue;
+      Log log;
+      log.path = "log.csv";
+      for (const auto& [name, values] : columns) log.columns.push_back({name, "", values});
+      GS_ASSIGN(Timeline timeline, BuildTimeline(log, {}));
+      logs.push_back({std::move(log), std::move(timeline)});
+    }
+    return DraftExperiment(model, logs, options);
   }
 
   // Of what the draft says of a joint or an actuator; null: nothing.

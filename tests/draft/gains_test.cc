@@ -70,6 +70,25 @@ TEST_F(GainsTest, AreMadeUpAndMarkedWhereTheLogDoesNotTell) {
   EXPECT_TRUE(IsUnsure("made up")) << text_;
 }
 
+// Of a first log that is too short for it another tells, if it has the same columns.
+TEST_F(GainsTest, AreOfAllLogsThatAreAlike) {
+  const auto columns = [](const Motion& m, const std::string& angle) {
+    return std::vector<Named>{{"time", m.time_s}, {"q_des", m.target}, {angle, m.angle}};
+  };
+  const Motion brief = Move(0, kGainsKp, kGainsKd, {.rows = 45}), whole = Move(0, kGainsKp, kGainsKd);
+  const auto kp = [&](const std::vector<Named>& second) {
+    const Experiment e = Drafted(Bars({"hip"}), columns(brief, "q"), {}, second);
+    const AddedActuator* a = Added(e, "hip");
+    EXPECT_NE(a, nullptr) << text_;
+    return a ? a->kp : 0;
+  };
+  kp({});
+  EXPECT_TRUE(IsUnsure("made up")) << text_;
+  EXPECT_NEAR(kp(columns(whole, "q")), kGainsKp, kWithin * kGainsKp);
+  kp(columns(whole, "angle"));
+  EXPECT_TRUE(IsUnsure("made up")) << text_;
+}
+
 TEST_F(GainsTest, AsTheUserSaysThem) {
   const Motion m = Move(0, kGainsKp, kGainsKd);
   const DraftOptions said{.servo = ServoSaid{.kp = 17, .kd = 0.4, .limit = 3, .armature = 0.01}};

@@ -102,6 +102,8 @@ struct ShareOfGap {
 
 // The rule of an effect that no replay ran through with.
 inline constexpr char kNotSimulated[] = "the model with it cannot be simulated at this time step";
+// The rule of an effect that by its columns is worth a fit, and got none.
+inline constexpr char kNotTried[] = "the budget ended before it was tried";
 // The rule of an effect on a joint that is out of sight (JointsOutOfSight).
 inline constexpr char kOutOfSight[] = "nothing that is measured follows the joint or what it carries; log its angle";
 

@@ -52,7 +52,11 @@ std::string RetunedText(const Diagnosis& d) {
 
 std::string EarlyEnd(const Diagnosis& d) {
   if (d.interrupted) return " It was interrupted: this is the best so far.";
-  return d.cut.empty() ? "" : " The budget ended the search early.";
+  if (d.cut.empty()) return "";
+  const auto left = std::ranges::count(d.statements, kNotTried, &Statement::rule);
+  return left == 0 ? " The budget ended the search early."
+                   : fmt::format(" The budget ended the search early: {} that may explain something was not tried.",
+                                 left == 1 ? "one effect" : fmt::format("each of {} effects", left));
 }
 
 // Of several signals: how much each one misses.

@@ -336,12 +336,45 @@ class Judging {
     result->statements.push_back(std::move(other));
   }
 
+  // The trial of the use that explains most beside others; the end of the table's where it has none.
+  std::size_t BestTrial(const EffectUse& use, std::vector<std::size_t> beside) const {
+    const ColumnTable& table = found_.columns;
+    std::size_t best = table.trials.size();
+    double least = kInfinity;
+    beside.push_back(best);
+    for (std::size_t t = 0; t < table.trials.size(); ++t) {
+      if (table.trials[t].use != use) continue;
+      beside.back() = t;
+      if (const double cost = SetCost(table, beside); cost < least) least = cost, best = t;
+    }
+    return best;
+  }
+
+  // Whether the search ended before a fit of the use that its columns promise something of, beside the final set's.
+  bool WasNotReached(const EffectUse& use) const {
+    const ColumnTable& table = found_.columns;
+    const auto fitted = [&](const Candidate* candidate) { return Has(candidate->effects, use); };
+    if (found_.cut.empty() || std::ranges::any_of(found_.ledger.All(), fitted)) return false;
+    std::vector<std::size_t> set;
+    const auto add = [&](const EffectUse& added) {
+      if (const std::size_t t = BestTrial(added, set); t < table.trials.size()) set.push_back(t);
+    };
+    for (const EffectUse& member : found_.chosen->effects) add(member);
+    const double without = SetCost(table, set);
+    add(use);
+    return std::log(without / SetCost(table, set)) >= kDiagnosePolicy.search.promise;
+  }
+
   // Effects that were looked at and did not enter the set.
   void AddOthers(Judgement* result) {
     const ColumnTable& table = found_.columns;
     if (!table.valid) return;  // nothing was looked at
     for (const EffectUse& use : found_.uses) {
       if (FindTold(use, result)) continue;
+      if (WasNotReached(use)) {
+        result->statements.push_back({.use = use, .answer = Answer::kUnseen, .prior = PriorOf(use), .rule = kNotTried});
+        continue;
+      }
       bool tried = false;
       double seen = 0, moved = 0;
       for (std::size_t t = 0; t < table.trials.size(); ++t) {

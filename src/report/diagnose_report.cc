@@ -166,9 +166,9 @@ std::string StatementTable(const Diagnosis& d) {
     text += fmt::format("{:>2} {:<34} {:<8} {:>11.2f}  {}: gains {:.2f}, held out {:.2f}\n", i + 1, s.use.Text(),
                         AnswerName(s.answer), s.probability, s.rule, n.gain, n.gain_held_out);
   }
-  text += fmt::format("{} more gain too little, {} cannot be seen in these logs\n", absent, unseen_count);
+  text += fmt::format("{} more gain too little, {} cannot be told\n", absent, unseen_count);
   for (const auto& [why, uses] : unseen)
-    text += Wrapped(fmt::format("cannot be seen: {}; {}", fmt::join(uses, ", "), why), 120, "  ") + "\n";
+    text += Wrapped(fmt::format("cannot be told: {}; {}", fmt::join(uses, ", "), why), 120, "  ") + "\n";
   if (!bounds.empty()) {
     const char* more = absent > kMostBounds ? ", ... (--json: all)" : "";
     text += Wrapped("at most (of a limit or a compliance: at least; 95 %): " + bounds + more, 120, "  ") + "\n";

@@ -27,7 +27,7 @@ using Table = PageContent::Table;
 std::string TitleOf(const Statement& s) {
   const char* is = s.answer == Answer::kPresent  ? "is present"
                    : s.answer == Answer::kAbsent ? "is not told as present"
-                                                 : "cannot be seen in these logs";
+                                                 : "cannot be told";
   std::string title = fmt::format("{} {}", Words(s.use), is);
   title[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(title[0])));
   return title;

@@ -113,6 +113,19 @@ TEST(DiagnoseTest, WhatIsKnownIsInTheBaseModel) {
   EXPECT_LT(d.refit, 0.3 * d.nominal);
 }
 
+TEST(DiagnoseTest, WhatTheBudgetDidNotReachIsNotAbsent) {
+  const Logs logs = MakeLogs("flexlink", twin::Kind::kSingle, "torque_bias@hub", 31);
+  ThreadPool pool(2);
+  const auto d =
+      Diagnose(logs.experiment, SplitData(logs.recordings, {}), {.budget_s = 1e-3, .next_experiment = false}, pool);
+  ASSERT_TRUE(d.ok()) << d.error().Text();
+  const auto found = std::ranges::find(d.value().statements, EffectUse{"torque_bias", "hub"}, &Statement::use);
+  ASSERT_NE(found, d.value().statements.end());
+  EXPECT_EQ(found->answer, Answer::kUnseen);
+  EXPECT_EQ(found->rule, kNotTried);
+  EXPECT_NE(d.value().explanation.find("was not tried"), std::string::npos) << d.value().explanation;
+}
+
 TEST(DiagnoseTest, NamesATorqueSpeedCurve) {
   const Logs logs = MakeLogs("qube", twin::Kind::kSingle, "torque_speed_curve@motor", 32);
   const Diagnosis d = DiagnoseLogs(logs);

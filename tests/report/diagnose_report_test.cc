@@ -51,7 +51,7 @@ TEST(DiagnoseReportTest, UnknownSaysWhereTheGapLies) {
       << text;
 }
 
-// What cannot be seen is named, with the reason and the input that would show it.
+// What cannot be told is named, with the reason and the input that would show it.
 TEST(DiagnoseReportTest, SaysWhatCannotBeSeen) {
   Diagnosis d = Unfinished();
   const std::string why = "these logs do not move what it acts on";
@@ -60,9 +60,9 @@ TEST(DiagnoseReportTest, SaysWhatCannotBeSeen) {
                   {.use = {"my_own", "motor"}, .answer = Answer::kUnseen, .rule = why}};
   const std::string page = ToTable(DiagnoseRun{.info = {}, .diagnosis = d});
   for (const char* said :
-       {"3 cannot be seen in these logs", "cannot be seen: backlash@arm; the model with it cannot be simulated",
-        "cannot be seen: dead_zone@motor; these logs do not move what it acts on; what would show it: ",
-        "cannot be seen: my_own@motor; these logs do not move what it acts on\n"})
+       {"3 cannot be told", "cannot be told: backlash@arm; the model with it cannot be simulated",
+        "cannot be told: dead_zone@motor; these logs do not move what it acts on; what would show it: ",
+        "cannot be told: my_own@motor; these logs do not move what it acts on\n"})
     EXPECT_NE(page.find(said), std::string::npos) << said << "\n" << page;
 }
 

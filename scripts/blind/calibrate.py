@@ -20,8 +20,16 @@ import statements  # noqa: E402
 PRIOR = (0.0, 2.0)
 KNOWN = {"constant": (-3.65, 0.5), "log_discrepancy": (1.11, 0.5), "smooth": (-2.21, 0.5),
          "clear": (0.0, 1.0), "dry": (0.0, 1.5)}  # weights by mean and deviation; the constant where mimicry is 0
-DERIVED = {  # as ProbabilityOf in src/diagnose/judge.cc has them
-    "largest_gain": lambda n: max(n[k] for k in ("gain", "gain_held_out", "gain_free") if n[k] is not None),
+MEMBER = 0.03  # search.member of the policy
+
+
+def largest_gain(n):
+    unseen = [n[k] for k in ("gain_held_out", "gain_free") if n[k] is not None]
+    return max(unseen) if unseen and max(unseen) < MEMBER else max([n["gain"], *unseen])
+
+
+DERIVED = {  # as src/diagnose/probability.cc has them
+    "largest_gain": largest_gain,
     "log_discrepancy": lambda n: math.copysign(math.log1p(abs(n["discrepancy"])), n["discrepancy"]),
 }
 

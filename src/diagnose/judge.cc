@@ -137,11 +137,6 @@ class Judging {
     }
   }
 
-  // Whether nothing that was not fitted shows it: what each effect of the set must gain, it gains on fitted logs alone.
-  static bool IsUnconfirmed(const StatementNumbers& numbers) {
-    return std::max(numbers.gain_held_out, numbers.gain_free) < kDiagnosePolicy.search.member;
-  }
-
   // The one that helps least on held-out logs of those that the set can do without; what is left is then chosen. The
   // last one stays, unsure or not, unless it is unconfirmed.
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {

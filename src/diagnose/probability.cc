@@ -8,12 +8,27 @@
 
 namespace gapscope {
 
-double LargestGain(const StatementNumbers& n) {
+namespace {
+
+// On what was not fitted; minus infinity: it tells nothing.
+double UnseenGain(const StatementNumbers& n) {
   double gain = -kInfinity;
-  for (const double one : {n.gain, n.gain_held_out, n.gain_free}) {
+  for (const double one : {n.gain_held_out, n.gain_free}) {
     if (std::isfinite(one)) gain = std::max(gain, one);
   }
   return gain;
+}
+
+}  // namespace
+
+bool IsUnconfirmed(const StatementNumbers& n) {
+  const double unseen = UnseenGain(n);
+  return std::isfinite(unseen) && unseen < kDiagnosePolicy.search.member;
+}
+
+double LargestGain(const StatementNumbers& n) {
+  const double unseen = UnseenGain(n);
+  return IsUnconfirmed(n) || !std::isfinite(n.gain) ? unseen : std::max(n.gain, unseen);
 }
 
 std::vector<EvidenceTerm> EvidenceTermsOf(const StatementNumbers& n) {

@@ -16,7 +16,10 @@ struct EvidenceTerm {
   double weight = 0;
   double Adds() const { return weight * counted; }
 };
-// The largest of the three gains: an effect that is there shows most where its absence adds up.
+// Whether nothing that was not fitted shows it: what each effect of the set must gain, it gains on fitted logs alone.
+bool IsUnconfirmed(const StatementNumbers& numbers);
+// The largest of the three gains: an effect that is there shows most where its absence adds up. What is gained on
+// fitted logs does not count where it is unconfirmed.
 double LargestGain(const StatementNumbers& numbers);
 // All terms, the constant first.
 std::vector<EvidenceTerm> EvidenceTermsOf(const StatementNumbers& numbers);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
+#include "src/diagnose/policy.h"
 #include "src/diagnose/probability.h"
 
 namespace gapscope {
@@ -45,6 +46,18 @@ TEST(ProbabilityTest, TheLargestGainCounts) {
   StatementNumbers numbers = kClear;
   numbers.gain = numbers.gain_held_out = 0.1;
   EXPECT_EQ(ProbabilityOf(numbers), ProbabilityOf(kClear));
+}
+
+// What a fit gains on its own logs alone is no evidence.
+TEST(ProbabilityTest, WhatNothingUnseenConfirmsDoesNotCount) {
+  StatementNumbers numbers = kClear;
+  numbers.gain = 6, numbers.gain_held_out = -3, numbers.gain_free = kNaN;
+  EXPECT_TRUE(IsUnconfirmed(numbers));
+  EXPECT_EQ(LargestGain(numbers), -3);
+  EXPECT_LT(ProbabilityOf(numbers), kDiagnosePolicy.probability.present);
+  numbers.gain_free = 0.5;
+  EXPECT_FALSE(IsUnconfirmed(numbers));
+  EXPECT_EQ(LargestGain(numbers), 6);
 }
 
 // Free runs that lose the motion either way tell nothing.

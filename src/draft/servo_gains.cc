@@ -78,8 +78,10 @@ struct Rows {
   std::vector<double> stretch, speed, acceleration, torque;
 };
 
+constexpr double kStill = 0.05;  // rad/s, below which friction has no clear sign
+constexpr std::size_t kFewestRows = 50;
+
 double TermAt(const Rows& rows, Term term, std::size_t k) {
-  constexpr double kStill = 0.05;  // rad/s, below which friction has no clear sign
   return term == kDamping    ? -rows.speed[k]
          : term == kArmature ? -rows.acceleration[k]
                              : -std::tanh(rows.speed[k] / kStill);
@@ -87,14 +89,22 @@ double TermAt(const Rows& rows, Term term, std::size_t k) {
 
 enum class Signs { kRight, kAny };  // terms with the wrong sign are left out, or not
 
+// Rows that a fit can use. A joint that rubs bears any load while it stands still: where enough rows move, only those.
+std::vector<std::size_t> UsedRows(const Rows& rows, bool rubs) {
+  std::vector<std::size_t> all, moving;
+  for (std::size_t k = 0; k < rows.torque.size(); ++k) {
+    if (!std::isfinite(rows.stretch[k] + rows.speed[k] + rows.acceleration[k] + rows.torque[k])) continue;
+    all.push_back(k);
+    if (std::abs(rows.speed[k]) > kStill) moving.push_back(k);
+  }
+  return rubs && moving.size() >= kFewestRows ? moving : all;
+}
+
 // By least squares.
 std::optional<Fit> FitLaw(const Rows& rows, std::vector<Term> terms, Signs signs = Signs::kRight) {
-  std::vector<std::size_t> used;
-  for (std::size_t k = 0; k < rows.torque.size(); ++k) {
-    if (std::isfinite(rows.stretch[k] + rows.speed[k] + rows.acceleration[k] + rows.torque[k])) used.push_back(k);
-  }
+  const std::vector<std::size_t> used = UsedRows(rows, std::ranges::find(terms, kFriction) != terms.end());
   const auto columns = static_cast<Eigen::Index>(2 + terms.size());
-  if (used.size() < 50) return std::nullopt;
+  if (used.size() < kFewestRows) return std::nullopt;
   Eigen::MatrixXd x(used.size(), columns);
   Eigen::VectorXd y(used.size());
   for (Eigen::Index i = 0; i < y.size(); ++i) {

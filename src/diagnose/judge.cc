@@ -345,18 +345,24 @@ class Judging {
     return best;
   }
 
-  // Whether the search ended before a fit of the use that its columns promise something of, beside the final set's.
-  bool WasNotReached(const EffectUse& use) const {
+  // Trials that stand for the final set.
+  std::vector<std::size_t> TrialsOfSet() const {
+    std::vector<std::size_t> trials;
+    for (const EffectUse& member : found_.chosen->effects) {
+      if (const std::size_t t = BestTrial(member, trials); t < found_.columns.trials.size()) trials.push_back(t);
+    }
+    return trials;
+  }
+
+  // Whether the search ended before a fit of the use that its columns promise something of, beside the set's trials.
+  bool WasNotReached(const EffectUse& use, std::vector<std::size_t> set) const {
     const ColumnTable& table = found_.columns;
     const auto fitted = [&](const Candidate* candidate) { return Has(candidate->effects, use); };
     if (found_.cut.empty() || std::ranges::any_of(found_.ledger.All(), fitted)) return false;
-    std::vector<std::size_t> set;
-    const auto add = [&](const EffectUse& added) {
-      if (const std::size_t t = BestTrial(added, set); t < table.trials.size()) set.push_back(t);
-    };
-    for (const EffectUse& member : found_.chosen->effects) add(member);
+    const std::size_t t = BestTrial(use, set);
+    if (t == table.trials.size()) return false;
     const double without = SetCost(table, set);
-    add(use);
+    set.push_back(t);
     return std::log(without / SetCost(table, set)) >= kDiagnosePolicy.search.promise;
   }
 
@@ -364,9 +370,10 @@ class Judging {
   void AddOthers(Judgement* result) {
     const ColumnTable& table = found_.columns;
     if (!table.valid) return;  // nothing was looked at
+    const std::vector<std::size_t> set = TrialsOfSet();
     for (const EffectUse& use : found_.uses) {
       if (FindTold(use, result)) continue;
-      if (WasNotReached(use)) {
+      if (WasNotReached(use, set)) {
         result->statements.push_back({.use = use, .answer = Answer::kUnseen, .prior = PriorOf(use), .rule = kNotTried});
         continue;
       }

@@ -220,10 +220,17 @@ class Fitter {
   }
 
   // Where nothing but inertia resists, gains and rotor are known up to one factor: a rotor that may take away from the
-  // link's inertia takes the gains with it. Gravity, or a rotor that shows, says how large they are.
+  // link's inertia takes the gains with it. Gravity, or a rotor without which the fit is worse, says how large they
+  // are.
   bool ScaleIsKnown(std::size_t a, const Fit& fit) const {
-    const auto free = FitLaw(Of(a, torques_[p_.actuators[a].joint], fit.late), kServo, Signs::kAny);
-    return free && std::abs(free->kp - fit.kp) < kKnown * fit.kp;
+    constexpr double kAsWell = 2;  // of what the fit leaves: noise of the acceleration is on both sides of it
+    const Rows rows = Of(a, torques_[p_.actuators[a].joint], fit.late);
+    const auto free = FitLaw(rows, kServo, Signs::kAny), bare = FitLaw(rows, {kDamping, kFriction});
+    const auto agrees = [&](const std::optional<Fit>& other) {
+      return other && std::abs(other->kp - fit.kp) < kKnown * fit.kp;
+    };
+    const bool as_well = bare && 1 - bare->explained <= kAsWell * (1 - fit.explained);
+    return agrees(free) && (!as_well || agrees(bare));
   }
 
   Rows Of(std::size_t a, const std::vector<double>& torque, int late) const {

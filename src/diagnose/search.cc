@@ -132,10 +132,26 @@ class Searcher {
     });
   }
 
+  // Whether one of the effects holds another: that one is no companion but what the richer one says without it.
+  bool RepeatsItself(const std::vector<EffectUse>& effects) const {
+    return std::ranges::any_of(effects, [&](const EffectUse& richer) {
+      return std::ranges::any_of(effects, [&](const EffectUse& simpler) {
+        return richer != simpler && Contains(richer, simpler, *bench_.rig);
+      });
+    });
+  }
+
   // Refits the best sets of each size on top of the parent, where arithmetic promises enough.
   void RefitSets(const Candidate& parent, const ColumnTable& table, const std::vector<std::size_t>& counts) {
     auto levels = BeamSearch(table, counts.size(), kPolicy.beam);
-    for (auto& level : levels) GiveWay(parent, table, &level);
+    for (auto& level : levels) {
+      std::erase_if(level, [&](const TrialSet& set) {
+        std::vector<EffectUse> all = UsesOf(table, set);
+        all.insert(all.end(), parent.effects.begin(), parent.effects.end());
+        return RepeatsItself(all);
+      });
+      GiveWay(parent, table, &level);
+    }
     double best = table.cost;
     std::vector<Candidate*> tasted;
     if (const TrialSet set = OneInEachLimb(parent, table, levels.front());
@@ -219,10 +235,9 @@ class Searcher {
       if (one->effects.size() != 1 || Gain(*result_.base, *one) < kPolicy.promise) return true;
       const EffectUse& use = one->effects.front();
       const EffectSet both = With(leader.effects, use);
-      return Has(leader.effects, use) || result_.ledger.Find(both) ||
+      return Has(leader.effects, use) || result_.ledger.Find(both) || RepeatsItself(both) ||
              std::any_of(leader.effects.begin(), leader.effects.end(), [&](const EffectUse& member) {
-               return Contains(use, member, *bench_.rig) || Contains(member, use, *bench_.rig) ||
-                      AreOneMotion(use, member, *result_.base->model, result_.logged);
+               return AreOneMotion(use, member, *result_.base->model, result_.logged);
              });
     });
     std::stable_sort(alone.begin(), alone.end(),
@@ -342,7 +357,8 @@ class Searcher {
     const ColumnTable& table = result_.columns;
     std::vector<std::pair<double, EffectUse>> ranked;
     for (const EffectUse& use : result_.uses) {
-      if (Has(result_.chosen->effects, use)) continue;
+      if (Has(result_.chosen->effects, use) || RepeatsItself(With(Without(result_.chosen->effects, member.use), use)))
+        continue;
       const bool one = AreOneMotion(use, member.use, *result_.base->model, result_.logged) ||
                        Contains(member.use, use, *bench_.rig) || Contains(use, member.use, *bench_.rig);
       double most = one ? 1 : 0;

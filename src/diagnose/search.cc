@@ -132,11 +132,11 @@ class Searcher {
     });
   }
 
-  // Whether one of the effects holds another: that one is no companion but what the richer one says without it.
+  // Whether one of the effects holds another exactly: that one is no companion but what the richer one says itself.
   bool RepeatsItself(const std::vector<EffectUse>& effects) const {
     return std::ranges::any_of(effects, [&](const EffectUse& richer) {
       return std::ranges::any_of(effects, [&](const EffectUse& simpler) {
-        return richer != simpler && Contains(richer, simpler, *bench_.rig);
+        return richer != simpler && Contains(richer, simpler, *bench_.rig, true);
       });
     });
   }
@@ -235,9 +235,10 @@ class Searcher {
       if (one->effects.size() != 1 || Gain(*result_.base, *one) < kPolicy.promise) return true;
       const EffectUse& use = one->effects.front();
       const EffectSet both = With(leader.effects, use);
-      return Has(leader.effects, use) || result_.ledger.Find(both) || RepeatsItself(both) ||
+      return Has(leader.effects, use) || result_.ledger.Find(both) ||
              std::any_of(leader.effects.begin(), leader.effects.end(), [&](const EffectUse& member) {
-               return AreOneMotion(use, member, *result_.base->model, result_.logged);
+               return Contains(use, member, *bench_.rig) || Contains(member, use, *bench_.rig) ||
+                      AreOneMotion(use, member, *result_.base->model, result_.logged);
              });
     });
     std::stable_sort(alone.begin(), alone.end(),

@@ -65,20 +65,7 @@ int BodyOf(const SignalSource& source, const mjModel& m) {
   if (source.joint >= 0) return m.jnt_bodyid[source.joint];
   for (int s = 0; s < m.nsensor; ++s) {
     if (source.sensor < m.sensor_adr[s] || source.sensor >= m.sensor_adr[s] + m.sensor_dim[s]) continue;
-    const int object = m.sensor_objid[s];
-    switch (m.sensor_objtype[s]) {
-      case mjOBJ_SITE:
-        return m.site_bodyid[object];
-      case mjOBJ_GEOM:
-        return m.geom_bodyid[object];
-      case mjOBJ_JOINT:
-        return m.jnt_bodyid[object];
-      case mjOBJ_BODY:
-      case mjOBJ_XBODY:
-        return object;
-      default:
-        return -1;
-    }
+    return m.sensor_objtype[s] == mjOBJ_JOINT ? m.jnt_bodyid[m.sensor_objid[s]] : BodyOfSensor(m, s);
   }
   return -1;
 }

@@ -10,28 +10,10 @@
 namespace gapscope {
 namespace {
 
-// The body that a sensor's object rides on; -1: on none.
-int BodyOf(const mjModel& m, int sensor) {
-  const int object = m.sensor_objid[sensor];
-  switch (m.sensor_objtype[sensor]) {
-    case mjOBJ_BODY:
-    case mjOBJ_XBODY:
-      return object;
-    case mjOBJ_SITE:
-      return m.site_bodyid[object];
-    case mjOBJ_GEOM:
-      return m.geom_bodyid[object];
-    case mjOBJ_CAMERA:
-      return m.cam_bodyid[object];
-    default:
-      return -1;
-  }
-}
-
 // The body of `bodies` that the sensor's object is fixed to; -1: none of them.
 int CarrierOf(const mjModel& m, int sensor, const std::vector<int>& bodies) {
   if (m.sensor_refid[sensor] >= 0) return -1;
-  for (int body = BodyOf(m, sensor); body > 0; body = m.body_parentid[body]) {
+  for (int body = BodyOfSensor(m, sensor); body > 0; body = m.body_parentid[body]) {
     if (std::ranges::find(bodies, body) != bodies.end()) return body;
     if (m.body_jntnum[body] > 0) break;
   }
@@ -115,7 +97,7 @@ Error NoStart(const mjModel& m, const std::vector<int>& bodies, const MeasuredSp
     error.actual = "the sensor '" + spec.on + "' measures no pose";
     error.allowed = "'framepos' and 'framequat'";
   } else if (CarrierOf(m, sensor, bodies) < 0) {
-    const int body = BodyOf(m, sensor);
+    const int body = BodyOfSensor(m, sensor);
     error.actual = m.sensor_refid[sensor] >= 0 ? "the sensor '" + spec.on + "' has a 'reftype'"
                    : body < 0                  ? "the sensor '" + spec.on + "' is on no body"
                               : "the body '" + NameOf(m, mjOBJ_BODY, body) + "' has no free joint and is not on 'hold'";
@@ -131,6 +113,23 @@ Error NoStart(const mjModel& m, const std::vector<int>& bodies, const MeasuredSp
 }
 
 }  // namespace
+
+int BodyOfSensor(const mjModel& m, int sensor) {
+  const int object = m.sensor_objid[sensor];
+  switch (m.sensor_objtype[sensor]) {
+    case mjOBJ_BODY:
+    case mjOBJ_XBODY:
+      return object;
+    case mjOBJ_SITE:
+      return m.site_bodyid[object];
+    case mjOBJ_GEOM:
+      return m.geom_bodyid[object];
+    case mjOBJ_CAMERA:
+      return m.cam_bodyid[object];
+    default:
+      return -1;
+  }
+}
 
 Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& m, const Experiment& experiment) {
   std::vector<FreeStart> starts;

@@ -28,6 +28,9 @@ struct FreeStart {
 // that says no such thing.
 Result<std::vector<FreeStart>> FindFreeStarts(const mjModel& model, const Experiment& experiment);
 
+// The body that a sensor's object rides on; -1: on none.
+int BodyOfSensor(const mjModel& m, int sensor);
+
 }  // namespace gapscope
 
 #endif  // GAPSCOPE_MODEL_FREE_STARTS_H_

@@ -82,6 +82,17 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
   return other;
 }
 
+Candidate* RefitMerged(const Workbench& bench, SearchResult& found, const EffectUse& simpler, const EffectUse& richer) {
+  const EffectSet set = Without(found.chosen->effects, simpler);
+  Candidate* merged = found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kFinish);
+  for (const auto& start : UsualBeyond(bench, *found.chosen, simpler, richer)) {
+    std::map<std::string, double> values;
+    SetValues(bench, richer, start, &values);
+    merged = found.ledger.Refit(set, *found.chosen, values, {}, Effort::kFinish);
+  }
+  return merged;
+}
+
 double TieOf(double gain) { return std::max(kDiagnosePolicy.search.tie, kDiagnosePolicy.search.tie_share * gain); }
 
 }  // namespace gapscope

@@ -26,6 +26,9 @@ std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candi
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort);
 
+// The chosen set without `simpler`, begun where `richer` does that one's part too. Null: it cannot be simulated.
+Candidate* RefitMerged(const Workbench& bench, SearchResult& found, const EffectUse& simpler, const EffectUse& richer);
+
 // By how much more a set may cost with a rival in the place of a member that gains so much: up to it they tie.
 double TieOf(double gain);
 

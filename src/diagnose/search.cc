@@ -59,6 +59,7 @@ class Searcher {
       Lead();
       Settle();
     } while (GrowFurther() || (!std::exchange(begun_anew, true) && RefitFromNominal(counts)));
+    while (MergeOne()) Settle();
     // A name is told alone only where what could stand in its place was tried. That is judging, for which no work is
     // too much.
     Exchange(kInfinity);
@@ -132,26 +133,10 @@ class Searcher {
     });
   }
 
-  // Whether one of the effects holds another exactly: that one is no companion but what the richer one says itself.
-  bool RepeatsItself(const std::vector<EffectUse>& effects) const {
-    return std::ranges::any_of(effects, [&](const EffectUse& richer) {
-      return std::ranges::any_of(effects, [&](const EffectUse& simpler) {
-        return richer != simpler && Contains(richer, simpler, *bench_.rig, true);
-      });
-    });
-  }
-
   // Refits the best sets of each size on top of the parent, where arithmetic promises enough.
   void RefitSets(const Candidate& parent, const ColumnTable& table, const std::vector<std::size_t>& counts) {
     auto levels = BeamSearch(table, counts.size(), kPolicy.beam);
-    for (auto& level : levels) {
-      std::erase_if(level, [&](const TrialSet& set) {
-        std::vector<EffectUse> all = UsesOf(table, set);
-        all.insert(all.end(), parent.effects.begin(), parent.effects.end());
-        return RepeatsItself(all);
-      });
-      GiveWay(parent, table, &level);
-    }
+    for (auto& level : levels) GiveWay(parent, table, &level);
     double best = table.cost;
     std::vector<Candidate*> tasted;
     if (const TrialSet set = OneInEachLimb(parent, table, levels.front());
@@ -358,8 +343,7 @@ class Searcher {
     const ColumnTable& table = result_.columns;
     std::vector<std::pair<double, EffectUse>> ranked;
     for (const EffectUse& use : result_.uses) {
-      if (Has(result_.chosen->effects, use) || RepeatsItself(With(Without(result_.chosen->effects, member.use), use)))
-        continue;
+      if (Has(result_.chosen->effects, use)) continue;
       const bool one = AreOneMotion(use, member.use, *result_.base->model, result_.logged) ||
                        Contains(member.use, use, *bench_.rig) || Contains(use, member.use, *bench_.rig);
       double most = one ? 1 : 0;
@@ -384,6 +368,22 @@ class Searcher {
     if (other && !other->converged && Gain(*result_.chosen, *other) > -kPolicy.hopeless)
       result_.ledger.Continue(other, Effort::kTry, result_.chosen->train_cost * std::exp(kPolicy.tie));
     return other;
+  }
+
+  // An effect that another one holds exactly is no companion of it but what that one says itself. Such pairs are good
+  // for a search's way, not for its end: the richer one takes the other's part over. Whether one did.
+  bool MergeOne() {
+    for (const EffectUse& simpler : result_.chosen->effects) {
+      for (const EffectUse& richer : result_.chosen->effects) {
+        if (richer == simpler || !Contains(richer, simpler, *bench_.rig, true)) continue;
+        say_("taking " + simpler.Text() + " into " + richer.Text());
+        Candidate* merged = RefitMerged(bench_, result_, simpler, richer);
+        if (!merged || Gain(*merged, *result_.chosen) >= kPolicy.simpler) continue;
+        result_.chosen = merged;
+        return true;
+      }
+    }
+    return false;
   }
 
   // `until`: share of the work.

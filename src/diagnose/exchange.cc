@@ -84,12 +84,17 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
 
 Candidate* RefitMerged(const Workbench& bench, SearchResult& found, const EffectUse& simpler, const EffectUse& richer) {
   const EffectSet set = Without(found.chosen->effects, simpler);
-  Candidate* merged = found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kFinish);
-  for (const auto& start : UsualBeyond(bench, *found.chosen, simpler, richer)) {
-    std::map<std::string, double> values;
-    SetValues(bench, richer, start, &values);
-    merged = found.ledger.Refit(set, *found.chosen, values, {}, Effort::kFinish);
+  Candidate* merged = found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kTry);
+  const Candidate* alone =
+      found.ledger.Refit(Without(found.chosen->effects, richer), *found.chosen, {}, {}, Effort::kTry);
+  if (alone) {
+    for (const auto& start : UsualBeyond(bench, *alone, simpler, richer)) {
+      std::map<std::string, double> values;
+      SetValues(bench, richer, start, &values);
+      merged = found.ledger.Refit(set, *alone, values, {}, Effort::kTry);
+    }
   }
+  if (merged) found.ledger.Continue(merged, Effort::kFinish);
   return merged;
 }
 

@@ -243,7 +243,7 @@ std::vector<LogReplay> PredictHeldOut(const Workbench& bench, const Candidate& c
   return HeldOutProblem(bench, candidate, bench.Options(*candidate.model, false))->Predict(candidate.held_out_point);
 }
 
-double FreeRunError(const Workbench& bench, const Candidate& candidate) {
+FreeRuns RunFree(const Workbench& bench, const Candidate& candidate) {
   FitOptions options = bench.Options(*candidate.model, false);
   options.fold = Fold::kAll;
   options.max_windows = 0;
@@ -262,7 +262,23 @@ double FreeRunError(const Workbench& bench, const Candidate& candidate) {
   options.prior_offset_rad = 0;  // which is in the sensors' noises
   FitPoint point;
   const auto problem = OnHeldOut(bench, candidate, options, &point);
-  return problem ? ReplayError(problem->Predict(point)) : kInfinity;
+  FreeRuns result;
+  if (!problem) return result;
+  result.error = ReplayError(problem->Predict(point));
+  std::vector<FitProblem::FittedStart> starts = problem->FittedStarts(point);
+  for (std::size_t w = 0; w < starts.size(); ++w) {
+    const FitWindow& window = problem->windows()[w];
+    const Recording& log = problem->recordings()[window.log];
+    FreeRun& run = result.runs.emplace_back();
+    run.log = log.log_path;
+    run.from_s = log.start_s + log.time_s[window.rows.begin];
+    run.until_s = log.start_s + log.time_s[window.rows.end - 1];
+    run.commands_late_s = problem->Stamps(point).commands_s;
+    run.start = std::move(starts[w].state);
+    for (std::size_t s = 0; s < log.measured.size(); ++s)
+      run.offsets.emplace_back(log.measured[s].spec.signal, starts[w].offsets[s]);
+  }
+  return result;
 }
 
 double PlaceInRange(double value, double low, double high) {

@@ -13,6 +13,7 @@
 
 #include "src/diagnose/block_errors.h"
 #include "src/diagnose/diagnosis_journal.h"
+#include "src/diagnose/free_runs.h"
 #include "src/diagnose/limb_cost.h"
 #include "src/tune/tune.h"
 
@@ -120,9 +121,8 @@ void ScoreCandidate(const Workbench& bench, Candidate* candidate);
 // What a candidate that was scored predicts of the held-out logs; empty: it cannot be simulated there.
 std::vector<LogReplay> PredictHeldOut(const Workbench& bench, const Candidate& candidate);
 
-// Error on the held-out logs when each is one free run (see ReplayError), with zero offsets and the initial state
-// fitted; infinity where that diverges.
-double FreeRunError(const Workbench& bench, const Candidate& candidate);
+// The held-out logs, each one free run, with zero offsets and the initial state fitted; of long logs parts.
+FreeRuns RunFree(const Workbench& bench, const Candidate& candidate);
 
 // Where a value lies in its range, 0 .. 1 within it: on a positive range by its logarithm, as it is searched.
 double PlaceInRange(double value, double low, double high);

@@ -227,7 +227,12 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   e.floors_left = chosen.held_out_floors;
   const double excess = e.floors_before - std::min(1.0, e.floors_left);
   e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
-  e.free_run_left = &chosen == &base ? e.free_run_before : FreeRunError(bench, chosen);
+  e.free_run_left = e.free_run_before;
+  if (&chosen != &base) {
+    FreeRuns runs = RunFree(bench, chosen);
+    e.free_run_left = runs.error;
+    e.free_runs = std::move(runs.runs);
+  }
   e.free_run_removed = std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0
                            ? 1 - e.free_run_left / e.free_run_before
                            : 0;

@@ -336,6 +336,11 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   result.work += lead.work;
   result.most_steps += lead.work.steps;
   SayWhatWasFitted(*at, &result);
+  std::vector<const Recording*> logs;
+  for (const auto* part : {&fine.train, &fine.held_out}) {
+    for (const Recording& recording : *part) logs.push_back(&recording);
+  }
+  ScoreOnEveryRow(*result.model, result.values, logs, result.time_step_s, &result.evidence.free_runs);
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

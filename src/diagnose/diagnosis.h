@@ -14,6 +14,7 @@
 
 #include "src/compare/conditions.h"
 #include "src/core/enum_names.h"
+#include "src/diagnose/free_runs.h"
 #include "src/model/run_model.h"
 #include "src/tune/tune.h"
 
@@ -168,6 +169,7 @@ struct VerdictEvidence {
   double removed = 0;                 // share of what exceeds the noise that went away, in windows
   // Normalised errors of one free run a log, and the share that went away; infinity, 0: it diverges.
   double free_run_before = 0, free_run_left = 0, free_run_removed = 0;
+  std::vector<FreeRun> free_runs = {};  // the final model's
 };
 
 // Of the errors of two free runs: both are further off than the signals' mean. Unstable plants end so, and runs that

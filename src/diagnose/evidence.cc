@@ -65,7 +65,7 @@ std::vector<BlockGain> Carriers(const Workbench& bench, const BlockSquares& gain
 }  // namespace
 
 Evidence::Evidence(const Workbench& bench, SearchResult& found)
-    : bench_(bench), found_(found), torques_(MakeTorques(bench)), free_left_(FreeRunError(bench, *found.chosen)) {
+    : bench_(bench), found_(found), torques_(MakeTorques(bench)), free_left_(RunFree(bench, *found.chosen)) {
   ScoreCandidate(bench_, found_.chosen);
 }
 
@@ -73,7 +73,7 @@ void Evidence::Choose(Candidate* candidate) {
   found_.ledger.Continue(candidate, Effort::kFinish);
   ScoreCandidate(bench_, candidate);
   found_.chosen = candidate;
-  free_left_ = FreeRunError(bench_, *candidate);
+  free_left_ = RunFree(bench_, *candidate);
 }
 
 // Only chosen sets are fitted to the end.
@@ -109,7 +109,7 @@ void Evidence::Of(const std::vector<EffectUse>& uses, Candidate* without, Statem
   numbers.gain = GainOf(LogCostAboveNoise(without->train_limbs), LogCostAboveNoise(found_.chosen->train_limbs));
   numbers.gain_held_out =
       GainOf(LogCostAboveNoise(without->held_out_limbs), LogCostAboveNoise(found_.chosen->held_out_limbs));
-  numbers.gain_free = FreeGain(FreeRunError(bench_, *without), free_left_);
+  numbers.gain_free = FreeGain(RunFree(bench_, *without).error, free_left_.error);
   numbers.clear = ClearBy(gains);
   SetCharacter(uses, &numbers);
   if (torques_.empty()) return;

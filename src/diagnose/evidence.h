@@ -23,7 +23,7 @@ class Evidence {
   void Of(const std::vector<EffectUse>& uses, Candidate* without, Statement* statement);
   // Another set becomes the chosen one.
   void Choose(Candidate* candidate);
-  double free_left() const { return free_left_; }  // FreeRunError of the chosen set
+  const FreeRuns& free_left() const { return free_left_; }  // of the chosen set
 
  private:
   // A fit that is not at its end promises, by its columns, what it does not reach. Once each.
@@ -36,7 +36,7 @@ class Evidence {
   const Workbench& bench_;
   SearchResult& found_;
   std::vector<ProbeTorque> torques_;
-  double free_left_;
+  FreeRuns free_left_;
   std::set<const Candidate*> compared_;
   ColumnTable left_;
   const Candidate* left_of_ = nullptr;  // whose table that is

@@ -404,7 +404,9 @@ class Judging {
     const Candidate &base = *found_.base, &chosen = *found_.chosen;
     VerdictEvidence& e = result->evidence;
     e.floors_before = base.held_out_floors;
-    e.free_run_before = &base == &chosen ? evidence_.free_left() : FreeRunError(bench_, base);
+    const FreeRuns of_base = &base == &chosen ? evidence_.free_left() : RunFree(bench_, base);
+    e.free_run_before = of_base.error;
+    e.free_runs = of_base.runs;
     VerdictFacts facts{.floors_left = e.floors_before};
     double right = 1;
     for (const Statement& s : result->statements) {

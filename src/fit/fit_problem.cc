@@ -289,6 +289,20 @@ std::vector<LogReplay> FitProblem::Predict(const FitPoint& point) {
   return logs;
 }
 
+std::vector<FitProblem::FittedStart> FitProblem::FittedStarts(const FitPoint& point) {
+  const std::vector<double> values = Values(point);
+  Worker& worker = GetWorker(0);
+  std::vector<FittedStart> starts;
+  for (std::size_t w = 0; w < windows_.size(); ++w) {
+    const FitWindow& window = windows_[w];
+    PlaceStart(worker, {window, point, values, point.states[w], Stamps(point)});
+    FittedStart& start = starts.emplace_back(FittedStart{.state = worker.start, .offsets = {}});
+    for (std::size_t s = 0; s < recordings_[window.log].measured.size(); ++s)
+      start.offsets.push_back(layout_.Offset(point.y, window.log, s));
+  }
+  return starts;
+}
+
 void FitProblem::WeighStates(const Residuals& residuals) {
   const auto priors = StatePriorsByNoise(model_, recordings_, layout_, windows_, residuals);
   for (std::size_t w = 0; w < windows_.size(); ++w) windows_[w].prior = priors[w];

@@ -53,13 +53,28 @@ ordered_json Json(const FoundEffect& found) {
           {"share_of_gap", JsonNumber(found.share_of_gap)}};
 }
 
+ordered_json Json(const FreeRun& run) {
+  ordered_json offsets = ordered_json::object();
+  for (const auto& [signal, offset] : run.offsets) offsets[signal] = offset;
+  return {{"log", run.log},
+          {"from_s", run.from_s},
+          {"until_s", run.until_s},
+          {"error", JsonNumber(run.error)},
+          {"qpos", run.start.qpos},
+          {"qvel", run.start.qvel},
+          {"commands_late_s", run.commands_late_s},
+          {"offsets", std::move(offsets)}};
+}
+
 ordered_json Json(const VerdictEvidence& e) {
   ordered_json signals = ordered_json::object();
   for (const SignalFloors& signal : e.signals) signals[signal.signal] = JsonNumber(signal.floors);
-  return {{"floors_before", JsonNumber(e.floors_before)},      {"floors_left", JsonNumber(e.floors_left)},
-          {"floors_left_by_signal", std::move(signals)},       {"removed", JsonNumber(e.removed)},
-          {"free_run_before", JsonNumber(e.free_run_before)},  {"free_run_left", JsonNumber(e.free_run_left)},
-          {"free_run_removed", JsonNumber(e.free_run_removed)}};
+  ordered_json runs = ordered_json::array();
+  for (const FreeRun& run : e.free_runs) runs.push_back(Json(run));
+  return {{"floors_before", JsonNumber(e.floors_before)},       {"floors_left", JsonNumber(e.floors_left)},
+          {"floors_left_by_signal", std::move(signals)},        {"removed", JsonNumber(e.removed)},
+          {"free_run_before", JsonNumber(e.free_run_before)},   {"free_run_left", JsonNumber(e.free_run_left)},
+          {"free_run_removed", JsonNumber(e.free_run_removed)}, {"free_runs", std::move(runs)}};
 }
 
 ordered_json Json(const CandidateReport& c) {

@@ -1,14 +1,17 @@
 """The changed MJCF in the user's own MuJoCo: the error that was promised comes out of the stock package alone."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import gapscope as gs
 
+SIGNALS = ("arm_rad", "pendulum_rad")
 REPLAY = Path(__file__).resolve().parents[1] / "replay" / "replay_in_python.py"
 SIZES = {
     "cable_spring@arm.stiffness_n_m_per_rad": 1.2e-3,
@@ -28,17 +31,24 @@ NATIVES = {
 }
 
 
-def stock_error(model: Path, log: str, time_step_s: float) -> float:
-    """The root mean square over the signals of each one's error over its standard deviation, in one free run."""
+def stock_error(model: Path, log: str, time_step_s: float, run: dict[str, Any] | None = None) -> float:
+    """The root mean square over the signals of each one's error over its standard deviation, in one free run: of the
+    whole log from the model's own state, or one of a diagnosis' `evidence.free_runs`."""
     pytest.importorskip("mujoco")
     rows = np.genfromtxt(log, delimiter=",", names=True)
-    commands, states = model.with_suffix(".csv"), model.with_suffix(".states")
+    commands, states, start = (model.with_suffix(suffix) for suffix in (".csv", ".states", ".json"))
+    offsets = np.zeros(2)
+    if run:
+        since = rows["time_s"] - rows["time_s"][0]
+        rows = rows[(since > run["from_s"] - 1e-9) & (since < run["until_s"] + 1e-9)]
+        offsets += [run["offsets"][signal] for signal in SIGNALS]
+        start.write_text(json.dumps(run))
     given = np.transpose([rows["time_s"], rows["voltage_v"]])
     np.savetxt(commands, given, "%.17g", ",", header="time_s,motor", comments="")
     replay = [sys.executable, REPLAY, gs.plugin_library(), model, commands, repr(time_step_s), states]
-    subprocess.run(list(map(str, replay)), check=True)
-    predicted = np.fromfile(states).reshape(len(rows), -1)[:, :2]
-    measured = np.transpose([rows["arm_rad"], rows["pendulum_rad"]])
+    subprocess.run(list(map(str, replay + [start] * bool(run))), check=True)
+    predicted = np.fromfile(states).reshape(len(rows), -1)[:, :2] + offsets
+    measured = np.transpose([rows[signal] for signal in SIGNALS])
     square = ((predicted - measured) ** 2).mean(axis=0) / measured.var(axis=0)
     return float(np.sqrt(square.mean()))
 
@@ -67,3 +77,14 @@ def test_what_mujoco_has_itself_needs_no_plugin(experiment: str, demo: str, tmp_
         kept = [one for one in effects if one != effect]
         sizes = {name: value for name, value in NATIVES.items() if not name.startswith(effect)}
         assert gs.replay(experiment, demo, with_=kept, set=sizes).error != pytest.approx(promised.error, rel=1e-3)
+
+
+def test_an_applied_diagnosis_keeps_its_promise_in_stock_mujoco(experiment: str, demo: str, tmp_path: Path) -> None:
+    """Its error in free runs, from where these began."""
+    found = gs.diagnose(experiment, demo, effort="quick", options={"no-next-experiment": True})
+    found.apply(tmp_path / "robot.xml")
+    evidence, step_s = found.json["evidence"], found.json["time_step_s"]
+    assert found.verdict == "effects" and evidence["free_run_left"] < 0.1 * evidence["free_run_before"]
+    for run in evidence["free_runs"]:
+        assert run["error"] < 2 * evidence["free_run_left"]
+        assert stock_error(tmp_path / "robot.xml", demo, step_s, run) == pytest.approx(run["error"], rel=0.01)

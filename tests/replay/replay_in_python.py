@@ -1,12 +1,13 @@
-"""Replays a log with the stock `mujoco` package: PLUGIN_LIBRARY MODEL LOG MAX_STEP_S OUT.
+"""Replays a log with the stock `mujoco` package: PLUGIN_LIBRARY MODEL LOG MAX_STEP_S OUT [START].
 
 LOG is a CSV file: time_s, then one column per actuator, named after it. OUT receives qpos and qvel at every stamp, as
-raw doubles. Written from the description of the replay (docs/how-to/replay.md, mujoco.h), not from its code: a command
+raw doubles. START is a JSON file with the qpos and qvel to begin with; else they are the model's own. Written from the description of the replay (docs/how-to/replay.md, mujoco.h), not from its code: a command
 is held from its stamp to the next, and every interval is cut in the fewest equal steps that are at most MAX_STEP_S
 long.
 """
 
 import csv
+import json
 import math
 import sys
 
@@ -15,7 +16,7 @@ import numpy as np
 
 
 def main() -> None:
-    library, model_path, log_path, max_step_s, out_path = sys.argv[1:]
+    library, model_path, log_path, max_step_s, out_path, *start = sys.argv[1:]
     mujoco.mj_loadPluginLibrary(library)
     model = mujoco.MjModel.from_xml_path(model_path)
     bit = mujoco.mjtDisableBit
@@ -24,6 +25,10 @@ def main() -> None:
     stiff = model.dof_solref[:, 0] == -1
     model.dof_solref[stiff, 1] = -0.9999 / float(max_step_s)
     data = mujoco.MjData(model)
+    if start:
+        with open(start[0]) as file:
+            state = json.load(file)
+        data.qpos[:], data.qvel[:] = state["qpos"], state["qvel"]
     with open(log_path, newline="") as file:
         rows = list(csv.reader(file))
     names, values = rows[0], np.array(rows[1:], dtype=float)

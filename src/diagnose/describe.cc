@@ -212,6 +212,21 @@ Candidate* FinalSet(const Workbench& bench, SearchResult& found, const Judgement
   return final;
 }
 
+void SayWhatIsLeft(const Workbench& bench, const Candidate& base, const Candidate& final, VerdictEvidence* evidence) {
+  VerdictEvidence& e = *evidence;
+  e.floors_left = final.held_out_floors;
+  const double excess = e.floors_before - std::min(1.0, e.floors_left);
+  e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
+  e.free_run_left = e.free_run_before;
+  if (&final != &base) {
+    FreeRuns free = RunFree(bench, final);
+    e.free_run_left = free.error;
+    e.free_runs = std::move(free.runs);
+  }
+  const bool known = std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0;
+  e.free_run_removed = known ? 1 - e.free_run_left / e.free_run_before : 0;
+}
+
 }  // namespace
 
 Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const DescribeOptions& options,
@@ -223,19 +238,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   Candidate& chosen = *FinalSet(bench, found, judgement);
   say("looking beside the final set");
   const BesideTorques beside = LookBeside(bench, chosen, found.uses);
-  VerdictEvidence& e = judgement.evidence;
-  e.floors_left = chosen.held_out_floors;
-  const double excess = e.floors_before - std::min(1.0, e.floors_left);
-  e.removed = e.floors_before > 1 ? (e.floors_before - e.floors_left) / excess : 0;
-  e.free_run_left = e.free_run_before;
-  if (&chosen != &base) {
-    FreeRuns runs = RunFree(bench, chosen);
-    e.free_run_left = runs.error;
-    e.free_runs = std::move(runs.runs);
-  }
-  e.free_run_removed = std::isfinite(e.free_run_before) && std::isfinite(e.free_run_left) && e.free_run_before > 0
-                           ? 1 - e.free_run_left / e.free_run_before
-                           : 0;
+  SayWhatIsLeft(bench, base, chosen, &judgement.evidence);
   result.verdict = judgement.verdict;
   result.probability = judgement.probability;
   result.evidence = judgement.evidence;

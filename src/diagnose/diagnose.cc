@@ -265,6 +265,15 @@ void SayWhatWasFitted(const Workbench& bench, Diagnosis* result) {
   result->windows = {.fitted = bench.windows->size(), .all = bench.all_windows, .length_s = bench.window_s};
 }
 
+// On every row of the logs, of which fits may have left out some.
+void ScoreFreeRuns(const DataSplit& fine, Diagnosis* result) {
+  std::vector<const Recording*> logs;
+  for (const auto* part : {&fine.train, &fine.held_out}) {
+    for (const Recording& recording : *part) logs.push_back(&recording);
+  }
+  ScoreOnEveryRow(*result->model, result->values, logs, result->time_step_s, &result->evidence.free_runs);
+}
+
 // Of the search; `replay_steps`: of one replay of the training windows.
 std::size_t MostSteps(SearchEffort effort, std::size_t replay_steps) {
   return static_cast<std::size_t>(ShareOfWork(effort) * static_cast<double>(kDiagnosePolicy.search.replays) *
@@ -336,11 +345,7 @@ Result<Diagnosis> Diagnose(const Experiment& experiment, const DataSplit& fine, 
   result.work += lead.work;
   result.most_steps += lead.work.steps;
   SayWhatWasFitted(*at, &result);
-  std::vector<const Recording*> logs;
-  for (const auto* part : {&fine.train, &fine.held_out}) {
-    for (const Recording& recording : *part) logs.push_back(&recording);
-  }
-  ScoreOnEveryRow(*result.model, result.values, logs, result.time_step_s, &result.evidence.free_runs);
+  ScoreFreeRuns(fine, &result);
   if (fewer_windows) result.cut.insert(result.cut.begin(), "windows");
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

@@ -208,6 +208,7 @@ class Judging {
       for (Statement& y : result->statements) {
         if (&x >= &y || x.group >= 0 || y.group >= 0 || std::min(x.probability, y.probability) >= present) continue;
         if (std::min(x.numbers.gain, y.numbers.gain) < kDiagnosePolicy.search.tie) continue;
+        if (!CouldBeComplements(x, y)) continue;
         say_("judging " + NameOfSet({x.use, y.use}) + ": both or neither");
         Statement both{.rule = "both or neither"};
         evidence_.Of({x.use, y.use}, &both);
@@ -222,6 +223,14 @@ class Judging {
         y.use = of_y, y.beside = of_x;
       }
     }
+  }
+
+  // Whether what both gain, at least what one of them does, could make them complements.
+  bool CouldBeComplements(const Statement& x, const Statement& y) const {
+    const auto of_x = bench_.LimbsOf(x.use), of_y = bench_.LimbsOf(y.use);
+    bool touch = false;
+    for (std::size_t l = 0; l < of_x.size(); ++l) touch = touch || (of_x[l] && of_y[l]);
+    return touch && AreComplements(x.numbers.gain, y.numbers.gain, std::max(x.numbers.gain, y.numbers.gain));
   }
 
   double ImitatedBy(const EffectUse& a, const EffectUse& b) const {

@@ -97,7 +97,7 @@ class Searcher {
   std::vector<char> LimbsOf(const std::vector<EffectUse>& uses) const {
     std::vector<char> limbs(bench_.coupling->limb_count(), static_cast<char>(false));
     for (const EffectUse& use : uses) {
-      const auto of_use = bench_.coupling->LimbsOf(bench_.coupling->OfPlace(use.on, *bench_.rig));
+      const auto of_use = bench_.LimbsOf(use);
       for (std::size_t l = 0; l < limbs.size(); ++l) limbs[l] = static_cast<char>(limbs[l] || of_use[l]);
     }
     return limbs;

@@ -1,9 +1,9 @@
 """Replays a log with the stock `mujoco` package: PLUGIN_LIBRARY MODEL LOG MAX_STEP_S OUT [START].
 
 LOG is a CSV file: time_s, then one column per actuator, named after it. OUT receives qpos and qvel at every stamp, as
-raw doubles. START is a JSON file with the qpos and qvel to begin with; else they are the model's own. Written from the description of the replay (docs/how-to/replay.md, mujoco.h), not from its code: a command
-is held from its stamp to the next, and every interval is cut in the fewest equal steps that are at most MAX_STEP_S
-long.
+raw doubles. START is a JSON file with the qpos and qvel to begin with; else they are the model's own. Written from the
+description of the replay (docs/how-to/replay.md, mujoco.h), not from its code: a command is held from its stamp to the
+next, and every interval is cut in the fewest equal steps that are at most MAX_STEP_S long.
 """
 
 import csv

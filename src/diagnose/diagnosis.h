@@ -155,13 +155,13 @@ struct NextExperiment {
 };
 std::string WhyName(NextExperiment::Why why);
 
-// What the verdict rests on as a whole.
 // What a signal misses, over its sensor's noise, root mean square.
 struct SignalFloors {
   std::string signal;
   double floors = 0;
 };
 
+// What the verdict rests on as a whole.
 struct VerdictEvidence {
   // Residual over the sensors' noise, root mean square, held out: refitted base model, final model.
   double floors_before = 0, floors_left = 0;

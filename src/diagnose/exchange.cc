@@ -4,6 +4,7 @@
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
+#include "src/diagnose/beside.h"
 #include "src/diagnose/policy.h"
 
 namespace gapscope {
@@ -64,6 +65,20 @@ std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candi
   return all;
 }
 
+namespace {
+
+// The set from where `at` stands, with the richer effect as it usually is beyond the simpler one.
+void RefitBeyond(const Workbench& bench, Ledger& ledger, const EffectSet& set, const Candidate& at,
+                 const Beyond& beyond, Effort effort) {
+  for (const auto& start : UsualBeyond(bench, at, beyond.simpler, beyond.richer)) {
+    std::map<std::string, double> values;
+    SetValues(bench, beyond.richer, start, &values);
+    ledger.Refit(set, at, values, {}, effort);
+  }
+}
+
+}  // namespace
+
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort) {
   const ColumnTable& table = found.columns;
@@ -72,28 +87,18 @@ Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const Effec
   std::map<std::string, double> values;
   SetValues(bench, table.trials[trials.back()], SolveSet(table, trials), &values);
   const EffectSet set = With(Without(found.chosen->effects, members), use);
-  Candidate* other = found.ledger.Refit(set, *found.chosen, values, {}, effort);
-  for (const EffectUse& member : members) {
-    for (const auto& start : UsualBeyond(bench, *found.chosen, member, use)) {
-      SetValues(bench, use, start, &values);
-      other = found.ledger.Refit(set, *found.chosen, values, {}, effort);
-    }
-  }
-  return other;
+  found.ledger.Refit(set, *found.chosen, values, {}, effort);
+  for (const EffectUse& member : members) RefitBeyond(bench, found.ledger, set, *found.chosen, {member, use}, effort);
+  return found.ledger.Find(set);
 }
 
 Candidate* RefitMerged(const Workbench& bench, SearchResult& found, const EffectUse& simpler, const EffectUse& richer) {
   const EffectSet set = Without(found.chosen->effects, simpler);
-  Candidate* merged = found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kTry);
+  found.ledger.Refit(set, *found.chosen, {}, {}, Effort::kTry);
   const Candidate* alone =
       found.ledger.Refit(Without(found.chosen->effects, richer), *found.chosen, {}, {}, Effort::kTry);
-  if (alone) {
-    for (const auto& start : UsualBeyond(bench, *alone, simpler, richer)) {
-      std::map<std::string, double> values;
-      SetValues(bench, richer, start, &values);
-      merged = found.ledger.Refit(set, *alone, values, {}, Effort::kTry);
-    }
-  }
+  if (alone) RefitBeyond(bench, found.ledger, set, *alone, {simpler, richer}, Effort::kTry);
+  Candidate* merged = found.ledger.Find(set);
   if (merged) found.ledger.Continue(merged, Effort::kFinish);
   return merged;
 }

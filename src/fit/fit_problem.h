@@ -106,7 +106,7 @@ class FitProblem {
   // Predictions on the rows of the problem's windows, offsets added, without lead-ins: one entry per recording.
   std::vector<LogReplay> Predict(const FitPoint& point);
 
-  // Where each window starts there, and what its signals' zero offsets are (measured = predicted - offset).
+  // Where each window starts there, and what its signals' zero offsets are (measured = predicted + offset).
   struct FittedStart {
     InitialState state;
     std::vector<double> offsets;

@@ -29,18 +29,22 @@ ModelPtr CopyForReplay(const mjModel& model) {
   return copy;
 }
 
+bool RunsAway(const mjModel& m, const mjData& d) {
+  for (int i = 0; i < m.nq; ++i) {
+    if (!(std::abs(d.qpos[i]) < kRunaway)) return true;
+  }
+  for (int i = 0; i < m.nv; ++i) {
+    if (!(std::abs(d.qvel[i]) < 1000 * kRunaway)) return true;
+  }
+  return false;
+}
+
 bool IsSane(const mjModel& m, const mjData& d) {
   // A command that MuJoCo finds too large is zeroed by it: no replay of that command either.
   for (const int bad : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL}) {
     if (d.warning[bad].number > 0) return false;
   }
-  for (int i = 0; i < m.nq; ++i) {
-    if (!(std::abs(d.qpos[i]) < kRunaway)) return false;
-  }
-  for (int i = 0; i < m.nv; ++i) {
-    if (!(std::abs(d.qvel[i]) < 1000 * kRunaway)) return false;
-  }
-  return true;
+  return !RunsAway(m, d);
 }
 
 // Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1], and `earlier` before the first
@@ -165,7 +169,7 @@ double Simulator::Read(const SignalSource& source) const {
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
-void Simulator::Begin(const Recording& recording, Window window, const InitialState& start) {
+bool Simulator::Begin(const Recording& recording, Window window, const InitialState& start) {
   const mjModel* m = mujoco_.get();
   mjData* d = data_.get();
   mj_resetData(m, d);
@@ -173,12 +177,12 @@ void Simulator::Begin(const Recording& recording, Window window, const InitialSt
   from_nothing_ = false;
   if ((remembers_ || latest_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
     FindEarlierCommands(recording);
-  PreRoll(recording, window);
+  const bool followed = PreRoll(recording, window);
   // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
   for (std::size_t i = 0; i < apart_.size(); ++i) {
     const auto [joint, of] = model_.mirrored_joints()[i];
-    apart_[i] = {d->qpos[m->jnt_qposadr[joint]] - d->qpos[m->jnt_qposadr[of]],
-                 d->qvel[m->jnt_dofadr[joint]] - d->qvel[m->jnt_dofadr[of]]};
+    apart_[i] = {followed ? d->qpos[m->jnt_qposadr[joint]] - d->qpos[m->jnt_qposadr[of]] : 0,
+                 followed ? d->qvel[m->jnt_dofadr[joint]] - d->qvel[m->jnt_dofadr[of]] : 0};
   }
   std::copy(start.qpos.begin(), start.qpos.end(), d->qpos);
   std::copy(start.qvel.begin(), start.qvel.end(), d->qvel);
@@ -196,6 +200,7 @@ void Simulator::Begin(const Recording& recording, Window window, const InitialSt
     reads_ = std::max(reads_, TraitsOf(kind).stage);
     if (kind == SignalKind::kOrientation && recording.measured[s].spec.element == 0) orientations_.push_back(s);
   }
+  return followed;
 }
 
 void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
@@ -255,7 +260,7 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
   GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= window.rows() * signals);
   const std::size_t nq = static_cast<std::size_t>(m->nq);
   GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
-  Begin(recording, window, start);
+  const bool followed = Begin(recording, window, start);
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];
@@ -269,8 +274,8 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       std::copy(d->qpos, d->qpos + nq, qpos.begin() + static_cast<std::ptrdiff_t>((row - window.begin) * nq));
     if (row + 1 == window.end) break;
 
-    result.steps += static_cast<std::size_t>(StepToNext(recording, row));
-    if (!IsSane(*m, *d)) {
+    if (followed) result.steps += static_cast<std::size_t>(StepToNext(recording, row));
+    if (!followed || !IsSane(*m, *d)) {
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;
       std::fill(out + signals, predicted.data() + window.rows() * signals, kNaN);
@@ -412,10 +417,10 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
 
 // Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log
 // for a while, so that they hold what the log says and not nothing.
-void Simulator::PreRoll(const Recording& recording, Window window) {
+bool Simulator::PreRoll(const Recording& recording, Window window) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  if (!remembers_ && apart_.empty()) return;
+  if (!remembers_ && apart_.empty()) return true;
   const double from = recording.time_s[window.begin] - Past();
   std::size_t first = window.begin;
   while (first > 0 && recording.time_s[first - 1] >= from) --first;
@@ -428,7 +433,8 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
     d->time = recording.time_s.front() - m->opt.timestep;
     mj_step(m, d);
   }
-  for (std::size_t row = first; row < window.begin; ++row) {
+  bool followed = true;
+  for (std::size_t row = first; row < window.begin && followed; ++row) {
     // A transmission's motor side is free to move beside the load.
     row == first ? StandAt(recording, row) : Follow(recording, row);
     d->time = recording.time_s[row];
@@ -437,9 +443,11 @@ void Simulator::PreRoll(const Recording& recording, Window window) {
     m->opt.timestep = interval / steps;
     SetCommands(recording, row, recording.time_s[row], recording.time_s[row + 1]);
     for (int step = 0; step < steps; ++step) mj_step(m, d);
+    followed = apart_.empty() || !RunsAway(*m, *d);
   }
   m->opt.integrator = integrator;
   for (auto& warning : d->warning) warning.number = 0;
+  return followed;
 }
 
 }  // namespace gapscope

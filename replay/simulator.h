@@ -72,11 +72,12 @@ class Simulator {
 
  private:
   void ApplyProbe(const ProbeTorque& probe);
-  // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp.
-  void Begin(const Recording& recording, Window window, const InitialState& start);
+  // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp. False: as PreRoll.
+  bool Begin(const Recording& recording, Window window, const InitialState& start);
   // From a row's stamp to the next one's, under its commands. Returns the steps that it took.
   int StepToNext(const Recording& recording, std::size_t row);
-  void PreRoll(const Recording& recording, Window window);
+  // False: a transmission's motor side does not follow, but runs away.
+  bool PreRoll(const Recording& recording, Window window);
   // How far back the states of a run remember.
   double Past() const;
   // Measured joints as the log has them at a row.

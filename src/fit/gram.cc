@@ -1,6 +1,5 @@
 #include "src/fit/gram.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -12,46 +11,10 @@
 #include "src/core/dense.h"
 #include "src/fit/blocks.h"
 #include "src/fit/coupling.h"
+#include "src/fit/window_columns.h"
 
 namespace gapscope {
 namespace {
-
-// Columns [y | extra | residual] of a window, below them the rows of its state's prior.
-class WindowColumns {
- public:
-  // Room for `size` columns; all but the extra ones are there. Takes the window's Jacobian.
-  void Begin(const Eigen::VectorXd& residual, Eigen::MatrixXd jacobian, const FitWindow& window,
-             const Eigen::VectorXd& state, Eigen::Index size) {
-    const Eigen::Index rows = residual.size(), m = state.size(), n = jacobian.cols() - m;
-    columns_.setZero(rows + m, size);
-    columns_.topLeftCorner(rows, n) = jacobian.leftCols(n);
-    columns_.col(size - 1) << residual, window.prior.cwiseProduct(state);
-    states_.resize(rows + m, m);
-    states_ << jacobian.rightCols(m), Eigen::MatrixXd(window.prior.asDiagonal());
-  }
-  void Set(Eigen::Index column, const Eigen::VectorXd& values) { columns_.col(column).head(values.size()) = values; }
-  // Robust weights, then the state out of all columns.
-  void Finish(const Huber& huber) {
-    const Eigen::Index m = states_.cols(), rows = columns_.rows() - m;
-    if (!huber.plain()) {
-      Eigen::VectorXd residual = columns_.col(columns_.cols() - 1).head(rows);
-      Eigen::MatrixXd all(rows, columns_.cols() + m);
-      all << columns_.topRows(rows), states_.topRows(rows);
-      huber.Weigh(residual, all);
-      columns_.topRows(rows) = all.leftCols(columns_.cols());
-      states_.topRows(rows) = all.rightCols(m);
-    }
-    if (m == 0) return;
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(states_);
-    columns_.applyOnTheLeft(qr.householderQ().adjoint());
-    columns_.topRows(m).setZero();
-    columns_.applyOnTheLeft(qr.householderQ());
-  }
-  const Eigen::MatrixXd& columns() const { return columns_; }
-
- private:
-  Eigen::MatrixXd columns_, states_;
-};
 
 // What the residuals at a point have beyond `base`; none: it cannot be simulated.
 std::optional<Residuals> Added(FitProblem& problem, const FitPoint& point, const Residuals& base,
@@ -76,7 +39,7 @@ class ExtraColumns {
       together_ = Replay(*column.child, column.values, column.probes);
       last_ = &column;
     }
-    if (!together_ && !column.moved.empty()) return Replay(*column.child, column.own_values, column.own_probes);
+    if (!together_ && !column.own_values.empty()) return Replay(*column.child, column.own_values, column.own_probes);
     if (!together_ || column.moved.empty()) return together_;
     return Own(*together_, column.moved);
   }
@@ -194,11 +157,10 @@ void AddProducts(const FitProblem& problem, const std::vector<WindowColumns>& wi
   const Eigen::Index size = products->cols();
   problem.pool().ForEach(static_cast<std::size_t>((size + kStripe - 1) / kStripe), [&](std::size_t k, int) {
     const Eigen::Index first = static_cast<Eigen::Index>(k) * kStripe, width = std::min(kStripe, size - first);
+    std::vector<double> scratch;
     for (const PartRows& of : part) {
-      if (windows[of.window].columns().size() == 0) continue;
-      const auto rows = windows[of.window].columns().middleRows(of.begin, of.count);
-      products->block(first, first, size - first, width).noalias() +=
-          of.weight * rows.rightCols(size - first).transpose() * rows.middleCols(first, width);
+      if (windows[of.window].empty()) continue;
+      windows[of.window].AddProducts(of.begin, of.count, of.weight, first, width, products, &scratch);
     }
   });
 }
@@ -238,8 +200,9 @@ std::optional<std::vector<WindowColumns>> ColumnsOf(FitProblem& parent, const Fi
   std::vector<WindowColumns> windows(parent.windows().size());
   for (std::size_t w = 0; w < windows.size(); ++w) {
     if (!options.mask[w]) continue;
-    windows[w].Begin(at.residuals[w], std::exchange(at.jacobians[w], {}), parent.windows()[w], point.states[w],
+    windows[w].Begin(at.residuals[w], at.jacobians[w], parent.windows()[w], point.states[w],
                      static_cast<Eigen::Index>(gram->columns.size()));
+    at.jacobians[w] = {};
   }
   ExtraColumns columns(parent, point, at, options.mask, &gram->work);
   for (std::size_t e = 0; e < extra.size(); ++e) {

@@ -276,6 +276,28 @@ TEST_F(SimulatorTest, AStepTooLongForTheModelDivergesToo) {
   EXPECT_EQ(Predict(*model, recording, {}, nullptr, 1e-4)[0].size(), 200u);
 }
 
+TEST_F(SimulatorTest, AMotorSideThatRunsAwayBeforeTheWindowEndsTheRunThere) {
+  const auto uses = ParseEffects({"joint_compliance@hinge"}, *model_->rig());
+  ASSERT_TRUE(uses.ok());
+  const auto model = MakeModel(experiment_, uses.value());
+  const Recording recording = MakeRecording(experiment_, 400, 0.002, [](int, double) { return 1.0; });
+  const std::string stiffness = "joint_compliance@hinge.stiffness_n_m_per_rad";
+  const auto outcome = [&](double stiffness_n_m_per_rad) {
+    std::vector<double> values = model->Nominal();
+    values[static_cast<std::size_t>(model->IndexOf(stiffness))] = stiffness_n_m_per_rad;
+    Simulator simulator(*model, 0.002);
+    EXPECT_TRUE(simulator.SetParameters(values, recording));
+    std::vector<double> predicted(2 * 100);
+    return simulator.Run(recording, {300, 400}, AtRest(*model), predicted);
+  };
+  EXPECT_EQ(outcome(10).outcome, Outcome::kCompleted);
+  // Both sides of 0.01 kg m^2 at 2 ms: a step of Runge and Kutta holds 2.8 rad of the oscillation, 1e4 N m/rad of it.
+  const RunResult run = outcome(3e5);
+  EXPECT_EQ(run.outcome, Outcome::kDiverged);
+  EXPECT_EQ(run.diverged_at_s, recording.time_s[300]);
+  EXPECT_EQ(run.steps, 0u);
+}
+
 class DelayTest : public SimulatorTest {
  protected:
   std::vector<std::vector<double>> Delayed(const Recording& recording, const char* effect, double delay_s,

@@ -124,8 +124,9 @@ void Separate(const std::vector<Hypothesis>& rivals, const OptimalOptions& optio
       }
       const double distance =
           foretold.worst < kInfinity
-              ? ForetoldFit(imitation, {foretold.recording, floors, options.window_s, options.time_step_s, kRivalSteps})
-                    .Misfit(jacobians)
+              ? ForetoldFit(imitation, {foretold.recording, floors, options.window_s, options.time_step_s, kRivalSteps,
+                                        options.max_windows, options.coupling})
+                    .Misfit(jacobians, options.deadline)
               : kInfinity;
       // What cannot be simulated separates nothing.
       score->per_target.push_back(std::isfinite(distance) ? distance : 0);

@@ -27,10 +27,12 @@ struct OptimalOptions {
   // Inputs are first scored by rough fits. The best ones, so many at a time, by full ones until none is left that could
   // be better.
   std::size_t batch = 2;
-  std::vector<double> floors;  // per measured signal, SI; empty: FloorsOf
-  double window_s = 0;         // rivals are compared in windows of this length; 0: in one run from rest
-  double time_step_s = 0;      // of every simulation; 0: each model's own
-  Deadline deadline;           // inputs that are not scored by then are left out
+  std::vector<double> floors;   // per measured signal, SI; empty: FloorsOf
+  double window_s = 0;          // rivals are compared in windows of this length; 0: in one run from rest
+  double time_step_s = 0;       // of every simulation; 0: each model's own
+  std::size_t max_windows = 0;  // that are compared; 0: all
+  std::shared_ptr<const Coupling> coupling = nullptr;  // FitOptions::coupling
+  Deadline deadline;                                   // inputs that are not scored by then are left out
 };
 
 struct InputScore {

@@ -35,11 +35,12 @@ std::vector<double> WeightsOf(const Recording& log, std::size_t signals, const s
 double RowsPerReading(const Recording& log) { return std::max(1.0, kNoiseCorrelation_s / log.timeline.median_step_s); }
 
 FitOptions OptionsOf(const Hypothesis& hypothesis, const ForetoldLog& foretold) {
-  const auto& [log, floors, window_s, time_step_s, steps] = foretold;
+  const auto& [log, floors, window_s, time_step_s, steps, max_windows, coupling] = foretold;
   const double half_sample_s = 0.5 * log.timeline.median_step_s;
   FitOptions options{.free = hypothesis.model->FreeParameters(),
                      .objective = ObjectiveKind::kFreeRun,
                      .start = WindowStart::kRest,
+                     .coupling = coupling,
                      .time_step_s = time_step_s,
                      .steps = steps,
                      .fit_states = false,
@@ -53,6 +54,7 @@ FitOptions OptionsOf(const Hypothesis& hypothesis, const ForetoldLog& foretold) 
     options.objective = ObjectiveKind::kWindows;
     options.start = WindowStart::kLog;
     options.window_s = window_s;
+    options.max_windows = max_windows;
     options.fit_states = true;
   }
   return options;
@@ -102,10 +104,10 @@ std::vector<double> ForetoldFit::Deviations(const std::vector<std::size_t>& want
                  [](double variance) { return std::sqrt(std::max(0.0, variance)); });
 }
 
-double ForetoldFit::Misfit(int jacobians) {
-  const SolveResult solved =
-      Solve(problem_, problem_.Start(),
-            {.max_iterations = jacobians, .tolerance = 0.01, .coarse_step = SolveOptions().fine_step});
+double ForetoldFit::Misfit(int jacobians, const Deadline& deadline) {
+  const SolveResult solved = Solve(
+      problem_, problem_.Start(),
+      {.max_iterations = jacobians, .tolerance = 0.01, .coarse_step = SolveOptions().fine_step, .deadline = deadline});
   const double squares = 2 * (solved.cost - problem_.prior().Cost(solved.point.y));
   return std::sqrt(std::max(0.0, squares) * rows_per_reading_ / static_cast<double>(problem_.residuals()));
 }

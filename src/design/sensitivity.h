@@ -32,6 +32,8 @@ struct ForetoldLog {
   double window_s = 0;
   double time_step_s = 0;  // 0: the model's
   StepKind steps = StepKind::kOwn;
+  std::size_t max_windows = 0;                         // 0: all
+  std::shared_ptr<const Coupling> coupling = nullptr;  // FitOptions::coupling
 };
 
 // The fit of a model's free parameters to the scored signals of a log that begins at rest. Residuals are in floors, and
@@ -47,9 +49,9 @@ class ForetoldFit {
   // Cramer-Rao bound: standard deviation of each coordinate of the problem's space, in its own units, at the start. Of
   // `wanted` coordinates nothing is known beforehand but that they lie within their bounds. Empty: not simulated.
   std::vector<double> Deviations(const std::vector<std::size_t>& wanted);
-  // Root mean square of the residuals, in floors, after a fit with at most this many Jacobians. Infinite: not
-  // simulated.
-  double Misfit(int jacobians);
+  // Root mean square of the residuals, in floors, after a fit with at most this many Jacobians, or until the
+  // deadline. Infinite: not simulated.
+  double Misfit(int jacobians, const Deadline& deadline = {});
 
  private:
   const double rows_per_reading_;

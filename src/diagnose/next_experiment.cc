@@ -91,6 +91,8 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
                          .floors = noise,
                          .window_s = bench.window_s,
                          .time_step_s = bench.time_step_s,
+                         .max_windows = bench.max_windows,
+                         .coupling = bench.coupling,
                          .deadline = bench.deadline};
   Experiment experiment = bench.rig->experiment();
   GS_ASSIGN([[maybe_unused]] const std::size_t driven, DrivenCommand(experiment, {}));  // there is a command

@@ -42,12 +42,12 @@ ReportSource SourceOf(const Experiment& experiment, const ReportLogs& logs) {
 namespace {
 
 // How each log began is fitted too, as errors have it: of a log that begins in full motion its first samples say too
-// little to run on from there. Of long logs that would take long, and says little of the rest.
+// little to run on from there. Of long logs, or of many joints, that would take long, and says little of the rest.
 std::vector<LogReplay> FromWhereTheyBegan(const ReportModel& model, const std::vector<Recording>& logs,
                                           const ReplayDefaults& replay, ThreadPool& pool) {
-  constexpr double kLong_s = 60;
-  const bool is_long = std::any_of(logs.begin(), logs.end(),
-                                   [](const Recording& r) { return r.time_s.back() - r.time_s.front() > kLong_s; });
+  constexpr double kLong_s = 120;  // of one joint
+  const double joints = model.model->compiled().nv;
+  const bool is_long = std::ranges::any_of(logs, [&](const Recording& r) { return r.duration_s() * joints > kLong_s; });
   if (!is_long)
     return Evaluate(*model.model, logs, {model.values, std::nullopt}, replay.mode, {.window_s = replay.window_s}, pool);
   return Replay(*model.model, logs, {.mode = replay.mode, .window_s = replay.window_s, .values = model.values}, pool)

@@ -183,10 +183,19 @@ Result<std::unique_ptr<DiagnosisJournal>> OpenJournal(const Model& model, const 
       {.folder = options.journal, .key = key, .resume = options.resume, .deadline = deadline, .warn = options.warn});
 }
 
-// So many windows take so many steps of the simulator, each of a model of two joints or less: with each more joint a
-// step costs as much again.
+// Of the kinematic tree that has the most, free to move on a base that stands.
+int DofsOfLargestTree(const mjModel& m) {
+  int most = 0;
+  for (int tree = 0; tree < m.ntree; ++tree) most = std::max(most, m.tree_dofnum[tree]);
+  return most;
+}
+
+// So many windows take so many steps of the simulator, each of a model of two joints or less. With each more joint of a
+// chain a step costs as much again: it takes longer, and there is more to try. Limbs that stand apart are tried at
+// once.
 std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& bench) {
-  const double cost = std::max(1.0, static_cast<double>(model.compiled().nv) - 1);
+  const mjModel& m = model.compiled();
+  const double cost = std::sqrt(std::max(1.0, m.nv - 1.0) * std::max(1.0, DofsOfLargestTree(m) - 1.0));
   return std::max<std::size_t>(
       1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }

@@ -114,6 +114,29 @@ TEST(CouplingTest, PartsByLimbAreTheLimbsOwnProducts) {
   }
 }
 
+// Products are made for each cart by itself, with its own states taken out; normal equations take all states out of
+// all.
+TEST(CouplingTest, ProductsOfCartsApartAreThoseOfAllTogether) {
+  for (const double huber : {0.0, 2.0}) {
+    Bench bench(false);
+    FitOptions options = bench.Options(bench.Measured());
+    options.huber = huber;
+    FitProblem problem(*bench.rig.model, bench.logs, options, bench.rig.model->Nominal(), bench.pool);
+    FitPoint point = problem.Start();
+    for (auto& state : point.states) state.setConstant(1e-3);
+    problem.SetHuberThreshold(problem.Evaluate(point, Keep::kResiduals).residuals);
+    const Linearization at = Linearize(problem, point, {.step = kStep});
+    const GramSystem gram = MakeGram(problem, point, {}, {.step = kStep});
+    ASSERT_TRUE(at.valid && gram.valid);
+    const Eigen::Index n = gram.parameters;
+    Eigen::MatrixXd hessian = gram.parts[0].topLeftCorner(n, n);
+    hessian.diagonal() += problem.prior().weight;
+    const Eigen::VectorXd gradient = gram.parts[0].col(n).head(n) + problem.prior().Gradient(point.y);
+    EXPECT_LT((hessian - at.hessian).norm(), 1e-12 * at.hessian.norm()) << huber;
+    EXPECT_LT((gradient - at.gradient).norm(), 1e-12 * at.gradient.norm()) << huber;
+  }
+}
+
 TEST(CouplingTest, AJacobianMadeTogetherIsTheOneMadeColumnByColumn) {
   for (const bool linked : {false, true}) {
     Bench bench(linked);

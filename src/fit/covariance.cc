@@ -28,7 +28,7 @@ Eigen::MatrixXd Meat(const Linearization& at, double* freedom) {
   for (std::size_t b = 0; b < at.block_gradients.size(); ++b) {
     const Eigen::VectorXd g = at.block_gradients[b] - mean;
     meat += g * g.transpose();
-    if (b + 1 < at.block_gradients.size() && at.block_logs[b] == at.block_logs[b + 1]) {
+    if (b + 1 < at.block_gradients.size() && at.block_series[b] == at.block_series[b + 1]) {
       const Eigen::VectorXd next = at.block_gradients[b + 1] - mean;
       meat += 0.5 * (g * next.transpose() + next * g.transpose());
     }

@@ -1,7 +1,7 @@
 // What a solved fit knows of its parameters: intervals, directions that the logs leave open, parameters that go
 // together.
 //
-// Cluster-robust ("sandwich") covariance: H^-1 (sum over half-second blocks of g g') H^-1, with the finite-sample
+// Cluster-robust ("sandwich") covariance: H^-1 (sum over half seconds of limbs of g g') H^-1, with the finite-sample
 // factors of a clustered regression (Liang and Zeger, Biometrika 73, 1986; Cameron and Miller, J. Human Resources 50,
 // 2015): right for coloured residuals and for a wrong noise model.
 #ifndef GAPSCOPE_FIT_COVARIANCE_H_

@@ -153,7 +153,7 @@ std::vector<double> Pack(const Linearization& l) {
   Put(out, l.hessian);
   Put(out, l.gradient);
   for (const auto& block : l.block_gradients) Put(out, block);
-  out.insert(out.end(), l.block_logs.begin(), l.block_logs.end());
+  out.insert(out.end(), l.block_series.begin(), l.block_series.end());
   for (const auto& gain : l.state_gain) Put(out, gain);
   for (const auto& step : l.state_step) Put(out, step);
   return out;
@@ -170,7 +170,7 @@ Linearization UnpackLinearization(const std::vector<double>& numbers) {
   l.hessian = in.Matrix();
   l.gradient = in.Matrix();
   for (std::size_t i = 0; i < blocks; ++i) l.block_gradients.emplace_back(in.Matrix());
-  for (std::size_t i = 0; i < blocks; ++i) l.block_logs.push_back(static_cast<int>(in.Number()));
+  for (std::size_t i = 0; i < blocks; ++i) l.block_series.push_back(static_cast<int>(in.Number()));
   for (std::size_t i = 0; i < windows; ++i) l.state_gain.push_back(in.Matrix());
   for (std::size_t i = 0; i < windows; ++i) l.state_step.emplace_back(in.Matrix());
   return l;

@@ -3,27 +3,43 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <tuple>
 
+#include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/core/statistics.h"
 #include "src/fit/blocks.h"
+#include "src/fit/coupling.h"
 
 namespace gapscope {
 namespace {
 
 using Columns = DifferenceOptions::Columns;
 
-// A window's part, with the gradient once more by half second of the log.
-struct Part {
-  WindowEquations equations;
-  std::vector<std::pair<long, Eigen::VectorXd>> blocks;
+// The gradient of one half second of a log in the signals of one limb.
+struct BlockGradient {
+  std::size_t limb = 0;
+  long half_second = 0;
+  Eigen::VectorXd gradient;
 };
 
-// Rows less what the states take, at the states' optimum, summed by half second.
-std::vector<std::pair<long, Eigen::VectorXd>> BlockGradients(const FitProblem& problem, const FitWindow& window,
-                                                             const Eigen::VectorXd& residual,
-                                                             const Eigen::MatrixXd& jacobian,
-                                                             const WindowEquations& equations) {
+// A window's part, with the gradient once more by blocks.
+struct Part {
+  WindowEquations equations;
+  std::vector<BlockGradient> blocks;
+};
+
+// Of each signal of a log.
+std::vector<std::size_t> LimbsOf(const FitProblem& problem, std::size_t log) {
+  const auto& coupling = problem.options().coupling;
+  return Collect(problem.recordings()[log].measured,
+                 [&](const auto& measured) { return coupling ? coupling->LimbOf(measured.index) : std::size_t{0}; });
+}
+
+// Rows less what the states take, at the states' optimum, summed by half second and limb.
+std::vector<BlockGradient> BlockGradients(const FitProblem& problem, const FitWindow& window,
+                                          const Eigen::VectorXd& residual, const Eigen::MatrixXd& jacobian,
+                                          const WindowEquations& equations) {
   const Eigen::Index n = equations.gradient.size(), m = equations.state_step.size();
   Eigen::MatrixXd reduced = jacobian.leftCols(n);
   Eigen::VectorXd after = residual;
@@ -31,12 +47,16 @@ std::vector<std::pair<long, Eigen::VectorXd>> BlockGradients(const FitProblem& p
     reduced -= jacobian.rightCols(m) * equations.gain;
     after += jacobian.rightCols(m) * equations.state_step;
   }
-  std::vector<std::pair<long, Eigen::VectorXd>> blocks;
+  const std::vector<std::size_t> limbs = LimbsOf(problem, window.log);
+  std::vector<BlockGradient> blocks;
   for (const RowBlock& rows : RowBlocks(problem.recordings()[window.log], window)) {
-    Eigen::VectorXd block = Eigen::VectorXd::Zero(n);
-    for (Eigen::Index first = rows.begin; first < residual.size(); first += window.scored())
-      block += reduced.middleRows(first, rows.count).transpose() * after.segment(first, rows.count);
-    blocks.emplace_back(rows.half_second, std::move(block));
+    std::map<std::size_t, Eigen::VectorXd> of_limb;
+    for (std::size_t s = 0; s < limbs.size(); ++s) {
+      const Eigen::Index first = rows.begin + static_cast<Eigen::Index>(s) * window.scored();
+      of_limb.try_emplace(limbs[s], Eigen::VectorXd::Zero(n)).first->second +=
+          reduced.middleRows(first, rows.count).transpose() * after.segment(first, rows.count);
+    }
+    for (auto& [limb, gradient] : of_limb) blocks.push_back({limb, rows.half_second, std::move(gradient)});
   }
   return blocks;
 }
@@ -119,7 +139,7 @@ Linearization Reduce(const FitProblem& problem, const FitPoint& point, const Der
   std::vector<Part> parts(count);
   problem.pool().ForEach(
       count, [&](std::size_t w, int) { parts[w] = ReducePart(problem, w, point, derivatives, with_blocks); });
-  std::map<std::pair<std::size_t, long>, Eigen::VectorXd> blocks;
+  std::map<std::tuple<std::size_t, std::size_t, long>, Eigen::VectorXd> blocks;  // by log, limb and half second
   double gained = 0;
   for (std::size_t w = 0; w < count; ++w) {
     WindowEquations& part = parts[w].equations;
@@ -127,15 +147,17 @@ Linearization Reduce(const FitProblem& problem, const FitPoint& point, const Der
     gained += part.state_gain_cost;
     result.hessian += part.hessian;
     result.gradient += part.gradient;
-    for (auto& [number, block] : parts[w].blocks) {
-      const auto [entry, added] = blocks.try_emplace({problem.windows()[w].log, number}, block);
-      if (!added) entry->second += block;
+    for (const auto& [limb, half_second, gradient] : parts[w].blocks) {
+      const auto [entry, added] = blocks.try_emplace({problem.windows()[w].log, limb, half_second}, gradient);
+      if (!added) entry->second += gradient;
     }
     result.state_gain.push_back(std::move(part.gain));
     result.state_step.push_back(std::move(part.state_step));
   }
+  std::map<std::pair<std::size_t, std::size_t>, int> series;
   for (auto& [key, block] : blocks) {
-    result.block_logs.push_back(static_cast<int>(key.first));
+    const std::pair log_and_limb{std::get<0>(key), std::get<1>(key)};
+    result.block_series.push_back(series.try_emplace(log_and_limb, static_cast<int>(series.size())).first->second);
     result.block_gradients.push_back(std::move(block));
   }
   result.cost += problem.prior().Cost(point.y);
@@ -188,7 +210,7 @@ Linearization Bend(const FitProblem& problem, const Linearization& at, const Der
                      .hessian = at.hessian,
                      .gradient = Eigen::VectorXd::Zero(n),
                      .block_gradients = {},
-                     .block_logs = {},
+                     .block_series = {},
                      .state_gain = at.state_gain,
                      .state_step = at.state_step,
                      .valid = true,

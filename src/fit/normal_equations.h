@@ -19,9 +19,10 @@ struct Linearization {
   double reduced_cost = 0;   // with the states at their own optimum, as far as the equations see it
   Eigen::MatrixXd hessian;   // Gauss-Newton, of y
   Eigen::VectorXd gradient;  // of y, at the states' own optimum
-  // Reduced, per half second of a log, all windows there together: for cluster-robust covariances.
+  // Reduced, per half second of a log and limb (Coupling), all windows there together: for cluster-robust covariances.
+  // Limbs do not touch, so that what a model gets wrong of one says nothing of another.
   std::vector<Eigen::VectorXd> block_gradients;
-  std::vector<int> block_logs;              // log of each block; blocks of a log stand in the order of time
+  std::vector<int> block_series;            // the log and limb of each block; its blocks stand in the order of time
   std::vector<Eigen::MatrixXd> state_gain;  // dx_w = state_step - state_gain dy
   std::vector<Eigen::VectorXd> state_step;
   bool valid = false;  // false: the point cannot be simulated

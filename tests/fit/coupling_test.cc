@@ -137,6 +137,31 @@ TEST(CouplingTest, ProductsOfCartsApartAreThoseOfAllTogether) {
   }
 }
 
+// Each cart's half seconds are blocks of their own, in which the others' parameters have no slope.
+TEST(CouplingTest, BlocksOfACovarianceAreOfOneLimb) {
+  Bench bench(false);
+  FitProblem whole = bench.Problem(), limbs = bench.Problem(bench.Measured());
+  FitPoint point = whole.Start();
+  point.y[0] += 0.05;
+  const DifferenceOptions central{.step = kStep, .columns = DifferenceOptions::Columns::kCentral};
+  const Linearization by_time = Linearize(whole, point, central), by_limb = Linearize(limbs, point, central);
+  ASSERT_EQ(by_limb.block_gradients.size(), 3 * by_time.block_gradients.size());
+  Eigen::VectorXd sums[] = {by_time.block_gradients[0], by_time.block_gradients[0]};
+  sums[0].setZero(), sums[1].setZero();
+  for (const auto& gradient : by_time.block_gradients) sums[0] += gradient;
+  for (const auto& gradient : by_limb.block_gradients) sums[1] += gradient;
+  EXPECT_LT((sums[0] - sums[1]).norm(), 1e-6 * sums[0].norm());
+  for (std::size_t i = 0; i < bench.rig.model->FreeParameters().size(); ++i) {
+    const std::size_t cart =
+        static_cast<std::size_t>(limbs.space().parameter(limbs.space().coordinates()[i]).name[0] - 'a');
+    for (std::size_t b = 0; b < by_limb.block_gradients.size(); ++b) {
+      if (by_limb.block_series[b] != static_cast<int>(cart)) {
+        EXPECT_EQ(by_limb.block_gradients[b][static_cast<Eigen::Index>(i)], 0);
+      }
+    }
+  }
+}
+
 TEST(CouplingTest, AJacobianMadeTogetherIsTheOneMadeColumnByColumn) {
   for (const bool linked : {false, true}) {
     Bench bench(linked);

@@ -206,7 +206,7 @@ TEST(JournalPackTest, LinearizationComesBack) {
   l.hessian = Eigen::MatrixXd::Random(3, 3);
   l.gradient = Eigen::VectorXd::Random(3);
   l.block_gradients = {Eigen::VectorXd::Random(3), Eigen::VectorXd::Random(3)};
-  l.block_logs = {0, 4};
+  l.block_series = {0, 4};
   l.state_gain = {Eigen::MatrixXd::Random(2, 3), Eigen::MatrixXd(0, 3)};
   l.state_step = {Eigen::VectorXd::Random(2), Eigen::VectorXd(0)};
   const auto again = UnpackLinearization(Pack(l));
@@ -214,7 +214,7 @@ TEST(JournalPackTest, LinearizationComesBack) {
   EXPECT_EQ(again.hessian, l.hessian);
   EXPECT_EQ(again.gradient, l.gradient);
   EXPECT_EQ(again.block_gradients[1], l.block_gradients[1]);
-  EXPECT_EQ(again.block_logs, l.block_logs);
+  EXPECT_EQ(again.block_series, l.block_series);
   EXPECT_EQ(again.state_gain[0], l.state_gain[0]);
   EXPECT_EQ(again.state_step[1].size(), 0);
 }

@@ -156,8 +156,8 @@ void AddTrials(const Workbench& bench, Candidate& child, std::vector<Asked> grou
     for (Asked& asked : group) {
       if (column >= asked.columns.size()) continue;
       ExtraColumn extra{.name = asked.use.Text(), .child = child.problem.get(), .values = together};
-      extra.moved = asked.moved;
       if (group.size() > 1) {
+        extra.moved = asked.moved;
         extra.own_values = neutral;
         set(asked, column, &extra.own_values);
       }
@@ -187,8 +187,8 @@ void AddTorques(const Workbench& bench, Candidate& parent, const std::vector<Pro
       for (std::size_t k = 0; k < group.size(); ++k) {
         table->torques.push_back(wanted->first + static_cast<Eigen::Index>(wanted->columns.size()));
         ExtraColumn extra{.name = "torque", .child = parent.problem.get(), .values = parent.values, .probes = probes};
-        extra.moved = moved[group[k]];
         if (group.size() > 1) {
+          extra.moved = moved[group[k]];
           extra.own_values = parent.values;
           extra.own_probes = {probes[k]};
         }

@@ -59,13 +59,10 @@ class FitProblem::Differences {
   }
   void Difference(Eigen::Index column, double h) { jacobian_.col(column) = (worker_.other - base_) / h; }
 
-  // A column's difference in the signals that it moves. Elsewhere it is what a solver's tolerance leaves.
+  // A column's difference in the signals that it moves.
   void OwnDifference(Eigen::Index column, double h, const MovedSignals& moved) {
     Difference(column, h);
-    KeepOwn(column, moved);
-  }
-  void KeepOwn(Eigen::Index column, const MovedSignals& moved) {
-    if (!moved.empty()) KeepMoved(problem_.recordings_[window_.log], window_, moved, jacobian_.col(column));
+    KeepMoved(problem_.recordings_[window_.log], window_, moved, jacobian_.col(column));
   }
 
   // Column by column, or in groups but for central differences: `in_one` makes a group's columns and says whether it
@@ -108,19 +105,16 @@ class FitProblem::Differences {
       return Replay(point_, worker_.values, state_, stamps_);
     };
     const Coordinate& c = problem_.space_.coordinates()[static_cast<std::size_t>(i)];
-    const MovedSignals& moved = problem_.parameters_together_.moved[static_cast<std::size_t>(i)];
     // The other way when that cannot be simulated.
     double h = StepOf(i);
     for (int attempt = 0; attempt < 2; ++attempt, h = -h) {
       if (!move(h)) continue;
-      OwnDifference(i, h, moved);
+      Difference(i, h);
       break;
     }
     const bool inside = point_.y[i] - h >= c.low && point_.y[i] - h <= c.high;
-    if (options_.columns == Columns::kCentral && inside && move(-h)) {
+    if (options_.columns == Columns::kCentral && inside && move(-h))
       jacobian_.col(i) = 0.5 * (jacobian_.col(i) - (worker_.other - base_) / h);
-      KeepOwn(i, moved);
-    }
     Set(i, 0);
   }
 
@@ -146,8 +140,7 @@ class FitProblem::Differences {
     };
     const auto one = [&](Eigen::Index j) {
       moved[j] += step(j);
-      if (Replay(point_, values_, moved, stamps_))
-        OwnDifference(first + j, step(j), columns.moved[static_cast<std::size_t>(j)]);
+      if (Replay(point_, values_, moved, stamps_)) Difference(first + j, step(j));
       moved[j] = state_[j];
     };
     InGroups(columns, [&](Eigen::Index j) { return j >= options_.known_states; }, one, in_one);

@@ -39,7 +39,7 @@ class ExtraColumns {
       together_ = Replay(*column.child, column.values, column.probes);
       last_ = &column;
     }
-    if (!together_ && !column.own_values.empty()) return Replay(*column.child, column.own_values, column.own_probes);
+    if (!together_ && !column.moved.empty()) return Replay(*column.child, column.own_values, column.own_probes);
     if (!together_ || column.moved.empty()) return together_;
     return Own(*together_, column.moved);
   }

@@ -5,6 +5,12 @@
 #include <numeric>
 
 namespace gapscope {
+namespace {
+
+// A share of a column's length that a signal's part of it must have: less is what a solver's tolerance leaves.
+constexpr double kNoise = 1e-4;
+
+}  // namespace
 
 void WindowColumns::Begin(const Eigen::VectorXd& residual, const Eigen::MatrixXd& jacobian, const FitWindow& window,
                           const Eigen::VectorXd& state, Eigen::Index size) {
@@ -26,8 +32,8 @@ void WindowColumns::FindParts() {
   std::vector<std::vector<Eigen::Index>> moved(static_cast<std::size_t>(states_.cols()));
   for (std::size_t state = 0; state < moved.size(); ++state) {
     for (Eigen::Index s = 0; s < signals; ++s) {
-      const auto column = states_.col(static_cast<Eigen::Index>(state));
-      if (!column.segment(s * signal_rows_, signal_rows_).isZero(0)) moved[state].push_back(s);
+      const auto column = states_.col(static_cast<Eigen::Index>(state)).head(signals * signal_rows_);
+      if (column.segment(s * signal_rows_, signal_rows_).norm() > kNoise * column.norm()) moved[state].push_back(s);
     }
   }
   std::vector<Eigen::Index> part_of(static_cast<std::size_t>(signals));
@@ -79,9 +85,10 @@ void WindowColumns::Add(Part& part, Eigen::Index column, const Eigen::VectorXd& 
 }
 
 void WindowColumns::Set(Eigen::Index column, const Eigen::VectorXd& values) {
+  const double least = kNoise * values.norm();
   for (Part& part : parts_) {
     const Eigen::VectorXd rows = Rows(part, values);
-    if (parts_.size() == 1 || !rows.isZero(0)) Add(part, column, rows);
+    if (parts_.size() == 1 || rows.norm() > least) Add(part, column, rows);
   }
 }
 

@@ -10,7 +10,7 @@
 namespace gapscope {
 
 // Columns [y | extra | residual], below the rows of each signal those of the state's prior. Signals that no state's
-// column joins stand apart: there a column that is as good as zero is not kept. Of many joints that do not touch, most are.
+// column joins stand apart: there a column that is as good as zero is not kept. Of joints that do not touch, most are.
 class WindowColumns {
  public:
   // Room for `size` columns; those of y are set. `jacobian`: columns of y, then of the state.

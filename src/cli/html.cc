@@ -46,7 +46,7 @@ namespace {
 std::vector<LogReplay> FromWhereTheyBegan(const ReportModel& model, const std::vector<Recording>& logs,
                                           const ReplayDefaults& replay, ThreadPool& pool) {
   constexpr double kLong_s = 120;  // of one joint
-  const double joints = model.model->compiled().nv;
+  const auto joints = static_cast<double>(model.model->compiled().nv);
   const bool is_long = std::ranges::any_of(logs, [&](const Recording& r) { return r.duration_s() * joints > kLong_s; });
   if (!is_long)
     return Evaluate(*model.model, logs, {model.values, std::nullopt}, replay.mode, {.window_s = replay.window_s}, pool);

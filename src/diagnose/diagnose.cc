@@ -195,7 +195,8 @@ int DofsOfLargestTree(const mjModel& m) {
 // once.
 std::size_t WindowsIn(std::size_t steps, const Model& model, const Workbench& bench) {
   const mjModel& m = model.compiled();
-  const double cost = std::sqrt(std::max(1.0, m.nv - 1.0) * std::max(1.0, DofsOfLargestTree(m) - 1.0));
+  const double joints = static_cast<double>(m.nv), largest = DofsOfLargestTree(m);
+  const double cost = std::sqrt(std::max(1.0, joints - 1) * std::max(1.0, largest - 1));
   return std::max<std::size_t>(
       1, static_cast<std::size_t>(static_cast<double>(steps) / cost * bench.time_step_s / bench.window_s));
 }

@@ -160,7 +160,7 @@ void AddProducts(const FitProblem& problem, const std::vector<WindowColumns>& wi
     std::vector<double> scratch;
     for (const PartRows& of : part) {
       if (windows[of.window].empty()) continue;
-      windows[of.window].AddProducts(of.begin, of.count, of.weight, first, width, products, &scratch);
+      windows[of.window].AddProducts(of.begin, of.count, of.weight, {first, width}, products, &scratch);
     }
   });
 }

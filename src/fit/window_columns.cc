@@ -117,8 +117,9 @@ void WindowColumns::Finish(const Huber& huber) {
   }
 }
 
-void WindowColumns::AddProducts(Eigen::Index begin, Eigen::Index count, double weight, Eigen::Index first,
-                                Eigen::Index width, Eigen::MatrixXd* products, std::vector<double>* scratch) const {
+void WindowColumns::AddProducts(Eigen::Index begin, Eigen::Index count, double weight, Stripe stripe,
+                                Eigen::MatrixXd* products, std::vector<double>* scratch) const {
+  const auto [first, width] = stripe;
   const Eigen::Index prior = states_.rows() - states_.cols();
   const Place& at = begin < prior ? signals_[static_cast<std::size_t>(begin / signal_rows_)]
                                   : states_at_[static_cast<std::size_t>(begin - prior)];

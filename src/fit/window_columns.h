@@ -22,10 +22,14 @@ class WindowColumns {
   void Finish(const Huber& huber);
 
   bool empty() const { return parts_.empty(); }
+  // Columns of the products that are added to.
+  struct Stripe {
+    Eigen::Index first = 0, width = 0;
+  };
   // Adds `weight` times the products of `count` rows from `begin` on, which are one signal's or one of the prior's: of
-  // the columns from `first` on with `width` of them. `scratch` is kept from one call to the next.
-  void AddProducts(Eigen::Index begin, Eigen::Index count, double weight, Eigen::Index first, Eigen::Index width,
-                   Eigen::MatrixXd* products, std::vector<double>* scratch) const;
+  // a stripe's columns with themselves and those behind them. `scratch` is kept from one call to the next.
+  void AddProducts(Eigen::Index begin, Eigen::Index count, double weight, Stripe stripe, Eigen::MatrixXd* products,
+                   std::vector<double>* scratch) const;
 
  private:
   // Signals that stand apart from others, and the states that move them.

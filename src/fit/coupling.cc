@@ -55,6 +55,18 @@ std::vector<std::vector<std::size_t>> ApartGroups(const std::vector<MovedSignals
   return groups;
 }
 
+std::vector<std::size_t> NumberParts(std::size_t count, const std::vector<std::vector<std::size_t>>& groups) {
+  std::vector<std::size_t> parts(count);
+  std::iota(parts.begin(), parts.end(), std::size_t{0});
+  for (const auto& group : groups) {
+    for (const std::size_t thing : group)
+      std::ranges::replace(parts, std::size_t{parts[thing]}, std::size_t{parts[group.front()]});
+  }
+  std::map<std::size_t, std::size_t> numbers;
+  for (std::size_t& part : parts) part = numbers.try_emplace(part, numbers.size()).first->second;
+  return parts;
+}
+
 void KeepMoved(const Recording& recording, const FitWindow& window, const MovedSignals& moved,
                Eigen::Ref<Eigen::VectorXd> column) {
   for (std::size_t s = 0; s < recording.measured.size(); ++s) {
@@ -109,20 +121,15 @@ Coupling Coupling::Measure(FitProblem& problem, const FitPoint& point, std::span
 }
 
 void Coupling::FindLimbs(std::size_t signals) {
-  std::vector<std::size_t> limbs(signals);
-  std::iota(limbs.begin(), limbs.end(), std::size_t{0});
+  std::vector<std::vector<std::size_t>> groups;
   for (const auto& [joint, moved] : of_joint_) {
-    std::size_t first = signals;
+    groups.emplace_back();
     for (std::size_t s = 0; s < signals; ++s) {
-      if (!moved.empty() && !moved[s]) continue;
-      if (first == signals) first = limbs[s];
-      std::ranges::replace(limbs, std::size_t{limbs[s]}, first);
+      if (moved.empty() || moved[s]) groups.back().push_back(s);
     }
   }
-  // Numbered in the order of their first signals.
-  std::map<std::size_t, std::size_t> numbers;
-  for (std::size_t& limb : limbs) limb = numbers.try_emplace(limb, numbers.size()).first->second;
-  if (numbers.size() > 1) limbs_ = std::move(limbs);
+  limbs_ = NumberParts(signals, groups);
+  if (limb_count() == 1) limbs_.clear();
 }
 
 std::vector<char> Coupling::LimbsOf(const MovedSignals& moved) const {

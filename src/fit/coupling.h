@@ -17,6 +17,10 @@ namespace gapscope {
 // that moves all signals is alone.
 std::vector<std::vector<std::size_t>> ApartGroups(const std::vector<MovedSignals>& moved);
 
+// For each of `count` things the number of its part, where the things of a group belong together. Parts are numbered in
+// the order of their first things.
+std::vector<std::size_t> NumberParts(std::size_t count, const std::vector<std::vector<std::size_t>>& groups);
+
 // Leaves of one window's column what lies in the signals that it moves.
 void KeepMoved(const Recording& recording, const FitWindow& window, const MovedSignals& moved,
                Eigen::Ref<Eigen::VectorXd> column);

@@ -2,7 +2,8 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <numeric>
+
+#include "src/fit/coupling.h"
 
 namespace gapscope {
 namespace {
@@ -25,43 +26,29 @@ void WindowColumns::Begin(const Eigen::VectorXd& residual, const Eigen::MatrixXd
   for (Eigen::Index column = 0; column < n; ++column) Set(column, jacobian.col(column));
 }
 
-// Signals in the parts of a graph whose edges are states that move two of them (one pass for each signal is enough to
-// carry the lowest number of a part to all of it).
 void WindowColumns::FindParts() {
-  const Eigen::Index signals = (states_.rows() - states_.cols()) / signal_rows_;
-  std::vector<std::vector<Eigen::Index>> moved(static_cast<std::size_t>(states_.cols()));
+  const Eigen::Index signals = SignalRows() / signal_rows_;
+  std::vector<std::vector<std::size_t>> moved(static_cast<std::size_t>(states_.cols()));  // by state
   for (std::size_t state = 0; state < moved.size(); ++state) {
+    const auto column = states_.col(static_cast<Eigen::Index>(state)).head(SignalRows());
     for (Eigen::Index s = 0; s < signals; ++s) {
-      const auto column = states_.col(static_cast<Eigen::Index>(state)).head(signals * signal_rows_);
-      if (column.segment(s * signal_rows_, signal_rows_).norm() > kNoise * column.norm()) moved[state].push_back(s);
+      if (column.segment(s * signal_rows_, signal_rows_).norm() > kNoise * column.norm())
+        moved[state].push_back(static_cast<std::size_t>(s));
     }
   }
-  std::vector<Eigen::Index> part_of(static_cast<std::size_t>(signals));
-  std::iota(part_of.begin(), part_of.end(), Eigen::Index{0});
-  for (Eigen::Index pass = 0; pass < signals; ++pass) {
-    for (const auto& joined : moved) {
-      if (joined.empty()) continue;
-      Eigen::Index lowest = signals;
-      for (const Eigen::Index s : joined) lowest = std::min(lowest, part_of[static_cast<std::size_t>(s)]);
-      for (const Eigen::Index s : joined) part_of[static_cast<std::size_t>(s)] = lowest;
-    }
+  const std::vector<std::size_t> part_of = NumberParts(static_cast<std::size_t>(signals), moved);
+  for (const std::size_t part : part_of) {
+    parts_.resize(std::max(parts_.size(), part + 1));
+    const auto signal = static_cast<Eigen::Index>(signals_.size());
+    signals_.push_back({part, SignalRows(parts_[part])});
+    parts_[part].signals.push_back(signal);
   }
-  signals_.assign(static_cast<std::size_t>(signals), {});
-  for (Eigen::Index s = 0; s < signals; ++s) {
-    const auto lowest = static_cast<std::size_t>(part_of[static_cast<std::size_t>(s)]);
-    Place& place = signals_[static_cast<std::size_t>(s)];
-    place.part = lowest == static_cast<std::size_t>(s) ? parts_.size() : signals_[lowest].part;
-    if (place.part == parts_.size()) parts_.emplace_back();
-    place.row = SignalRows(parts_[place.part]);
-    parts_[place.part].signals.push_back(s);
-  }
-  states_at_.assign(moved.size(), {});
-  for (std::size_t state = 0; state < moved.size(); ++state)
-    states_at_[state].part = moved[state].empty() ? 0 : signals_[static_cast<std::size_t>(moved[state].front())].part;
-  for (std::size_t state = 0; state < moved.size(); ++state) {
-    Part& part = parts_[states_at_[state].part];
-    states_at_[state].row = SignalRows(part) + static_cast<Eigen::Index>(part.states.size());
-    part.states.push_back(static_cast<Eigen::Index>(state));
+  for (const auto& signals_of_state : moved) {
+    const std::size_t part = signals_of_state.empty() ? 0 : part_of[signals_of_state.front()];
+    auto& states = parts_[part].states;
+    const auto state = static_cast<Eigen::Index>(states_at_.size());
+    states_at_.push_back({part, SignalRows(parts_[part]) + static_cast<Eigen::Index>(states.size())});
+    states.push_back(state);
   }
   for (Part& part : parts_) part.values.resize(SignalRows(part) + static_cast<Eigen::Index>(part.states.size()), size_);
 }
@@ -73,7 +60,7 @@ Eigen::VectorXd WindowColumns::Rows(const Part& part, const Eigen::VectorXd& val
     rows.segment(to, signal_rows_) = values.segment(s * signal_rows_, signal_rows_);
     to += signal_rows_;
   }
-  const Eigen::Index prior = states_.rows() - states_.cols();
+  const Eigen::Index prior = SignalRows();
   for (std::size_t i = 0; i < part.states.size() && values.size() > prior; ++i)
     rows[to + static_cast<Eigen::Index>(i)] = values[prior + part.states[i]];
   return rows;
@@ -120,7 +107,7 @@ void WindowColumns::Finish(const Huber& huber) {
 void WindowColumns::AddProducts(Eigen::Index begin, Eigen::Index count, double weight, Stripe stripe,
                                 Eigen::MatrixXd* products, std::vector<double>* scratch) const {
   const auto [first, width] = stripe;
-  const Eigen::Index prior = states_.rows() - states_.cols();
+  const Eigen::Index prior = SignalRows();
   const Place& at = begin < prior ? signals_[static_cast<std::size_t>(begin / signal_rows_)]
                                   : states_at_[static_cast<std::size_t>(begin - prior)];
   const Eigen::Index row = at.row + (begin < prior ? begin % signal_rows_ : 0);

@@ -46,6 +46,8 @@ class WindowColumns {
 
   void FindParts();
   void Add(Part& part, Eigen::Index column, const Eigen::VectorXd& values) const;
+  // Of all signals; below them stand the rows of the state's prior.
+  Eigen::Index SignalRows() const { return states_.rows() - states_.cols(); }
   Eigen::Index SignalRows(const Part& part) const {
     return signal_rows_ * static_cast<Eigen::Index>(part.signals.size());
   }

@@ -52,6 +52,17 @@ Workbench WithLogs(const Workbench& bench, const DataSplit& data, const Model& m
   return other;
 }
 
+Workbench ForSizes(const Workbench& bench, const Candidate& candidate) {
+  constexpr double kBeyond = 2;
+  const double half_seconds =
+      kBeyond * static_cast<double>(candidate.point.y.size()) / static_cast<double>(bench.coupling->limb_count());
+  const double windows = half_seconds * kFitPolicy.block_s / bench.window_s;
+  Workbench wider = bench;
+  if (windows > static_cast<double>(bench.windows->size()))
+    ChooseWindows(*candidate.model, static_cast<std::size_t>(std::ceil(windows)), &wider);
+  return wider;
+}
+
 bool Has(const std::vector<EffectUse>& set, const EffectUse& use) {
   return std::find(set.begin(), set.end(), use) != set.end();
 }
@@ -168,7 +179,7 @@ void PolishCandidate(const Workbench& bench, Candidate* candidate) {
   fit.logarithmic_effects = true;
   fit.prior_centre = bench.Nominal(*candidate->model);
   auto problem = std::make_unique<FitProblem>(*candidate->model, bench.data->train, fit, candidate->values, bench.pool);
-  problem->CountKnown(VarianceAt(*problem, candidate->train_cost));
+  problem->CountKnown(VarianceAt(*candidate->problem, candidate->train_cost));
   const FitPoint start = CarryOver(*candidate->problem, candidate->point, *problem, candidate->values);
   const SolveOptions options{.max_iterations = 8,
                              .tolerance = kPriorLevel / std::max(candidate->train_cost, 1.0),

@@ -238,6 +238,12 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   Candidate& chosen = *FinalSet(bench, found, judgement);
   say("looking beside the final set");
   const BesideTorques beside = LookBeside(bench, chosen, found.uses);
+  const Workbench for_sizes = ForSizes(bench, chosen);
+  if (!chosen.effects.empty() && for_sizes.windows->size() > bench.windows->size()) {
+    say("fitting the final set to more windows");
+    PolishCandidate(for_sizes, &chosen);
+    ScoreCandidate(bench, &chosen);
+  }
   SayWhatIsLeft(bench, base, chosen, &judgement.evidence);
   result.verdict = judgement.verdict;
   result.probability = judgement.probability;
@@ -248,7 +254,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.floor = std::min(FloorError(bench.data->held_out, noise), result.final);
   result.closed = ClosedShare(result.refit, result.final, result.floor);
   say("leaving each log out");
-  const LeftOut left_out = LeaveOut(bench, base, chosen, noise);
+  const LeftOut left_out = LeaveOut(for_sizes, base, chosen, noise);
   result.by_log = left_out.gaps;
   result.effects = DescribeEffects(bench, found, chosen, beside, left_out, &judgement);
   for (const Statement& s : judgement.statements) {

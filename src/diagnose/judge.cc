@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <tuple>
 
 #include "src/core/statistics.h"
@@ -120,11 +121,20 @@ class Judging {
   }
 
   // A member that is not sure and hardly gains, or only on the logs that were fitted, takes evidence from the others.
-  // It goes, the most harmful one first, and they are judged without it.
+  // It goes, the least likely one first, and they are judged without it: at once what it stood in for, the rest at
+  // last.
   void JudgeMembers(Judgement* result, std::vector<Statement>* dropped) {
     auto& all = result->statements;
     for (const Member& member : found_.members) all.push_back(Of(member.use));
-    for (auto spare = TakeOutSpare(all); spare != all.end(); spare = TakeOutSpare(all)) {
+    std::set<EffectUse> stale;  // judged beside members that are gone
+    for (auto spare = TakeOutSpare(all); spare != all.end() || !stale.empty(); spare = TakeOutSpare(all)) {
+      if (spare == all.end()) {
+        for (Statement& s : all) {
+          if (stale.contains(s.use)) s = Of(s.use);
+        }
+        stale.clear();
+        continue;
+      }
       const EffectUse gone = spare->use;
       const bool hardly = spare->numbers.gain < kDiagnosePolicy.search.tie;
       dropped->push_back(*spare);
@@ -132,23 +142,28 @@ class Judging {
       all.erase(spare);
       std::erase_if(found_.members, [&](const Member& m) { return m.use == gone; });
       for (Statement& s : all) {
-        if (!hardly || ImitatedBy(s.use, gone) >= kDiagnosePolicy.search.imitates) s = Of(s.use);
+        stale.insert(s.use);
+        if (hardly && ImitatedBy(s.use, gone) < kDiagnosePolicy.search.imitates) continue;
+        s = Of(s.use);
+        stale.erase(s.use);
       }
     }
   }
 
-  // The one that helps least on held-out logs of those that the set can do without; what is left is then chosen. The
-  // last one stays, unsure or not, unless it is unconfirmed.
+  // The least likely one of those that the set can do without; what is left is then chosen. The last one stays, unsure
+  // or not, unless it is unconfirmed.
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
     auto least = all.end();
     for (auto s = all.begin(); s != all.end(); ++s) {
       const StatementNumbers& n = s->numbers;
       const bool is_spare = IsUnconfirmed(n) || (s->probability < kDiagnosePolicy.probability.present &&
                                                  (n.gain < kDiagnosePolicy.search.tie || n.gain_held_out < 0));
-      if (is_spare && (least == all.end() || n.gain_held_out < least->numbers.gain_held_out)) least = s;
+      if (is_spare && (least == all.end() || s->probability < least->probability)) least = s;
     }
     if (least == all.end() || (found_.members.size() < 2 && !IsUnconfirmed(least->numbers))) return all.end();
-    Candidate* without = found_.ledger.Find(Without(found_.chosen->effects, least->use));
+    const EffectSet rest = Without(found_.chosen->effects, least->use);
+    Candidate* without = found_.ledger.Find(rest);
+    if (!without) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
     if (!without) return all.end();
     evidence_.Choose(without);
     return least;
@@ -282,7 +297,7 @@ class Judging {
     return rivals;
   }
 
-  // What costs as little in a member's place is told with it.
+  // What costs as little in a member's place is told with it, and what the logs do not tell from that at all.
   void AddRivals(Judgement* result) {
     EffectSet present;
     for (const Statement& s : result->statements) {
@@ -298,6 +313,10 @@ class Judging {
         if (!one && rival.behind > TieOf(member.gain)) continue;
         if (IsLessLikely(rival.use, member.use, base)) continue;
         TellWith(member.use, rival.use, "costs as little in its place", result);
+        for (const EffectUse& use : found_.uses) {
+          if (!Has(found_.chosen->effects, use) && AreOneMotion(use, rival.use, base, found_.logged))
+            TellWith(member.use, use, "is one motion with " + rival.use.Text(), result);
+        }
       }
     }
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <tuple>
 
 #include "src/core/collect.h"
@@ -325,11 +326,16 @@ FitPoint CarryOver(const FitProblem& from, const FitPoint& at, const FitProblem&
   }
   point.y.head(to.space().size()) = to.space().ToSearch(mine);
   for (const auto& [theirs, ours] : SharedNuisances(from.layout(), to.layout())) point.y[ours] = at.y[theirs];
-  GS_CHECK(point.states.size() == at.states.size());
-  // A motor side that only one of the two has is where the pre-roll leaves it.
+  // A window that only this one has starts where the log has it, and a motor side that only one of the two has is
+  // where the pre-roll leaves it.
+  std::map<std::pair<std::size_t, std::size_t>, const Eigen::VectorXd*> theirs;  // by log and first row
+  for (std::size_t w = 0; w < at.states.size(); ++w)
+    theirs[{from.windows()[w].log, from.windows()[w].rows.begin}] = &at.states[w];
   for (std::size_t w = 0; w < point.states.size(); ++w) {
-    const Eigen::Index shared = std::min(point.states[w].size(), at.states[w].size());
-    point.states[w].head(shared) = at.states[w].head(shared);
+    const auto same = theirs.find({to.windows()[w].log, to.windows()[w].rows.begin});
+    if (same == theirs.end()) continue;
+    const Eigen::Index shared = std::min(point.states[w].size(), same->second->size());
+    point.states[w].head(shared) = same->second->head(shared);
   }
   return point;
 }

@@ -168,8 +168,8 @@ class FitProblem {
   std::vector<std::unique_ptr<Worker>> workers_;
 };
 
-// A solution of `from` as a point of `to`, of the same logs and windows: parameters by name (those that `from` lacks
-// start from `values`, which are of `to`), offsets, shift and states as they are.
+// A solution of `from` as a point of `to`, of the same logs: parameters by name (those that `from` lacks start from
+// `values`, which are of `to`), offsets, shift, and states of the windows that both have.
 FitPoint CarryOver(const FitProblem& from, const FitPoint& point, const FitProblem& to,
                    const std::vector<double>& values);
 

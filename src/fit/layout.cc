@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "replay/initial_state.h"
 #include "src/compare/score.h"
@@ -19,14 +20,32 @@ double Weight(const FitOptions& options, const Recording::Measured& measured, co
   return 1 / (options.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean));
 }
 
-bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& layout) {
+// What is scored of a log: the motion, or what follows from forces.
+enum class Scored { kMotion, kForces };
+
+// Whether a scored signal of the kind `is` so.
+template <class Is>
+bool AnyScored(const std::vector<Recording>& recordings, const FitLayout& layout, Scored kind, const Is& is) {
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
-      const SignalTraits& traits = TraitsOf(recordings[l].measured[s].spec.kind);
-      if (traits.stage != SignalStage::kState && layout.signals[l][s].weight > 0) return true;
+      const Recording::Measured& measured = recordings[l].measured[s];
+      const bool of_motion = TraitsOf(measured.spec.kind).stage == SignalStage::kState;
+      if (of_motion == (kind == Scored::kMotion) && layout.signals[l][s].weight > 0 && is(measured)) return true;
     }
   }
   return false;
+}
+
+bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& layout) {
+  return AnyScored(recordings, layout, Scored::kForces, [](const auto&) { return true; });
+}
+
+// Whether all of the motion that is scored comes late by times of the model's: commands that are late by one more time
+// would be the same motion.
+bool DelaysEveryMotion(const Model& model, const std::vector<Recording>& recordings, const FitLayout& layout) {
+  const auto is_late = [&](const Recording::Measured& measured) { return model.source(measured.index).delay >= 0; };
+  return AnyScored(recordings, layout, Scored::kMotion, is_late) &&
+         !AnyScored(recordings, layout, Scored::kMotion, std::not_fn(is_late));
 }
 
 // Joints that no position or speed of the log is of, in the model's order. Not those that an effect added or an
@@ -155,7 +174,8 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
     low.push_back(-1);
     high.push_back(1);
   };
-  if (options.fit_shift && !model.DelaysEveryCommand()) add_shift(&layout.command_shift);
+  if (options.fit_shift && !model.DelaysEveryCommand() && !DelaysEveryMotion(model, recordings, layout))
+    add_shift(&layout.command_shift);
   if (options.fit_shift && ScoresForces(recordings, layout)) add_shift(&layout.force_shift);
   layout.low = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
   layout.high = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));

@@ -378,6 +378,33 @@ TEST(FitProblemTest, LateSensorStartsWhereTheMechanismWas) {
 }
 
 // A held-out error is of the rows that a fit looks at: what a window's start is wrong by shows in forces before them.
+// A problem of two of the windows, and one of all.
+TEST(CarryOverTest, StatesGoWithTheirWindows) {
+  const Rig rig = LoadCart();
+  const std::vector<Recording> logs = {CartLog(rig, 501, 0.01, 1), CartLog(rig, 501, 0.01, 2)};
+  ThreadPool pool(1);
+  FitOptions options = CartOptions(rig, ObjectiveKind::kWindows);
+  FitProblem all(*rig.model, logs, options, rig.model->Nominal(), pool);
+  ASSERT_GT(all.windows().size(), 4u);
+  std::vector<LogWindow> few;
+  for (const std::size_t w : {std::size_t{1}, all.windows().size() - 1})
+    few.push_back({all.windows()[w].log, all.windows()[w].rows});
+  options.windows = std::make_shared<const std::vector<LogWindow>>(few);
+  FitProblem part(*rig.model, logs, options, rig.model->Nominal(), pool);
+  ASSERT_EQ(part.windows().size(), 2u);
+  FitPoint point = part.Start();
+  point.y.setConstant(0.3);
+  for (auto& state : point.states) state.setConstant(0.01);
+  const FitPoint carried = CarryOver(part, point, all, rig.model->Nominal());
+  const FitPoint start = all.Start();
+  EXPECT_LT((carried.y - point.y).norm(), kRounding);
+  for (std::size_t w = 0; w < all.windows().size(); ++w) {
+    const bool shared = w == 1 || w + 1 == all.windows().size();
+    EXPECT_EQ(carried.states[w], shared ? Eigen::VectorXd(point.states[0]) : start.states[w]) << w;
+  }
+  EXPECT_EQ(CarryOver(all, carried, part, rig.model->Nominal()).states, point.states);
+}
+
 TEST(FitProblemTest, LeadInsAreNotPredicted) {
   const Rig rig = LoadCart();
   const std::vector<Recording> logs = {CartLog(rig, 400, 0)};

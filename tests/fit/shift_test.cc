@@ -46,6 +46,26 @@ TEST(FitShiftTest, ForcesReadOnEitherSideOfTheirCommandLeaveTheGainAlone) {
   }
 }
 
+// Where all sensors are late by one time, a shift of the commands is the same motion: the time would be known to a
+// sample at best, and by no slope at all. One sensor's time leaves the shift.
+TEST(FitShiftTest, ALateMotionTakesTheShiftsPlace) {
+  constexpr double kLate_s = 0.012;
+  const Rig rig = LoadRig("flexlink", {"sensor_delay@all"}), one = LoadRig("flexlink", {"sensor_delay@hub_rad"});
+  const int delay = rig.Index("sensor_delay@all.delay_s");
+  const auto command = [](double t) { return 0.4 * std::sin(5 * t + 3 * t * t); };
+  const std::vector<Recording> logs = {
+      MakeLog(rig, rig.Values({{"sensor_delay@all.delay_s", kLate_s}}), command, 4, 0.004, 2e-4, 1)};
+  ThreadPool pool(2);
+  const FitOptions options{.free = {rig.Index("hub.inertia"), delay}, .time_step_s = 0.004};
+  FitProblem problem(*rig.model, logs, options, rig.model->Nominal(), pool);
+  const FitPoint point = Solve(problem, problem.Start(), {.tolerance = 1e-6}).point;
+  EXPECT_EQ(problem.Stamps(point).commands_s, 0);
+  EXPECT_NEAR(problem.Values(point)[static_cast<std::size_t>(delay)], kLate_s, 3e-4);
+  EXPECT_LT(problem.layout().command_shift, 0);
+  const FitOptions of_one{.free = {one.Index("hub.inertia")}, .time_step_s = 0.004};
+  EXPECT_GE(FitProblem(*one.model, logs, of_one, one.model->Nominal(), pool).layout().command_shift, 0);
+}
+
 // A command later than one sample drives the nuisance shift onto its bound: a column must still tell what a delay would
 // explain.
 TEST(ExtraColumnTest, SeesADelayBeyondTheNuisanceShift) {

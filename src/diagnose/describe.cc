@@ -280,6 +280,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
     for (const auto& recording : *part) result.data_s += recording.time_s.back() - recording.time_s.front();
   }
   result.most_steps = bench.most_steps;
+  result.windows.of_sizes = chosen.problem->windows().size();
   result.model = chosen.model;
   result.values = chosen.values;
   result.nominal_values = found.nominal->values;

@@ -272,7 +272,9 @@ void SayWhatWasFitted(const Workbench& bench, Diagnosis* result) {
   result->split = bench.data->how;
   result->by_windows = bench.by_windows;
   result->time_step_s = bench.time_step_s;
-  result->windows = {.fitted = bench.windows->size(), .all = bench.all_windows, .length_s = bench.window_s};
+  result->windows.fitted = bench.windows->size();
+  result->windows.all = bench.all_windows;
+  result->windows.length_s = bench.window_s;
 }
 
 // On every row of the logs, of which fits may have left out some.

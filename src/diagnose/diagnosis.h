@@ -179,6 +179,7 @@ inline bool AreLost(double before, double after) { return before > 1 && after > 
 // Pieces that logs are fitted in; of long logs those that say most.
 struct FittedWindows {
   std::size_t fitted = 0, all = 0;  // of the training logs
+  std::size_t of_sizes = 0;         // that the final set's sizes are fitted to
   double length_s = 0;
 };
 

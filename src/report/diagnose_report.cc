@@ -394,7 +394,10 @@ ordered_json ToJson(const DiagnoseRun& run, Timing timing) {
   if (d.model) json["model"] = JsonModel(RunModelOf(*d.model, d.values));
   if (d.refit_model) json["refit_model"] = JsonModel(RunModelOf(*d.refit_model, d.refit_values));
   json["time_step_s"] = d.time_step_s;
-  json["windows"] = {{"fitted", d.windows.fitted}, {"all", d.windows.all}, {"length_s", d.windows.length_s}};
+  json["windows"] = {{"fitted", d.windows.fitted},
+                     {"of_sizes", d.windows.of_sizes},
+                     {"all", d.windows.all},
+                     {"length_s", d.windows.length_s}};
   if (timing == Timing::kInclude) json["wall_s"] = d.wall_s;
   json["budget"] = {{"work", d.most_steps}, {"spent", d.work.steps}, {"unit", "steps"}, {"cut", d.cut}};
   json["termination"] = d.interrupted ? "interrupted" : d.cut.empty() ? "finished" : "budget spent";
@@ -424,9 +427,10 @@ std::string ToTable(const DiagnoseRun& run) {
     if (!d.next.command.empty()) text += WrappedCommand(d.next.command, 120) + "\n";
   }
   const char* const early = d.interrupted ? ", interrupted" : d.cut.empty() ? "" : ", the whole budget";
-  const auto& [fitted, all, length_s] = d.windows;
-  text += fmt::format("\nfitted: {} of {} windows of {:.3g} s; held out: {}; {:.1f} s{}\n", fitted, all, length_s,
-                      d.split, d.wall_s, early);
+  const auto& [fitted, all, of_sizes, length_s] = d.windows;
+  const std::string sizes = of_sizes > fitted ? fmt::format(", sizes to {}", of_sizes) : "";
+  text += fmt::format("\nfitted: {} of {} windows of {:.3g} s{}; held out: {}; {:.1f} s{}\n", fitted, all, length_s,
+                      sizes, d.split, d.wall_s, early);
   return text;
 }
 

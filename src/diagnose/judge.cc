@@ -150,16 +150,9 @@ class Judging {
     }
   }
 
-  // The least likely one of those that the set can do without; what is left is then chosen. The last one stays, unsure
-  // or not, unless it is unconfirmed.
+  // What is left is then chosen. The last one stays, unsure or not, unless it is unconfirmed.
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
-    auto least = all.end();
-    for (auto s = all.begin(); s != all.end(); ++s) {
-      const StatementNumbers& n = s->numbers;
-      const bool is_spare = IsUnconfirmed(n) || (s->probability < kDiagnosePolicy.probability.present &&
-                                                 (n.gain < kDiagnosePolicy.search.tie || n.gain_held_out < 0));
-      if (is_spare && (least == all.end() || s->probability < least->probability)) least = s;
-    }
+    const auto least = LeastLikelySpare(all);
     if (least == all.end() || (found_.members.size() < 2 && !IsUnconfirmed(least->numbers))) return all.end();
     const EffectSet rest = Without(found_.chosen->effects, least->use);
     Candidate* without = found_.ledger.Find(rest);
@@ -457,6 +450,17 @@ class Judging {
 };
 
 }  // namespace
+
+std::vector<Statement>::iterator LeastLikelySpare(std::vector<Statement>& members) {
+  auto least = members.end();
+  for (auto s = members.begin(); s != members.end(); ++s) {
+    const StatementNumbers& n = s->numbers;
+    const bool is_spare = IsUnconfirmed(n) || (s->probability < kDiagnosePolicy.probability.present &&
+                                               (n.gain < kDiagnosePolicy.search.tie || n.gain_held_out < 0));
+    if (is_spare && (least == members.end() || s->probability < least->probability)) least = s;
+  }
+  return least;
+}
 
 bool AreOneFinding(double gain_a, double gain_b, double together) {
   const auto [less, more] = std::minmax({std::max(gain_a, 0.0), std::max(gain_b, 0.0)});

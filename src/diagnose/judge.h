@@ -15,6 +15,10 @@ bool AreOneFinding(double gain_a, double gain_b, double together);
 // of what it gains beside it. Gains are ln(cost without / cost with); what distinct effects gain adds up in costs.
 bool AreComplements(double gain_a, double gain_b, double together);
 
+// Of a set's members the one to take out first, the least likely of those that it can do without: what is not sure and
+// hardly gains, or not on held-out logs, and what nothing unseen confirms. The end: there is none.
+std::vector<Statement>::iterator LeastLikelySpare(std::vector<Statement>& members);
+
 // Of an effect and a simpler one that it contains, by the probability of what it does beyond that one.
 enum class Told { kSimpler, kTogether, kRicher };
 Told ToldBeyond(double probability);

@@ -74,6 +74,38 @@ TEST(OneFindingTest, TwoThatGainAlikeOrOnlyTogether) {
   EXPECT_FALSE(AreOneFinding(2.4, -0.1, 2.3));
 }
 
+Statement Member(double probability, StatementNumbers numbers) {
+  return {.probability = probability, .numbers = numbers};
+}
+
+// The one held-out log of a late drive may not show it: what is far less likely goes before.
+TEST(SpareTest, TheLeastLikelyGoesFirst) {
+  const StatementNumbers clear = kClear,
+                         late{.gain = 0.3, .gain_held_out = -0.04, .gain_free = 0.4, .discrepancy = 70, .clear = -0.6},
+                         drag{.gain = 0.02, .gain_held_out = -0.02, .gain_free = 0.05, .discrepancy = 8, .clear = -0.6};
+  std::vector<Statement> members = {Member(0.97, clear), Member(0.4, late), Member(0.02, drag)};
+  EXPECT_EQ(LeastLikelySpare(members) - members.begin(), 2);
+  members.pop_back();
+  EXPECT_EQ(LeastLikelySpare(members) - members.begin(), 1);
+  members.pop_back();
+  EXPECT_EQ(LeastLikelySpare(members), members.end());
+}
+
+// Not sure, but it gains on every log: it may say what others need it for.
+TEST(SpareTest, WhatGainsEverywhereStays) {
+  std::vector<Statement> members = {
+      Member(0.3, {.gain = 0.3, .gain_held_out = 0.2, .gain_free = 0.1, .discrepancy = 2, .clear = 1})};
+  EXPECT_EQ(LeastLikelySpare(members), members.end());
+  members.front().numbers.gain = 0.05;
+  EXPECT_EQ(LeastLikelySpare(members), members.begin());
+}
+
+// However sure: it gains on the logs that were fitted alone.
+TEST(SpareTest, WhatNothingUnseenConfirmsIsSpare) {
+  std::vector<Statement> members = {Member(0.9, {.gain = 6, .gain_held_out = -1, .gain_free = -0.2, .clear = -1})};
+  EXPECT_EQ(LeastLikelySpare(members), members.begin());
+}
+
 // Costs 1 with both, 1.3 without either one, 1.4 without both: one alone brings 0.1 of the 0.3 that it brings beside
 // the other. Distinct effects: what they gain adds up, however large it is.
 TEST(ComplementsTest, TwoThatAreSeenOnlyBesideEachOther) {

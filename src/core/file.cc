@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
@@ -79,6 +80,22 @@ std::string MakeFolderOf(const std::string& path) {
 }
 
 }  // namespace
+
+std::vector<std::string> ShortPaths(const std::vector<std::string>& paths) {
+  const auto ends_so = [](std::string_view path, std::string_view names) {
+    return path.ends_with(names) && (path.size() == names.size() || path[path.size() - names.size() - 1] == '/');
+  };
+  std::vector<std::string> all;
+  for (const std::string& path : paths) {
+    std::size_t from = path.rfind('/') + 1;  // 0 where there is none
+    const auto is_shared = [&](const std::string& other) {
+      return other != path && ends_so(other, std::string_view(path).substr(from));
+    };
+    while (from > 0 && std::ranges::any_of(paths, is_shared)) from = from == 1 ? 0 : path.rfind('/', from - 2) + 1;
+    all.push_back(path.substr(from));
+  }
+  return all;
+}
 
 Result<std::string> ReadFile(const std::string& path) {
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));

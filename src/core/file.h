@@ -6,10 +6,15 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "src/core/result.h"
 
 namespace gapscope {
+
+// As short an end of each path, in whole names, as no other path has: "run.csv", or "monday/run.csv" beside
+// "tuesday/run.csv".
+std::vector<std::string> ShortPaths(const std::vector<std::string>& paths);
 
 // The bytes of a regular file. Errors: absent, a folder, unreadable.
 Result<std::string> ReadFile(const std::string& path);

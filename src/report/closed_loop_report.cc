@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "src/core/collect.h"
+#include "src/core/file.h"
 #include "src/report/json.h"
 
 namespace gapscope {
@@ -60,9 +60,10 @@ ordered_json ToJson(const LoopStatistics::Log& log, const std::string& actuator)
 std::string ToTable(const LoopStatistics& loop, const std::vector<std::string>& log_paths) {
   std::string text = fmt::format("\n{:<37} {:<18} {:>10} {:>10} {:>19} {:>8}\n", "statistics", "", "mean", "deviation",
                                  "95 % between", "turns/s");
+  std::vector<std::string> names = ShortPaths(log_paths);
   for (std::size_t l = 0; l < loop.logs.size(); ++l) {
     const LoopStatistics::Log& log = loop.logs[l];
-    std::string name = std::filesystem::path(log_paths[l]).filename().string();
+    std::string& name = names[l];
     const auto line = [&](const std::string& what, const MotionStatistics& s) {
       text += fmt::format("{:<37} {:<18} {:>10.4g} {:>10.4g} {:>9.4g} {:>9.4g} {:>8.3g}\n", name, what, s.mean,
                           s.deviation, s.low, s.high, s.crossings_hz);

@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "src/core/collect.h"
+#include "src/core/file.h"
 #include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
 #include "src/diagnose/probability.h"
@@ -69,9 +70,11 @@ Table BlockTable(const Statement& s) {
   Table table{.title = "Half seconds of the held-out logs that carry it",
               .heads = {"log", "from, s", "to, s", "share of what it gains"},
               .note = "The last row gains least."};
-  for (const BlockGain& block : s.sets->blocks) {
-    table.rows.push_back({std::filesystem::path(block.log).filename().string(), fmt::format("{:g}", block.from_s),
-                          fmt::format("{:g}", block.to_s), fmt::format("{:.1f} %", 100 * block.share)});
+  const std::vector<BlockGain>& blocks = s.sets->blocks;
+  const std::vector<std::string> logs = ShortPaths(Collect(blocks, &BlockGain::log));
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    table.rows.push_back({logs[i], fmt::format("{:g}", blocks[i].from_s), fmt::format("{:g}", blocks[i].to_s),
+                          fmt::format("{:.1f} %", 100 * blocks[i].share)});
   }
   return table;
 }

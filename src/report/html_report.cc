@@ -371,6 +371,8 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
     data["logs"].push_back(std::move(log));
     paths.push_back(recording.log_path);
   }
+  const std::vector<std::string> names = ShortPaths(paths);
+  for (std::size_t k = 0; k < names.size(); ++k) data["logs"][k]["name"] = names[k];
   data["subject"] = Subject(source, paths);
   return data;
 }

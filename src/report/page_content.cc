@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "src/core/collect.h"
+#include "src/core/file.h"
 
 namespace gapscope {
 namespace {
@@ -26,11 +26,12 @@ PageContent::Table ByLogTable(std::vector<LogGap> gaps) {
                                "Errors over each signal's own spread, by parameters fitted without that log or "
                                "part. Noise: what the sensors' own is of it."};
   std::ranges::stable_sort(gaps, std::ranges::greater{}, &LogGap::final);
-  for (const LogGap& gap : gaps) {
+  const std::vector<std::string> logs = ShortPaths(Collect(gaps, &LogGap::log));
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    const LogGap& gap = gaps[i];
     const double closed = ClosedShare(gap.refit, gap.final, gap.floor);
-    table.rows.push_back({std::filesystem::path(gap.log).filename().string(), ShortNumber(gap.from_s, 4),
-                          ShortNumber(gap.until_s, 4), ShortNumber(gap.refit, 3), ShortNumber(gap.final, 3),
-                          ShortNumber(gap.floor, 3),
+    table.rows.push_back({logs[i], ShortNumber(gap.from_s, 4), ShortNumber(gap.until_s, 4), ShortNumber(gap.refit, 3),
+                          ShortNumber(gap.final, 3), ShortNumber(gap.floor, 3),
                           std::isfinite(gap.refit) ? fmt::format("{:.0f} %", 100 * closed) : "–"});
   }
   return table;

@@ -26,6 +26,17 @@ TEST(MappedFileTest, EndsWithAMessageWhereTheFileIsCut) {
   std::filesystem::remove(path);
 }
 
+TEST(ShortPathsTest, AreAsLongAsTellsThemApart) {
+  using Paths = std::vector<std::string>;
+  EXPECT_EQ(ShortPaths({"/logs/monday/run.csv", "/logs/tuesday/run.csv", "/logs/tuesday/other.csv"}),
+            (Paths{"monday/run.csv", "tuesday/run.csv", "other.csv"}));
+  EXPECT_EQ(ShortPaths({"a/x/run.csv", "b/x/run.csv", "run.csv"}), (Paths{"a/x/run.csv", "b/x/run.csv", "run.csv"}));
+  // A name that ends like another one is another name; two parts of one log are one log.
+  EXPECT_EQ(ShortPaths({"/a/run.csv", "/b/prerun.csv", "/a/run.csv"}), (Paths{"run.csv", "prerun.csv", "run.csv"}));
+  EXPECT_EQ(ShortPaths({"/run.csv", "a/run.csv"}), (Paths{"/run.csv", "a/run.csv"}));
+  EXPECT_TRUE(ShortPaths({}).empty());
+}
+
 class PartWriterTest : public testing::Test {
  protected:
   void SetUp() override { ASSERT_TRUE(WriteFile(folder / "a", "old").ok()); }

@@ -4,8 +4,7 @@
 const known = (x) => typeof x === "number" && isFinite(x);
 const number = (x, digits = 4) => (known(x) ? String(Number(x.toPrecision(digits))) : "–");
 const percent = (x) => (known(x) ? `${Math.round(100 * x)} %` : "–");
-const fileName = (path) => path.split("/").pop();
-const logName = (log) => fileName(log.path) + (log.from_s > 0 ? `, from ${number(log.from_s)} s` : "");
+const logName = (log) => log.name + (log.from_s > 0 ? `, from ${number(log.from_s)} s` : "");
 
 function element(tag, attributes = {}, ...children) {
   const made = document.createElement(tag);

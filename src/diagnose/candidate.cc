@@ -53,9 +53,8 @@ Workbench WithLogs(const Workbench& bench, const DataSplit& data, const Model& m
 }
 
 Workbench ForSizes(const Workbench& bench, const Candidate& candidate) {
-  constexpr double kBeyond = 2;
-  const double half_seconds =
-      kBeyond * static_cast<double>(candidate.point.y.size()) / static_cast<double>(bench.coupling->limb_count());
+  const double half_seconds = kDiagnosePolicy.evidence.half_seconds * static_cast<double>(candidate.point.y.size()) /
+                              static_cast<double>(bench.coupling->limb_count());
   const double windows = half_seconds * kFitPolicy.block_s / bench.window_s;
   Workbench wider = bench;
   if (windows > static_cast<double>(bench.windows->size()))

@@ -58,6 +58,8 @@ struct EvidencePolicy {
   // By which intervals of sizes are wider than their covariance says: a set that is not quite right leaves more than
   // noise and torques. Fitted to banks (docs/results/diagnosis.md).
   double interval_factor = 1.6;
+  // Of the windows that sizes are fitted to, for each fitted parameter: with fewer no covariance is left.
+  double half_seconds = 2;
   // Training logs are left out in so many parts, the parameters fitted to the others from where they are.
   std::size_t folds = 5;
   int left_out_iterations = 3;

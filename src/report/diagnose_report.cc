@@ -320,6 +320,7 @@ ordered_json JsonPolicy() {
                                {"evidence.free_run_s", policy.evidence.free_run_s},
                                {"evidence.free_runs", policy.evidence.free_runs},
                                {"evidence.interval_factor", policy.evidence.interval_factor},
+                               {"evidence.half_seconds", policy.evidence.half_seconds},
                                {"evidence.folds", policy.evidence.folds},
                                {"evidence.left_out_iterations", policy.evidence.left_out_iterations},
                                {"evidence.left_out_tolerance", policy.evidence.left_out_tolerance},

@@ -57,7 +57,7 @@ Workbench ForSizes(const Workbench& bench, const Candidate& candidate) {
                               static_cast<double>(bench.coupling->limb_count());
   const double windows = half_seconds * kFitPolicy.block_s / bench.window_s;
   Workbench wider = bench;
-  if (windows > static_cast<double>(bench.windows->size()))
+  if (!candidate.effects.empty() && windows > static_cast<double>(bench.windows->size()))
     ChooseWindows(*candidate.model, static_cast<std::size_t>(std::ceil(windows)), &wider);
   return wider;
 }

@@ -117,7 +117,8 @@ struct FitLimits {
 void FitCandidate(const Workbench& bench, Candidate* candidate, const FitPoint& start, const FitLimits& limits,
                   GiveUp give_up = {}, const Candidate* from = nullptr);
 // With as many windows as intervals of sizes need, where the logs have them: half seconds, counted in each limb, some
-// for each fitted parameter (EvidencePolicy). What a search is made with is enough but for robots of many joints.
+// for each fitted parameter (EvidencePolicy); of a set without effects there are none to tell. What a search is made
+// with is enough but for robots of many joints.
 Workbench ForSizes(const Workbench& bench, const Candidate& candidate);
 // Undamped steps at the end of a fit, in the windows of the bench: directions that the logs leave open go to where the
 // prior pulls them.

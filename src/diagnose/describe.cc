@@ -144,8 +144,7 @@ std::vector<FoundEffect> DescribeEffects(const Workbench& bench, SearchResult& f
   EffectSet before;
   for (std::size_t i = 0; i + 1 < effects.size(); ++i) {
     before = With(before, effects[i].use);
-    Candidate* part = found.ledger.Find(before);
-    if (!part) part = found.ledger.Refit(before, final, {}, {}, Effort::kTry);
+    Candidate* part = found.ledger.FindOrTry(before, final);
     if (!part) continue;
     ScoreCandidate(bench, part);
     effects[i + 1].error_before = part->held_out_error;
@@ -239,7 +238,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   say("looking beside the final set");
   const BesideTorques beside = LookBeside(bench, chosen, found.uses);
   const Workbench for_sizes = ForSizes(bench, chosen);
-  if (!chosen.effects.empty() && for_sizes.windows->size() > bench.windows->size()) {
+  if (for_sizes.windows->size() > bench.windows->size()) {
     say("fitting the final set to more windows");
     PolishCandidate(for_sizes, &chosen);
     ScoreCandidate(bench, &chosen);

@@ -48,8 +48,7 @@ const std::vector<double>& GapShares::Errors(const EffectSet& set) {
   if (!fresh) return place->second;
   const Candidate* candidate = &final_;
   if (set != final_.effects) {
-    Candidate* fitted = found_.ledger.Find(set);
-    if (!fitted) fitted = found_.ledger.Refit(set, final_, {}, {}, Effort::kTry);
+    Candidate* fitted = found_.ledger.FindOrTry(set, final_);
     if (!fitted) return place->second;
     ScoreCandidate(bench_, fitted);
     candidate = fitted;

@@ -154,9 +154,7 @@ class Judging {
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
     const auto least = LeastLikelySpare(all);
     if (least == all.end() || (found_.members.size() < 2 && !IsUnconfirmed(least->numbers))) return all.end();
-    const EffectSet rest = Without(found_.chosen->effects, least->use);
-    Candidate* without = found_.ledger.Find(rest);
-    if (!without) without = found_.ledger.Refit(rest, *found_.chosen, {}, {}, Effort::kTry);
+    Candidate* without = found_.ledger.FindOrTry(Without(found_.chosen->effects, least->use), *found_.chosen);
     if (!without) return all.end();
     evidence_.Choose(without);
     return least;
@@ -251,11 +249,16 @@ class Judging {
     return most;
   }
 
+  // As these logs and the base model have them.
+  bool AreOne(const EffectUse& a, const EffectUse& b) const {
+    return AreOneMotion(a, b, *found_.base->model, found_.logged);
+  }
+
   // Whether it could be in the place of a member that the set leaves out: it then gains what that one gained.
   bool StandsIn(const EffectUse& use, const EffectSet& set) const {
     return std::any_of(found_.members.begin(), found_.members.end(), [&](const Member& member) {
-      return !Has(set, member.use) && (AreOneMotion(use, member.use, *found_.base->model, found_.logged) ||
-                                       ImitatedBy(member.use, use) >= kDiagnosePolicy.search.imitates);
+      return !Has(set, member.use) &&
+             (AreOne(use, member.use) || ImitatedBy(member.use, use) >= kDiagnosePolicy.search.imitates);
     });
   }
 
@@ -265,8 +268,7 @@ class Judging {
     const EffectSet rest = Without(set, member);
     const Candidate *own = found_.ledger.Find(set), *other = found_.ledger.Find(With(rest, use));
     if (!own || !other) return kInfinity;
-    const Candidate* without = found_.ledger.Find(rest);
-    if (!without) without = found_.ledger.Refit(rest, *own, {}, {}, Effort::kTry);
+    const Candidate* without = found_.ledger.FindOrTry(rest, *own);
     return without && Gain(*without, *own) >= kDiagnosePolicy.search.tie ? Gain(*other, *own) : kInfinity;
   }
 
@@ -276,7 +278,7 @@ class Judging {
     std::vector<Rival> rivals;
     for (const EffectUse& use : found_.uses) {
       if (Has(found_.chosen->effects, use)) continue;
-      double behind = AreOneMotion(use, member.use, *found_.base->model, found_.logged) ? 0 : kInfinity;
+      double behind = AreOne(use, member.use) ? 0 : kInfinity;
       for (const Rival& tried : member.rivals) {
         if (tried.use == use) behind = std::min(behind, tried.behind);
       }
@@ -302,12 +304,11 @@ class Judging {
       result->statements[m].rivals = rivals;
       for (const Rival& rival : rivals) {
         const Model& base = *found_.base->model;
-        const bool one = AreOneMotion(rival.use, member.use, base, found_.logged);
-        if (!one && rival.behind > TieOf(member.gain)) continue;
+        if (!AreOne(rival.use, member.use) && rival.behind > TieOf(member.gain)) continue;
         if (IsLessLikely(rival.use, member.use, base)) continue;
         TellWith(member.use, rival.use, "costs as little in its place", result);
         for (const EffectUse& use : found_.uses) {
-          if (!Has(found_.chosen->effects, use) && AreOneMotion(use, rival.use, base, found_.logged))
+          if (!Has(found_.chosen->effects, use) && AreOne(use, rival.use))
             TellWith(member.use, use, "is one motion with " + rival.use.Text(), result);
         }
       }

@@ -72,6 +72,11 @@ Candidate* Ledger::Find(const EffectSet& set) const {
   return place == fitted_.end() || !std::isfinite(place->second->train_cost) ? nullptr : place->second.get();
 }
 
+Candidate* Ledger::FindOrTry(const EffectSet& set, const Candidate& from) {
+  Candidate* fitted = Find(set);
+  return fitted ? fitted : Refit(set, from, {}, {}, Effort::kTry);
+}
+
 std::vector<Candidate*> Ledger::All() const {
   std::vector<Candidate*> all;
   for (const auto& [set, candidate] : fitted_) {

@@ -27,6 +27,8 @@ class Ledger {
 
   // Null: the set was not refitted, or cannot be.
   Candidate* Find(const EffectSet& set) const;
+  // Where it was not refitted, it is tried from there.
+  Candidate* FindOrTry(const EffectSet& set, const Candidate& from);
   // Every set that could be fitted, in the order of effects.
   std::vector<Candidate*> All() const;
   // Fits the set from another set's solution; `values`: of effects that the other one lacks, by the names of their

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <tuple>
 
 #include "src/core/collect.h"
@@ -328,14 +327,19 @@ FitPoint CarryOver(const FitProblem& from, const FitPoint& at, const FitProblem&
   for (const auto& [theirs, ours] : SharedNuisances(from.layout(), to.layout())) point.y[ours] = at.y[theirs];
   // A window that only this one has starts where the log has it, and a motor side that only one of the two has is
   // where the pre-roll leaves it.
-  std::map<std::pair<std::size_t, std::size_t>, const Eigen::VectorXd*> theirs;  // by log and first row
-  for (std::size_t w = 0; w < at.states.size(); ++w)
-    theirs[{from.windows()[w].log, from.windows()[w].rows.begin}] = &at.states[w];
+  // Both have them in the logs' order.
+  const std::vector<FitWindow>& theirs = from.windows();
+  auto next = theirs.begin();
   for (std::size_t w = 0; w < point.states.size(); ++w) {
-    const auto same = theirs.find({to.windows()[w].log, to.windows()[w].rows.begin});
+    const FitWindow& window = to.windows()[w];
+    const auto same = std::find_if(next, theirs.end(), [&](const FitWindow& other) {
+      return other.log == window.log && other.rows.begin == window.rows.begin && other.rows.end == window.rows.end;
+    });
     if (same == theirs.end()) continue;
-    const Eigen::Index shared = std::min(point.states[w].size(), same->second->size());
-    point.states[w].head(shared) = same->second->head(shared);
+    const Eigen::VectorXd& state = at.states[static_cast<std::size_t>(same - theirs.begin())];
+    const Eigen::Index shared = std::min(point.states[w].size(), state.size());
+    point.states[w].head(shared) = state.head(shared);
+    next = same + 1;
   }
   return point;
 }

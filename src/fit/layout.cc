@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "replay/initial_state.h"
 #include "src/compare/score.h"
@@ -20,32 +19,28 @@ double Weight(const FitOptions& options, const Recording::Measured& measured, co
   return 1 / (options.normalization == Normalization::kDeviation ? deviation : std::hypot(deviation, moments.mean));
 }
 
-// What is scored of a log: the motion, or what follows from forces.
-enum class Scored { kMotion, kForces };
+// What is scored: signals of the motion, and those that follow from forces.
+struct ScoredSignals {
+  std::vector<const Recording::Measured*> motion, forces;
+};
 
-// Whether a scored signal of the kind `is` so.
-template <class Is>
-bool AnyScored(const std::vector<Recording>& recordings, const FitLayout& layout, Scored kind, const Is& is) {
+ScoredSignals FindScored(const std::vector<Recording>& recordings, const FitLayout& layout) {
+  ScoredSignals scored;
   for (std::size_t l = 0; l < recordings.size(); ++l) {
     for (std::size_t s = 0; s < recordings[l].measured.size(); ++s) {
       const Recording::Measured& measured = recordings[l].measured[s];
+      if (!(layout.signals[l][s].weight > 0)) continue;
       const bool of_motion = TraitsOf(measured.spec.kind).stage == SignalStage::kState;
-      if (of_motion == (kind == Scored::kMotion) && layout.signals[l][s].weight > 0 && is(measured)) return true;
+      (of_motion ? scored.motion : scored.forces).push_back(&measured);
     }
   }
-  return false;
+  return scored;
 }
 
-bool ScoresForces(const std::vector<Recording>& recordings, const FitLayout& layout) {
-  return AnyScored(recordings, layout, Scored::kForces, [](const auto&) { return true; });
-}
-
-// Whether all of the motion that is scored comes late by times of the model's: commands that are late by one more time
-// would be the same motion.
-bool DelaysEveryMotion(const Model& model, const std::vector<Recording>& recordings, const FitLayout& layout) {
-  const auto is_late = [&](const Recording::Measured& measured) { return model.source(measured.index).delay >= 0; };
-  return AnyScored(recordings, layout, Scored::kMotion, is_late) &&
-         !AnyScored(recordings, layout, Scored::kMotion, std::not_fn(is_late));
+// Whether they come late by times of the model's: commands that are late by one more time would be the same motion.
+bool AreLate(const Model& model, const std::vector<const Recording::Measured*>& motion) {
+  return !motion.empty() &&
+         std::ranges::all_of(motion, [&](const auto* signal) { return model.source(signal->index).delay >= 0; });
 }
 
 // Joints that no position or speed of the log is of, in the model's order. Not those that an effect added or an
@@ -174,9 +169,10 @@ FitLayout MakeLayout(const Model& model, const std::vector<Recording>& recording
     low.push_back(-1);
     high.push_back(1);
   };
-  if (options.fit_shift && !model.DelaysEveryCommand() && !DelaysEveryMotion(model, recordings, layout))
+  const ScoredSignals scored = FindScored(recordings, layout);
+  if (options.fit_shift && !model.DelaysEveryCommand() && !AreLate(model, scored.motion))
     add_shift(&layout.command_shift);
-  if (options.fit_shift && ScoresForces(recordings, layout)) add_shift(&layout.force_shift);
+  if (options.fit_shift && !scored.forces.empty()) add_shift(&layout.force_shift);
   layout.low = Eigen::Map<Eigen::VectorXd>(low.data(), static_cast<Eigen::Index>(low.size()));
   layout.high = Eigen::Map<Eigen::VectorXd>(high.data(), static_cast<Eigen::Index>(high.size()));
   return layout;

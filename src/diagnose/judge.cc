@@ -222,7 +222,7 @@ class Judging {
         Weigh({x.use, y.use}, &both);
         both.prior = std::min(PriorOf(x.use), PriorOf(y.use));
         both.probability = AtPrior(both.evidence, both.prior);
-        if (both.probability < present || !AreComplements(x.numbers.gain, y.numbers.gain, both.numbers.gain)) continue;
+        if (both.probability < present || !AreComplements(x.numbers, y.numbers, both.numbers)) continue;
         const EffectUse of_x = x.use, of_y = y.use;
         x = y = both;
         x.use = of_x, x.beside = of_y;
@@ -231,12 +231,13 @@ class Judging {
     }
   }
 
-  // Whether what both gain, at least what one of them does, could make them complements.
+  // Whether what both gain could make them complements: on the fitted logs that is at least what one of them does.
   bool CouldBeComplements(const Statement& x, const Statement& y) const {
     const auto of_x = bench_.LimbsOf(x.use), of_y = bench_.LimbsOf(y.use);
     bool touch = false;
     for (std::size_t l = 0; l < of_x.size(); ++l) touch = touch || (of_x[l] && of_y[l]);
-    return touch && AreComplements(x.numbers.gain, y.numbers.gain, std::max(x.numbers.gain, y.numbers.gain));
+    return touch && (AreComplements(x.numbers.gain, y.numbers.gain, std::max(x.numbers.gain, y.numbers.gain)) ||
+                     std::min(x.numbers.gain_held_out, y.numbers.gain_held_out) >= kDiagnosePolicy.search.tie);
   }
 
   double ImitatedBy(const EffectUse& a, const EffectUse& b) const {
@@ -473,6 +474,11 @@ bool AreComplements(double gain_a, double gain_b, double together) {
   const double a = std::expm1(gain_a), b = std::expm1(gain_b), both = std::expm1(together);
   const double alone = kDiagnosePolicy.evidence.alone;
   return a > 0 && b > 0 && both - b <= alone * a && both - a <= alone * b;
+}
+
+bool AreComplements(const StatementNumbers& a, const StatementNumbers& b, const StatementNumbers& together) {
+  return AreComplements(a.gain, b.gain, together.gain) ||
+         AreComplements(a.gain_held_out, b.gain_held_out, together.gain_held_out);
 }
 
 Told ToldBeyond(double probability) {

@@ -14,6 +14,8 @@ bool AreOneFinding(double gain_a, double gain_b, double together);
 // Whether two members are seen only beside each other: either one, where the other one is missing, gains at most half
 // of what it gains beside it. Gains are ln(cost without / cost with); what distinct effects gain adds up in costs.
 bool AreComplements(double gain_a, double gain_b, double together);
+// On the logs that were fitted, or on those that were held out: there one alone may do harm.
+bool AreComplements(const StatementNumbers& a, const StatementNumbers& b, const StatementNumbers& together);
 
 // Of a set's members the one to take out first, the least likely of those that it can do without: what is not sure and
 // hardly gains, or not on held-out logs, and what nothing unseen confirms. The end: there is none.

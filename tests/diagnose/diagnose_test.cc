@@ -51,6 +51,8 @@ Logs MakeLogs(const std::string& rig, twin::Kind kind, const std::string& effect
   return logs;
 }
 
+const DiagnoseOptions kQuick{.effort = SearchEffort::kQuick};
+
 // Without the design of a next experiment, which none of these tests reads.
 Diagnosis DiagnoseLogs(const Logs& logs, DiagnoseOptions options = {}) {
   options.next_experiment = false;
@@ -148,7 +150,7 @@ TEST(DiagnoseTest, NamesNothingWhereNothingIsMissing) {
 // A cable and dry friction: each alone bends to do what the other one does, and fails on the windows that were held
 // out.
 TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
-  const Diagnosis d = DiagnoseLogs(MakeLogs("flexlink", twin::Kind::kAuto, "", 913, 19));
+  const Diagnosis d = DiagnoseLogs(MakeLogs("flexlink", twin::Kind::kAuto, "", 913, 19), kQuick);
   ASSERT_EQ(d.verdict, Verdict::kEffects) << d.explanation;
   ASSERT_EQ(d.effects.size(), 2u);
   std::vector<std::string> names = {d.effects[0].use.Text(), d.effects[1].use.Text()};
@@ -161,15 +163,14 @@ TEST(DiagnoseTest, NamesTwoEffectsThatFailAlone) {
 // model, whatever effort goes into effects.
 TEST(DiagnoseTest, FreeRunsFindZeroOffsets) {
   Logs logs = MakeLogs("qube", twin::Kind::kNone, "", 35, 0, 1);
-  const DiagnoseOptions quick{.effort = SearchEffort::kQuick};
-  const Diagnosis as_logged = DiagnoseLogs(logs, quick);
+  const Diagnosis as_logged = DiagnoseLogs(logs, kQuick);
   for (auto& recording : logs.recordings) {
     for (auto& measured : recording.measured) {
       if (measured.spec.on != "pendulum") continue;
       for (double& value : measured.values) value += 0.1;
     }
   }
-  const Diagnosis off = DiagnoseLogs(logs, quick);
+  const Diagnosis off = DiagnoseLogs(logs, kQuick);
   EXPECT_NEAR(off.evidence.free_run_before / as_logged.evidence.free_run_before, 1, 0.1);
 }
 
@@ -179,7 +180,7 @@ TEST(DiagnoseTest, ShuffledCommandsAreNoEffect) {
   std::mt19937_64 random(5);
   for (auto& recording : logs.recordings)
     std::shuffle(recording.commands[0].values.begin(), recording.commands[0].values.end(), random);
-  const Diagnosis d = DiagnoseLogs(logs);
+  const Diagnosis d = DiagnoseLogs(logs, kQuick);
   EXPECT_EQ(d.verdict, Verdict::kUnknown) << d.explanation;
 }
 

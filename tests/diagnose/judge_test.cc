@@ -116,6 +116,16 @@ TEST(ComplementsTest, TwoThatAreSeenOnlyBesideEachOther) {
   EXPECT_FALSE(AreComplements(std::log(1.3), -0.1, std::log(1.3)));
 }
 
+// Squared errors on held-out logs: 1 with both, 16 and 9 without either one, 2.6 without both. One alone does harm.
+TEST(ComplementsTest, OneAloneDoesHarmOnLogsThatAreHeldOut) {
+  const StatementNumbers a{.gain = std::log(5), .gain_held_out = std::log(16)},
+      b{.gain = std::log(6), .gain_held_out = std::log(9)};
+  StatementNumbers both{.gain = std::log(12), .gain_held_out = std::log(2.6)};
+  EXPECT_TRUE(AreComplements(a, b, both));
+  both.gain_held_out = std::log(26);
+  EXPECT_FALSE(AreComplements(a, b, both));
+}
+
 // Odds multiply: 1 to 3 at nine to one are 3 to 1.
 TEST(PriorTest, MultipliesTheOdds) {
   EXPECT_DOUBLE_EQ(AtPrior(0.25, 0.9), 0.75);

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 collect_ignore = ["try_wheel.py", "bench.py", "mjlab", "isaaclab", "engines"]
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell ignores in what it starts with "&"
 
 
 @pytest.fixture(autouse=True)

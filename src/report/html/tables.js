@@ -37,13 +37,14 @@ function writeConditions(where) {
   if (where.length) show("where");
 }
 
-// Words and numbers as the program wrote them; what begins with a digit or a sign stands to the right.
+// Words and numbers as the program wrote them: the first cell names its row; of the others what begins with a digit or
+// a sign stands to the right.
 function writeTables(tables) {
-  const cell = (text) => (/^[-+−]?[0-9]/.test(text) ? {number: text} : text);
+  const cell = (text, i) => (i > 0 && /^[-+−]?[0-9]/.test(text) ? {number: text} : text);
   for (const {title, heads, rows, note} of tables) {
     show("tables").append(
       element("h2", {}, title),
-      table(title, heads.map((h, i) => (rows[0] && typeof cell(rows[0][i]) === "object" ? {number: h} : h)),
+      table(title, heads.map((h, i) => (rows[0] && typeof cell(rows[0][i], i) === "object" ? {number: h} : h)),
         rows.map((row) => row.map(cell))),
       note ? element("p", {class: "note"}, note) : "",
     );

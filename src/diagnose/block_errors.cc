@@ -26,6 +26,12 @@ BlockErrors ErrorsByBlock(const std::vector<LogReplay>& logs) {
   return all;
 }
 
+double SignalErrors::Rms() const {
+  double sum = 0;
+  for (const auto& [block, square] : squares) sum += square;
+  return std::sqrt(sum / rows);
+}
+
 BlockSquares SquaresByBlock(const BlockErrors& errors, const std::function<double(std::size_t, std::size_t)>& weight) {
   BlockSquares sums;
   for (std::size_t l = 0; l < errors.size(); ++l) {

@@ -17,6 +17,8 @@ struct SignalErrors {
   double deviation = 0;  // of what was measured, over the whole log
   double rows = 0;
   std::map<long, double> squares;  // by half second
+
+  double Rms() const;  // NaN: nothing was simulated
 };
 using BlockErrors = std::vector<std::vector<SignalErrors>>;  // by log and signal
 BlockErrors ErrorsByBlock(const std::vector<LogReplay>& logs);

@@ -250,7 +250,7 @@ Result<Diagnosis> Describe(SearchResult& found, const Workbench& bench, const De
   result.nominal = found.nominal->held_out_error;
   result.refit = base.held_out_error;
   result.final = chosen.held_out_error;
-  result.floor = std::min(FloorError(bench.data->held_out, noise), result.final);
+  result.floor = std::min(FloorError(bench.data->held_out, chosen.held_out, noise), result.final);
   result.closed = ClosedShare(result.refit, result.final, result.floor);
   say("leaving each log out");
   const LeftOut left_out = LeaveOut(for_sizes, base, chosen, noise);

@@ -46,20 +46,22 @@ std::optional<Candidate> FitAgain(const Workbench& bench, const Candidate& fitte
 }
 
 // On the held-out logs of `bench`.
-std::vector<double> ErrorsOf(const Workbench& bench, std::optional<Candidate> candidate) {
+BlockErrors ErrorsOf(const Workbench& bench, std::optional<Candidate> candidate) {
   if (!candidate) return {};
   ScoreCandidate(bench, &*candidate);
-  return NormalisedErrors(candidate->held_out);
+  return std::move(candidate->held_out);
 }
 
-void Append(const std::vector<Recording>& logs, const std::vector<double>& before, const std::vector<double>& after,
+void Append(const std::vector<Recording>& logs, const BlockErrors& before, const BlockErrors& after,
             const std::vector<double>& noise, std::vector<LogGap>* gaps) {
+  const std::vector<double> refits = NormalisedErrors(before), finals = NormalisedErrors(after);
   for (std::size_t l = 0; l < logs.size(); ++l) {
-    const double refit = l < before.size() ? before[l] : kInfinity, final = l < after.size() ? after[l] : kInfinity;
+    const double refit = l < refits.size() ? refits[l] : kInfinity, final = l < finals.size() ? finals[l] : kInfinity;
+    const std::span left = std::span(after).subspan(std::min(l, after.size())).first(l < after.size() ? 1 : 0);
     gaps->push_back({.log = logs[l].log_path,
                      .refit = refit,
                      .final = final,
-                     .floor = std::min(FloorError({&logs[l], 1}, noise), final),
+                     .floor = std::min(FloorError({&logs[l], 1}, left, noise), final),
                      .from_s = logs[l].start_s,
                      .until_s = logs[l].start_s + logs[l].duration_s()});
   }
@@ -94,11 +96,14 @@ void LeaveWindowsOut(const Workbench& bench, const Candidate& final, LeftOut* re
 
 }  // namespace
 
-double FloorError(std::span<const Recording> logs, const std::vector<double>& noise) {
+double FloorError(std::span<const Recording> logs, std::span<const BlockErrors::value_type> errors,
+                  const std::vector<double>& noise) {
   double sum = 0, signals = 0;
-  for (const auto& log : logs) {
-    for (const auto& measured : log.measured) {
-      const double share = noise[measured.index] / MomentsOf(measured.values).deviation;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    for (std::size_t s = 0; s < logs[l].measured.size(); ++s) {
+      const auto& measured = logs[l].measured[s];
+      const double error = l < errors.size() ? errors[l][s].Rms() : kInfinity,
+                   share = std::min(noise[measured.index], error) / MomentsOf(measured.values).deviation;
       if (measured.spec.scored && std::isfinite(share)) sum += share * share, signals += 1;
     }
   }
@@ -123,7 +128,7 @@ std::optional<ClosedByLog> ClosedOf(std::span<const LogGap> gaps) {
 LeftOut LeaveOut(const Workbench& bench, const Candidate& base, const Candidate& final,
                  const std::vector<double>& noise) {
   LeftOut result;
-  Append(bench.data->held_out, NormalisedErrors(base.held_out), NormalisedErrors(final.held_out), noise, &result.gaps);
+  Append(bench.data->held_out, base.held_out, final.held_out, noise, &result.gaps);
   if (final.effects.empty()) return result;
   if (bench.by_windows)
     LeaveWindowsOut(bench, final, &result);

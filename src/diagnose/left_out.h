@@ -10,8 +10,10 @@
 
 namespace gapscope {
 
-// The sensors' noise as a normalised error. `noise`: by the experiment's signals, SI.
-double FloorError(std::span<const Recording> logs, const std::vector<double>& noise);
+// What the sensors' noise is of the normalised error, of no signal more than its error; all of it where a log was not
+// simulated (`errors` is empty). `noise`: by the experiment's signals, SI.
+double FloorError(std::span<const Recording> logs, std::span<const BlockErrors::value_type> errors,
+                  const std::vector<double>& noise);
 
 struct LeftOut {
   std::vector<LogGap> gaps;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "src/core/statistics.h"
+#include "src/diagnose/left_out.h"
 
 namespace gapscope {
 namespace {
@@ -47,6 +48,33 @@ TEST(BlockErrorsTest, HalfSecondsHoldWhatWasMissedInThem) {
   const BlockSquares squares =
       SquaresByBlock(ErrorsByBlock({log}), [](std::size_t, std::size_t s) { return s == 0 ? 3 : 1; });
   for (const auto& [block, square] : squares) EXPECT_NEAR(square, block.second == 1 ? 12 : 0, 1e-12);
+}
+
+// A signal whose noise is larger than its error hides nothing of the one beside it.
+TEST(FloorErrorTest, NoSignalsNoiseIsMoreThanItsError) {
+  LogReplay log;
+  Recording recording;
+  for (const double off : {0.3, 0.1}) {
+    SignalTrace trace{.scored = true};
+    Recording::Measured measured{.index = recording.measured.size()};
+    measured.spec.scored = true;
+    for (int r = 0; r < 40; ++r) {
+      measured.values.push_back(r % 2);
+      trace.measured.push_back(r % 2);
+      trace.predicted.push_back(r % 2 + off);
+    }
+    log.signals.push_back(trace);
+    recording.measured.push_back(measured);
+  }
+  for (int r = 0; r < 40; ++r) log.time_s.push_back(0.1 * r);
+  const BlockErrors errors = ErrorsByBlock({log});
+  const double deviation = MomentsOf(log.signals[0].measured).deviation;
+  const auto floor = [&](double first, double second) {
+    return deviation * FloorError({&recording, 1}, errors, {first, second});
+  };
+  EXPECT_NEAR(floor(0.03, 0.04), std::sqrt((0.03 * 0.03 + 0.04 * 0.04) / 2), 1e-9);
+  EXPECT_NEAR(floor(0.03, 0.8), std::sqrt((0.03 * 0.03 + 0.1 * 0.1) / 2), 1e-9);
+  EXPECT_NEAR(deviation * FloorError({&recording, 1}, {}, {0.03, 0.8}), std::sqrt((0.03 * 0.03 + 0.64) / 2), 1e-9);
 }
 
 }  // namespace

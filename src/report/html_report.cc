@@ -223,13 +223,12 @@ ordered_json Traces(const ReportSource& source, const ShownLog& log, std::size_t
   return json;
 }
 
-// "Replay of a.csv and b.csv with qube.xml". `logs`: paths, in the order of the page.
+// "Replay of a.csv and b.csv with qube.xml". `logs`: their short paths, in the order of the page; one may have parts.
 std::string Subject(const ReportSource& source, const std::vector<std::string>& logs) {
   constexpr std::size_t kNamed = 3;
   std::vector<std::string> names;
-  for (const auto& log : logs) {
-    std::string name = std::filesystem::path(log).filename().string();
-    if (std::ranges::find(names, name) == names.end()) names.push_back(std::move(name));
+  for (const std::string& log : logs) {
+    if (std::ranges::find(names, log) == names.end()) names.push_back(log);
   }
   const bool more = names.size() > kNamed;
   names.resize(std::min(names.size(), kNamed));
@@ -373,7 +372,7 @@ ordered_json Data(const ordered_json& result, const ReportSource& source, std::s
   }
   const std::vector<std::string> names = ShortPaths(paths);
   for (std::size_t k = 0; k < names.size(); ++k) data["logs"][k]["name"] = names[k];
-  data["subject"] = Subject(source, paths);
+  data["subject"] = Subject(source, names);
   return data;
 }
 

@@ -42,8 +42,16 @@ struct Foretold {
 };
 Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit);
 
-// The first question that an input of the library would settle, with that input; else the first one, and why there is
-// none. `noise`: of each measured signal, SI. Limits that the experiment does not state are what the logs reached.
+// Whether the question would be open no longer, whichever explanation holds.
+bool Settles(const OpenQuestion& question, const Foretold& foretold);
+
+// The least length in s that would settle the question if an input so many times as long said so many times as much; 0:
+// none of those that are tried.
+double LengthThatSettles(const OpenQuestion& question, ForetoldMisfit misfit);
+
+// The first question that an input of the library would settle, with that input, as short as will do; else the first
+// one, and why there is none. `noise`: of each measured signal, SI. Limits that the experiment does not state are what
+// the logs reached.
 NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise);
 
 }  // namespace gapscope

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "src/core/statistics.h"
 #include "src/diagnose/probability.h"
@@ -70,6 +71,30 @@ TEST(ForetellTest, ARivalThatDoesWorseSpeaksForTheOther) {
   EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 1, .not_there = 0}).if_present, 0.8);
   EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 0.7, .not_there = 0}).if_present, 0.4);
   EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 1, .not_there = 0}).if_absent, 0.4);
+}
+
+// An input settles a question where nothing of it is open afterwards, whichever way it comes out.
+TEST(SettlesTest, OnlyWhereBothAnswersAreSure) {
+  EXPECT_TRUE(Settles(Unsure(), {.if_present = 0.85, .if_absent = 0.1}));
+  EXPECT_FALSE(Settles(Unsure(), {.if_present = 0.75, .if_absent = 0.1})) << "open still if it is there";
+  EXPECT_FALSE(Settles(Unsure(), {.if_present = 0.85, .if_absent = 0.3})) << "open still if it is not";
+  OpenQuestion between{.together = 0.7};
+  between.next.probability = 0.35;
+  EXPECT_TRUE(Settles(between, {.if_present = 0.7, .if_absent = 0}));
+  EXPECT_FALSE(Settles(between, {.if_present = 0.7, .if_absent = 0.35})) << "told together where the second one holds";
+  EXPECT_FALSE(Settles(between, {.if_present = 0.35, .if_absent = 0})) << "told together where the first one holds";
+}
+
+TEST(LengthThatSettlesTest, TheLessAnInputSaysTheLongerItIs) {
+  std::vector<double> lengths;
+  for (const double there : {30.0, 2.0, 1.0, 0.5, 0.0})
+    lengths.push_back(LengthThatSettles(Unsure(), {.seconds = 8, .there = there}));
+  EXPECT_EQ(lengths.front(), 8);
+  EXPECT_EQ(lengths.back(), 0) << "no length does where it says nothing";
+  EXPECT_NE(std::ranges::find(lengths, 16), lengths.end());
+  EXPECT_NE(std::ranges::find(lengths, 32), lengths.end());
+  // Longer and longer, then none.
+  EXPECT_TRUE(std::ranges::is_sorted(lengths, {}, [](double s) { return s == 0 ? kInfinity : s; }));
 }
 
 }  // namespace

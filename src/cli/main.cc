@@ -2,7 +2,10 @@
 #include <fmt/core.h>
 #include <malloc.h>
 
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 
 #include "src/cli/arguments.h"
@@ -21,6 +24,16 @@ int Refuse(const Error& error, bool json) {
   return kBadInput;
 }
 
+// What was printed may wait for room that a full disk behind it does not have.
+int Printed(int status, bool json) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+  return Refuse({.what = "cannot write all that was to be printed",
+                 .where = "standard output",
+                 .actual = std::strerror(errno),
+                 .cure = "what --out names is written all the same"},
+                json);
+}
+
 int Main(int argc, char** argv) {
   SetCommandLine(argc, argv);
   const bool json = AsksForJsonProgress(argc, argv);
@@ -28,10 +41,10 @@ int Main(int argc, char** argv) {
   int status = kDone;
   const auto command = ReadArguments(argc, argv, commands, &status);
   if (!command.ok()) return Refuse(command.error(), json);
-  if (!command.value()) return status;
+  if (!command.value()) return Printed(status, json);
   const auto run = [&] {
     const auto done = command.value()->run();
-    return done.ok() ? done.value() : Refuse(done.error(), json);
+    return done.ok() ? Printed(done.value(), json) : Refuse(done.error(), json);
   };
   const auto& leave_out = command.value()->leave_out_plugins;
   if (!leave_out || !leave_out("")) return run();
@@ -50,6 +63,7 @@ int main(int argc, char** argv) {
   // of what a robot of 29 joints takes.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   gapscope::EndWhereMappedFileIsCut();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file beyond the size that is allowed is an error, as on a full disk
   try {
     return gapscope::cli::Main(argc, argv);
   } catch (const std::exception& e) {

@@ -290,6 +290,17 @@ TEST_F(CliTest, AnUnwritableOutIsRefused) {
   EXPECT_EQ(nowhere.out, "") << "no result is printed that was not written";
 }
 
+// A device that takes nothing stands for a full disk.
+TEST_F(CliTest, WhatIsPrintedIntoNothingIsAnError) {
+  const std::string log = JointLog();
+  for (const std::string& words :
+       {std::string("--help"), std::string("--version"), "replay " + Joint() + " '" + log + "'"}) {
+    const Answer answer = Run(words + " >/dev/full");
+    EXPECT_EQ(answer.status, 2) << words;
+    EXPECT_NE(answer.err.find("standard output: cannot write all that was to be printed"), std::string::npos) << words;
+  }
+}
+
 TEST_F(CliTest, FailAboveIsStatusOne) {
   const std::string replay = "replay " + Joint() + " '" + JointLog() + "' --quiet --json";
   const auto json = nlohmann::json::parse(Run(replay).out);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -54,6 +55,24 @@ void GiveRoomToDelays(mjSpec* spec) {
   }
 }
 
+// A replay draws nothing: visual geometry takes 7 to 15 % of a step, lights and cameras 2 to 6 %. Cameras that a sensor
+// is on stay.
+void LeaveOutPictures(mjSpec* spec) {
+  spec->compiler.discardvisual = 1;
+  while (mjsElement* light = mjs_firstElement(spec, mjOBJ_LIGHT)) mjs_delete(spec, light);
+  std::set<std::string> seen;
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_SENSOR); e; e = mjs_nextElement(spec, e)) {
+    const mjsSensor* sensor = mjs_asSensor(e);
+    if (sensor->objtype == mjOBJ_CAMERA) seen.insert(mjs_getString(sensor->objname));
+    if (sensor->reftype == mjOBJ_CAMERA) seen.insert(mjs_getString(sensor->refname));
+  }
+  std::vector<mjsElement*> drawn;
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_CAMERA); e; e = mjs_nextElement(spec, e)) {
+    if (!seen.contains(mjs_getString(mjs_getName(e)))) drawn.push_back(e);
+  }
+  for (mjsElement* camera : drawn) mjs_delete(spec, camera);
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const Model>> Model::Load(const Experiment& experiment) {
@@ -71,7 +90,7 @@ Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig
   for (const auto& use : effects) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
   GiveRoomToDelays(structure.spec.get());
-  structure.spec->compiler.discardvisual = 1;  // a replay needs no pictures: 7-15 % of a step
+  LeaveOutPictures(structure.spec.get());
   if (contacts == Contacts::kNone) structure.spec->option.disableflags |= mjDSBL_CONTACT;
   GS_RETURN_IF_ERROR(model->Compile(&structure));
   model->FindMirrored();

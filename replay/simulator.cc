@@ -169,15 +169,19 @@ double Simulator::Read(const SignalSource& source) const {
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
-bool Simulator::Begin(const Recording& recording, Window window, const InitialState& start) {
-  const mjModel* m = mujoco_.get();
-  mjData* d = data_.get();
-  mj_resetData(m, d);
+bool Simulator::Recall(const Recording& recording, Window window) {
+  mj_resetData(mujoco_.get(), data_.get());
   std::fill(held_.begin(), held_.end(), window.begin);
   from_nothing_ = false;
   if ((remembers_ || latest_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
     FindEarlierCommands(recording);
-  const bool followed = PreRoll(recording, window);
+  return PreRoll(recording, window);
+}
+
+bool Simulator::Begin(const Recording& recording, Window window, const InitialState& start) {
+  const mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  const bool followed = Recall(recording, window);
   // Where a transmission's motor side stands beside its load, which the log does not hold: on which flank of a gap.
   for (std::size_t i = 0; i < apart_.size(); ++i) {
     const auto [joint, of] = model_.mirrored_joints()[i];
@@ -250,6 +254,34 @@ void Simulator::ApplyProbe(const ProbeTorque& probe) {
   const double u = probe.actuator >= 0 ? probe.per_command * data_->ctrl[probe.actuator] : 0;
   data_->qfrc_applied[dof] =
       probe.amplitude_n_m * std::sin(probe.per_rad * q + probe.s_per_rad * w + u + probe.phase_rad);
+}
+
+void Simulator::Drag(const Recording& recording, Window window, const std::function<void(std::size_t row)>& see) {
+  if (!Recall(recording, window)) return;
+  mjModel* m = mujoco_.get();
+  mjData* d = data_.get();
+  const auto& time = recording.time_s;
+  const int integrator = m->opt.integrator;
+  m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
+  for (std::size_t row = window.begin; row < window.end; ++row) {
+    const double before = row > 0 ? time[row] - time[row - 1] : 0;
+    const double after = row + 1 < time.size() ? time[row + 1] - time[row] : before;
+    Follow(recording, row);
+    d->time = time[row];
+    for (std::size_t c = 0; c < delays_s_.size(); ++c) {
+      std::size_t near = held_[c];
+      d->ctrl[model_.command_actuators()[c]] =
+          MeanCommand(recording, c, time[row] - 0.5 * before, time[row] + 0.5 * after, near);
+    }
+    see(row);
+    if (!remembers_ || row + 1 == window.end) continue;
+    Follow(recording, row);
+    m->opt.timestep = after;
+    SetCommands(recording, row, time[row], time[row + 1]);
+    mj_step(m, d);
+  }
+  m->opt.integrator = integrator;
+  for (auto& warning : d->warning) warning.number = 0;
 }
 
 RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,

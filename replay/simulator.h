@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_REPLAY_SIMULATOR_H_
 #define GAPSCOPE_REPLAY_SIMULATOR_H_
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -63,6 +64,11 @@ class Simulator {
   RunResult Run(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted,
                 std::span<double> qpos = {});
 
+  // Drags the model along the window: at each row the measured joints stand and move as the log says, under the mean
+  // command of the sample around it, and delays, lags and a supply remember what went before. `see` may move data().
+  // Where the drag cannot begin (see PreRoll) it is not called.
+  void Drag(const Recording& recording, Window window, const std::function<void(std::size_t row)>& see);
+
   // Takes effect with the next SetParameters.
   void set_stamps(StampShift stamps) { stamps_ = stamps; }
   void set_probes(std::span<const ProbeTorque> probes) { probes_.assign(probes.begin(), probes.end()); }
@@ -72,6 +78,8 @@ class Simulator {
 
  private:
   void ApplyProbe(const ProbeTorque& probe);
+  // What went before the window, in all that remembers. False: as PreRoll.
+  bool Recall(const Recording& recording, Window window);
   // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp. False: as PreRoll.
   bool Begin(const Recording& recording, Window window, const InitialState& start);
   // From a row's stamp to the next one's, under its commands. Returns the steps that it took.

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "replay/initial_state.h"
 #include "replay/simulator.h"
 #include "src/core/statistics.h"
 #include "src/experiment/local_fit.h"
 
 namespace gapscope {
 namespace {
-
-constexpr double kHalfWidth_s = 0.02;
 
 // Limits that hold the middle 99 % of the values, so that one outlier does not squeeze the map.
 std::vector<double> Edges(std::vector<double> values, std::size_t count) {
@@ -26,59 +25,129 @@ std::vector<double> Edges(std::vector<double> values, std::size_t count) {
   return edges;
 }
 
+struct MeasuredJoint {
+  const Recording::Measured* measured;
+  const SignalSource* source;
+};
+
+// All of a short log; of a long one even stretches, evenly spread, of so many rows together.
+std::vector<Window> Stretches(std::size_t rows, std::size_t most_rows) {
+  constexpr std::size_t kStretches = 16;
+  if (rows <= most_rows) return {{0, rows}};
+  std::vector<Window> stretches;
+  for (std::size_t i = 0; i < kStretches; ++i) {
+    const std::size_t begin = i * rows / kStretches;
+    stretches.push_back({begin, begin + most_rows / kStretches});
+  }
+  return stretches;
+}
+
+// Of one stretch; all by its rows, and in each by joint.
+class Stretch {
+ public:
+  Stretch(const std::vector<MeasuredJoint>& joints, const Recording& recording, Window window)
+      : joints_(joints), recording_(recording), window_(window), count_(joints.size()) {
+    const double step_s = std::max(recording.timeline.median_step_s, 1e-6);
+    reach_ = std::max<std::size_t>(1, static_cast<std::size_t>(kInitialFitHalfWidth_s / step_s));
+  }
+
+  void Estimate(Simulator& simulator, std::vector<ResidualTorque>* residuals) {
+    if (window_.rows() <= 2 * reach_) return;
+    FindAccelerations();
+    Follow(simulator);
+    if (rest_.empty()) return;
+    for (std::size_t j = 0; j < count_; ++j) AddTo(j, (*residuals)[j]);
+  }
+
+ private:
+  std::size_t At(std::size_t row, std::size_t joint) const { return row * count_ + joint; }
+
+  // What passed between two speeds, over the time between them.
+  void FindAccelerations() {
+    std::vector<double> speeds;
+    for (std::size_t row = window_.begin; row < window_.end; ++row) {
+      for (const MeasuredJoint& joint : joints_)
+        speeds.push_back(FitLocally(recording_, *joint.measured, row, kInitialFitHalfWidth_s).slope);
+    }
+    accelerations_.assign(speeds.size(), 0);
+    for (std::size_t k = reach_; k + reach_ < window_.rows(); ++k) {
+      const auto stamp = recording_.time_s.begin() + static_cast<std::ptrdiff_t>(window_.begin + k);
+      const auto reach = static_cast<std::ptrdiff_t>(reach_);
+      for (std::size_t j = 0; j < count_; ++j)
+        accelerations_[At(k, j)] =
+            (speeds[At(k + reach_, j)] - speeds[At(k - reach_, j)]) / (stamp[reach] - stamp[-reach]);
+    }
+  }
+
+  void Follow(Simulator& simulator) {
+    const mjModel* m = &simulator.mujoco_model();
+    mjData* d = &simulator.data();
+    std::vector<mjtNum> inertia(static_cast<std::size_t>(m->nv));
+    simulator.Drag(recording_, window_, [&](std::size_t row) {
+      for (std::size_t j = 0; j < count_; ++j)
+        d->qacc[joints_[j].source->dof] = accelerations_[At(row - window_.begin, j)];
+      mj_inverse(m, d);
+      mj_fwdActuation(m, d);
+      mj_mulM(m, d, inertia.data(), d->qacc);
+      for (const MeasuredJoint& joint : joints_) {
+        const int dof = joint.source->dof;
+        angles_.push_back(d->qpos[joint.source->qpos]);
+        speeds_.push_back(d->qvel[dof]);
+        inertia_.push_back(inertia[static_cast<std::size_t>(dof)]);
+        rest_.push_back(d->qfrc_inverse[dof] - d->qfrc_actuator[dof] - inertia_.back());
+      }
+    });
+  }
+
+  bool IsKnown(std::size_t k) const {
+    return std::ranges::all_of(
+        joints_, [&](const MeasuredJoint& joint) { return std::isfinite(joint.measured->values[window_.begin + k]); });
+  }
+
+  // All other torques are means over the same time as the acceleration, which at 10 Hz is a quarter too small.
+  void AddTo(std::size_t j, ResidualTorque& residual) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < 2 * reach_; ++k) sum += rest_[At(k, j)];
+    for (std::size_t k = reach_; k + reach_ < window_.rows(); ++k) {
+      sum += rest_[At(k + reach_, j)];
+      if (IsKnown(k)) {
+        residual.angle_rad.push_back(angles_[At(k, j)]);
+        residual.speed_rad_per_s.push_back(speeds_[At(k, j)]);
+        residual.torque_n_m.push_back(inertia_[At(k, j)] + sum / static_cast<double>(2 * reach_ + 1));
+      }
+      sum -= rest_[At(k - reach_, j)];
+    }
+  }
+
+  const std::vector<MeasuredJoint>& joints_;
+  const Recording& recording_;
+  Window window_;
+  std::size_t count_ = 0, reach_ = 1;
+  std::vector<double> accelerations_, angles_, speeds_;
+  std::vector<double> inertia_, rest_;  // mass matrix times acceleration; all other torques
+};
+
 }  // namespace
 
 std::vector<ResidualTorque> EstimateResidualTorque(const Model& model, std::span<const double> values,
                                                    const Recording& recording, std::size_t most_rows) {
   const mjModel& m = model.compiled();
-  struct Joint {
-    const Recording::Measured* measured;
-    const SignalSource* source;
-  };
-  std::vector<Joint> joints;
+  std::vector<MeasuredJoint> joints;
+  double late_s = kInfinity;
   for (const auto& measured : recording.measured) {
     const SignalSource& source = model.source(measured.index);
-    if (TraitsOf(source.kind).gives_angle) joints.push_back({&measured, &source});
+    if (!TraitsOf(source.kind).gives_angle) continue;
+    joints.push_back({&measured, &source});
+    late_s = std::min(late_s, source.delay >= 0 ? values[static_cast<std::size_t>(source.delay)] : 0);
   }
   if (joints.size() != static_cast<std::size_t>(m.njnt) || m.nv != m.njnt || recording.rows() < 8) return {};
   Simulator simulator(model, 0);
+  simulator.set_stamps({.commands_s = late_s});  // what is logged late was moved by a command as much before
   if (!simulator.SetParameters(values, recording)) return {};
-  mjData* d = &simulator.data();
-  const mjModel* written = &simulator.mujoco_model();
-
-  // Speeds at all rows first: accelerations are their slopes.
-  const std::size_t rows = recording.rows();
-  const std::size_t stride = std::max<std::size_t>(1, rows / most_rows);
-  const std::size_t reach = std::max<std::size_t>(
-      1, static_cast<std::size_t>(kHalfWidth_s / std::max(recording.timeline.median_step_s, 1e-6)));
   std::vector<ResidualTorque> residuals(joints.size());
   for (std::size_t j = 0; j < joints.size(); ++j) residuals[j].joint = joints[j].measured->spec.on;
-  mj_resetData(written, d);
-  for (std::size_t row = reach; row + reach < rows; row += stride) {
-    bool known = true;
-    for (const Joint& joint : joints) {
-      const auto speed_at = [&](std::size_t r) {
-        return FitLocally(recording, *joint.measured, r, kHalfWidth_s).slope;
-      };
-      const double offset = joint.source->offset >= 0 ? values[joint.source->offset] : 0;
-      d->qpos[joint.source->qpos] = joint.measured->values[row] - offset;
-      d->qvel[joint.source->dof] = speed_at(row);
-      d->qacc[joint.source->dof] = (speed_at(row + reach) - speed_at(row - reach)) /
-                                   (recording.time_s[row + reach] - recording.time_s[row - reach]);
-      known = known && std::isfinite(d->qpos[joint.source->qpos]) && std::isfinite(d->qacc[joint.source->dof]);
-    }
-    if (!known) continue;
-    for (std::size_t c = 0; c < recording.commands.size(); ++c)
-      d->ctrl[model.command_actuators()[c]] = recording.commands[c].values[row];
-    mj_inverse(written, d);
-    mj_fwdActuation(written, d);
-    for (std::size_t j = 0; j < joints.size(); ++j) {
-      const int dof = joints[j].source->dof;
-      residuals[j].angle_rad.push_back(d->qpos[joints[j].source->qpos]);
-      residuals[j].speed_rad_per_s.push_back(d->qvel[dof]);
-      residuals[j].torque_n_m.push_back(d->qfrc_inverse[dof] - d->qfrc_actuator[dof]);
-    }
-  }
+  for (const Window& window : Stretches(recording.rows(), most_rows))
+    Stretch(joints, recording, window).Estimate(simulator, &residuals);
   return residuals;
 }
 

@@ -18,10 +18,10 @@ struct ResidualTorque {
   std::vector<double> angle_rad, speed_rad_per_s, torque_n_m;  // one per row that was used
 };
 
-// For each joint with a measured position: inverse dynamics of the measured motion (position from the log, speed and
-// acceleration from local fits over
-// +-20 ms) less the actuators' torque under the logged commands, at most `most_rows` rows evenly spread. Actuators with
-// a memory (delay, lag) act as at rest in it. Empty when a joint of the model is not measured: its motion is not known.
+// For each joint with a measured position: inverse dynamics of the measured motion (angle, speed and acceleration by
+// local fits over +-20 ms) less the actuators' torque under the logged commands, over the same time, at most about
+// `most_rows` rows evenly spread. Delays, lags and a supply remember what the log says of the time before. A row has the
+// torques of all joints. Empty when a joint of the model is not measured: its motion is not known.
 std::vector<ResidualTorque> EstimateResidualTorque(const Model& model, std::span<const double> values,
                                                    const Recording& recording, std::size_t most_rows = 20000);
 

@@ -24,7 +24,7 @@ struct TorqueCurve {
 
 // Both of the same log and parameters, by models without and with the effect. Of the joint on which the effect's torque
 // is largest beside what is missing there; over its angle or its speed, whichever the effect's torque changes more
-// with. Nothing: the effect adds no torque that the motion of the moment makes (a delay), or the torques are not known.
+// with. Nothing: the effect changes no torque (a late sensor of several), or the torques are not known.
 std::optional<TorqueCurve> CompareTorques(const std::vector<ResidualTorque>& without,
                                           const std::vector<ResidualTorque>& with, std::size_t bins);
 

@@ -143,7 +143,9 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
       Foretell(question, MisfitOf(best, explanations.rivals, question.nested, question.remaining));
   next.if_present = foretold.if_present;
   next.if_absent = foretold.if_absent;
-  if (!Settles(question, foretold)) {
+  // Of effects that are told together, one that would be told alone where it is there is worth a log.
+  const bool tells_one = !question.nested && foretold.if_present > question.next.probability;
+  if (!tells_one && !Settles(question, foretold)) {
     next.problem = fmt::format(
         "none of {} inputs of {:g} s would settle it (the best: P {:.2f} if it is there, {:.2f} if not). Another "
         "signal may.",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import gapscope as gs
 
 # scripts/wheel and scripts/bench_python run the first two, the tests of engines what is in the folders.
-collect_ignore = ["try_wheel.py", "bench.py", "mjlab", "isaaclab", "engines"]
+collect_ignore = ["try_wheel.py", "bench.py", "interrupt_kernel.py", "mjlab", "isaaclab", "engines"]
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell ignores in what it starts with "&"

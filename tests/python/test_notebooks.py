@@ -34,3 +34,16 @@ def test_holds_against_the_truth(notebook: Path, environment: Path, tmp_path: Pa
     variables = {**os.environ, "TMPDIR": str(tmp_path), "IPYTHONDIR": str(tmp_path), "MPLCONFIGDIR": str(tmp_path)}
     done = subprocess.run(command, capture_output=True, text=True, env=variables, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_interrupting_a_cell_keeps_the_best_and_the_kernel(environment: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [environment / "python", ROOT / "tests" / "python" / "interrupt_kernel.py"],
+        cwd=ROOT,
+        env={**os.environ, "IPYTHONDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.stdout.split("\n")[:3] == ["under way", "partial", "2"], done.stdout + done.stderr[-3000:]

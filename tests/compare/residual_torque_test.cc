@@ -75,26 +75,29 @@ double RmsOfArm(const Model& model, const std::vector<double>& values, const Rec
   return std::sqrt(sum / static_cast<double>(residuals.at(0).torque_n_m.size()));
 }
 
-// At 5 to 8 Hz a drive that is late, slow or measured late pushes at the wrong time: with what is known of that in the
-// model, nothing is missing.
+// At 5 to 8 Hz a drive that is late, slow or measured late pushes at the wrong time, and friction by the load needs the
+// drive's torque. With what is known of that in the model, little is missing: nothing, but where friction jumps at a
+// reversal, which local fits round off.
 TEST(ResidualTorqueTest, WhatDrivesAndSensorsRememberIsTakenFromTheLog) {
   const Experiment experiment = ShippedExperiment("qube");
   const auto bare = MakeModel(experiment);
   const struct {
     EffectUse use;
     std::string parameter;
-  } effects[] = {{{"command_delay", "motor"}, "delay_s"},
-                 {{"actuator_lag", "motor"}, "time_constant_s"},
-                 {{"sensor_delay", "all"}, "delay_s"}};
-  for (const auto& [use, parameter] : effects) {
-    const std::map<std::string, double> late = {{use.Text() + "." + parameter, 0.02}};
+    double value, left;
+  } effects[] = {{{"command_delay", "motor"}, "delay_s", 0.02, 0.1},
+                 {{"actuator_lag", "motor"}, "time_constant_s", 0.02, 0.1},
+                 {{"sensor_delay", "all"}, "delay_s", 0.02, 0.1},
+                 {{"load_friction", "arm"}, "coefficient", 0.3, 0.35}};
+  for (const auto& [use, parameter, value, left] : effects) {
+    const std::map<std::string, double> made = {{use.Text() + "." + parameter, value}};
     const auto model = MakeModel(experiment, {use});
     Recording log = MakeRecording(experiment, 3000, 0.002,
                                   [](int, double t) { return 2 * std::sin(32 * t) + 2 * std::sin(50 * t); });
     log.timeline.median_step_s = 0.002;
-    const auto predicted = Predict(*model, log, late);
+    const auto predicted = Predict(*model, log, made);
     for (std::size_t s = 0; s < predicted.size(); ++s) log.measured[s].values = predicted[s];
-    EXPECT_LT(RmsOfArm(*model, ValuesWith(*model, late), log), 0.1 * RmsOfArm(*bare, bare->Nominal(), log))
+    EXPECT_LT(RmsOfArm(*model, ValuesWith(*model, made), log), left * RmsOfArm(*bare, bare->Nominal(), log))
         << use.effect;
   }
 }

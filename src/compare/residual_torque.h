@@ -20,8 +20,8 @@ struct ResidualTorque {
 
 // For each joint with a measured position: inverse dynamics of the measured motion (angle, speed and acceleration by
 // local fits over +-20 ms) less the actuators' torque under the logged commands, over the same time, at most about
-// `most_rows` rows evenly spread. Delays, lags and a supply remember what the log says of the time before. A row has the
-// torques of all joints. Empty when a joint of the model is not measured: its motion is not known.
+// `most_rows` rows evenly spread. Delays, lags and a supply remember what the log says of the time before. A row has
+// the torques of all joints. Empty when a joint of the model is not measured: its motion is not known.
 std::vector<ResidualTorque> EstimateResidualTorque(const Model& model, std::span<const double> values,
                                                    const Recording& recording, std::size_t most_rows = 20000);
 

@@ -108,14 +108,13 @@ Result<Explanations> BuildExplanations(const OpenQuestion& question, const std::
 // the question if it were longer, such longer ones.
 Result<std::vector<InputScore>> DesignInputs(const OpenQuestion& question, const Explanations& of,
                                              OptimalOptions options, ThreadPool& pool) {
-  GS_ASSIGN(OptimalDesign design, DesignForRivals(of.nominal, of.rivals, options, pool));
-  const double length =
-      LengthThatSettles(question, MisfitOf(design.inputs.front(), of.rivals, question.nested, question.remaining));
-  if (length > options.duration_s) {
+  for (;;) {
+    GS_ASSIGN(OptimalDesign design, DesignForRivals(of.nominal, of.rivals, options, pool));
+    const double length =
+        LengthThatSettles(question, MisfitOf(design.inputs.front(), of.rivals, question.nested, question.remaining));
+    if (length <= options.duration_s) return std::move(design.inputs);
     options.duration_s = length;
-    GS_ASSIGN(design, DesignForRivals(of.nominal, of.rivals, options, pool));
   }
-  return std::move(design.inputs);
 }
 
 Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& bench, const std::vector<double>& noise) {
@@ -205,10 +204,8 @@ bool Settles(const OpenQuestion& question, const Foretold& foretold) {
 }
 
 double LengthThatSettles(const OpenQuestion& question, ForetoldMisfit misfit) {
-  const NextPolicy& policy = kDiagnosePolicy.next;
-  for (double length = policy.duration_s; length <= policy.longest_s; length *= 2) {
-    misfit.seconds = length;
-    if (Settles(question, Foretell(question, misfit))) return length;
+  for (; misfit.seconds <= kDiagnosePolicy.next.longest_s; misfit.seconds *= 2) {
+    if (Settles(question, Foretell(question, misfit))) return misfit.seconds;
   }
   return 0;
 }

@@ -45,8 +45,8 @@ Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit);
 // Whether the question would be open no longer, whichever explanation holds.
 bool Settles(const OpenQuestion& question, const Foretold& foretold);
 
-// The least length in s that would settle the question if an input so many times as long said so many times as much; 0:
-// none of those that are tried.
+// The least length in s, this one or doubled, that would settle the question if an input so many times as long said so
+// many times as much; 0: none of those that are tried.
 double LengthThatSettles(const OpenQuestion& question, ForetoldMisfit misfit);
 
 // The first question that an input of the library would settle, with that input, as short as will do; else the first

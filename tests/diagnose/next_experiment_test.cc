@@ -93,6 +93,7 @@ TEST(LengthThatSettlesTest, TheLessAnInputSaysTheLongerItIs) {
   EXPECT_EQ(lengths.back(), 0) << "no length does where it says nothing";
   EXPECT_NE(std::ranges::find(lengths, 16), lengths.end());
   EXPECT_NE(std::ranges::find(lengths, 32), lengths.end());
+  EXPECT_EQ(LengthThatSettles(Unsure(), {.seconds = 16, .there = 30.0}), 16) << "not shorter than it is";
   // Longer and longer, then none.
   EXPECT_TRUE(std::ranges::is_sorted(lengths, {}, [](double s) { return s == 0 ? kInfinity : s; }));
 }

@@ -85,38 +85,6 @@ ForetoldMisfit MisfitOf(const InputScore& best, const std::vector<Hypothesis>& r
   return misfit;
 }
 
-// The question's explanations, and the model without any of them.
-struct Explanations {
-  Hypothesis nominal;
-  std::vector<Hypothesis> rivals;
-};
-
-Result<Explanations> BuildExplanations(const OpenQuestion& question, const std::shared_ptr<const Rig>& rig,
-                                       const ScaleTable& scales) {
-  Explanations built;
-  for (std::size_t i = 0; i < question.next.models.size(); ++i) {
-    GS_ASSIGN(ResultModel run, BuildRunModel(rig, question.next.models[i], "the next experiment", scales));
-    built.rivals.push_back(
-        {.name = NameOf(question.next.separates[i]), .model = run.model, .values = std::move(run.values)});
-  }
-  GS_ASSIGN(const auto bare, Model::Build(rig));
-  built.nominal = {.name = "nominal", .model = bare, .values = bare->Nominal()};
-  return built;
-}
-
-// Inputs by how well they tell the explanations apart, as long as `options` says; where the best of them would settle
-// the question if it were longer, such longer ones.
-Result<std::vector<InputScore>> DesignInputs(const OpenQuestion& question, const Explanations& of,
-                                             OptimalOptions options, ThreadPool& pool) {
-  for (;;) {
-    GS_ASSIGN(OptimalDesign design, DesignForRivals(of.nominal, of.rivals, options, pool));
-    const double length =
-        LengthThatSettles(question, MisfitOf(design.inputs.front(), of.rivals, question.nested, question.remaining));
-    if (length <= options.duration_s) return std::move(design.inputs);
-    options.duration_s = length;
-  }
-}
-
 Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& bench, const std::vector<double>& noise) {
   NextExperiment next = question.next;
   OptimalOptions options{.duration_s = kDiagnosePolicy.next.duration_s,
@@ -135,20 +103,22 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
   experiment = WithLimitSignals(experiment);
   GS_ASSIGN(const auto rig, Rig::Load(experiment));
   options.rehearsal = RehearsalOf(question, bench);
-  GS_ASSIGN(const Explanations explanations, BuildExplanations(question, rig, bench.scales));
-  GS_ASSIGN(const auto inputs, DesignInputs(question, explanations, options, bench.pool));
-  const InputScore& best = inputs.front();
-  const Foretold foretold =
-      Foretell(question, MisfitOf(best, explanations.rivals, question.nested, question.remaining));
+  GS_ASSIGN(const auto bare, Model::Build(rig));
+  std::vector<Hypothesis> rivals;
+  for (std::size_t i = 0; i < next.models.size(); ++i) {
+    GS_ASSIGN(ResultModel built, BuildRunModel(rig, next.models[i], "the next experiment", bench.scales));
+    rivals.push_back({.name = NameOf(next.separates[i]), .model = built.model, .values = std::move(built.values)});
+  }
+  const Hypothesis nominal{.name = "nominal", .model = bare, .values = bare->Nominal()};
+  GS_ASSIGN(const OptimalDesign design, DesignForRivals(nominal, rivals, options, bench.pool));
+  const InputScore& best = design.inputs.front();
+  const Foretold foretold = Foretell(question, MisfitOf(best, rivals, question.nested, question.remaining));
   next.if_present = foretold.if_present;
   next.if_absent = foretold.if_absent;
-  // Of effects that are told together, one that would be told alone where it is there is worth a log.
-  const bool tells_one = !question.nested && foretold.if_present > question.next.probability;
-  if (!tells_one && !Settles(question, foretold)) {
+  if (!IsWorthALog(question, foretold)) {
     next.problem = fmt::format(
-        "none of {} inputs of {:g} s would settle it (the best: P {:.2f} if it is there, {:.2f} if not). Another "
-        "signal may.",
-        inputs.size(), best.wave.duration_s, next.if_present, next.if_absent);
+        "none of {} inputs would settle it (the best: P {:.2f} if it is there, {:.2f} if not). Another signal may.",
+        design.inputs.size(), next.if_present, next.if_absent);
     return next;
   }
   next.command = CommandFor(experiment.path, options.rehearsal, best) + " --out next_experiment.csv";
@@ -197,17 +167,9 @@ Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit) {
   return question.nested ? ForetellPresence(question, misfit) : ForetellBetween(question, misfit);
 }
 
-bool Settles(const OpenQuestion& question, const Foretold& foretold) {
-  const double now = question.next.probability;
-  if (!question.nested) return foretold.if_present > now && foretold.if_absent < now;
-  return foretold.if_present >= kDiagnosePolicy.next.sure && foretold.if_absent <= kDiagnosePolicy.next.absent;
-}
-
-double LengthThatSettles(const OpenQuestion& question, ForetoldMisfit misfit) {
-  for (; misfit.seconds <= kDiagnosePolicy.next.longest_s; misfit.seconds *= 2) {
-    if (Settles(question, Foretell(question, misfit))) return misfit.seconds;
-  }
-  return 0;
+bool IsWorthALog(const OpenQuestion& question, const Foretold& foretold) {
+  if (!question.nested) return foretold.if_present > question.next.probability;
+  return foretold.if_present - foretold.if_absent >= kDiagnosePolicy.next.answers;
 }
 
 NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise) {

@@ -41,17 +41,11 @@ struct Foretold {
   double if_present = 0, if_absent = 0;
 };
 Foretold Foretell(const OpenQuestion& question, const ForetoldMisfit& misfit);
+// Whether the two answers would tell the question, or tell one of several explanations alone where it is there.
+bool IsWorthALog(const OpenQuestion& question, const Foretold& foretold);
 
-// Whether the question would be open no longer, whichever explanation holds.
-bool Settles(const OpenQuestion& question, const Foretold& foretold);
-
-// The least length in s, this one or doubled, that would settle the question if an input so many times as long said so
-// many times as much; 0: none of those that are tried.
-double LengthThatSettles(const OpenQuestion& question, ForetoldMisfit misfit);
-
-// The first question that an input of the library would settle, with that input, as short as will do; else the first
-// one, and why there is none. `noise`: of each measured signal, SI. Limits that the experiment does not state are what
-// the logs reached.
+// The first question that an input of the library would settle, with that input; else the first one, and why there is
+// none. `noise`: of each measured signal, SI. Limits that the experiment does not state are what the logs reached.
 NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise);
 
 }  // namespace gapscope

@@ -344,7 +344,7 @@ ordered_json JsonPolicy() {
                                {"next.sure", policy.next.sure},
                                {"next.of_one_log", policy.next.of_one_log},
                                {"next.duration_s", policy.next.duration_s},
-                               {"next.longest_s", policy.next.longest_s},
+                               {"next.answers", policy.next.answers},
                                {"next.apart", policy.next.apart},
                                {"next.beyond_tie", policy.next.beyond_tie}};
   json.update(others);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "src/core/statistics.h"
 #include "src/diagnose/probability.h"
@@ -73,29 +72,15 @@ TEST(ForetellTest, ARivalThatDoesWorseSpeaksForTheOther) {
   EXPECT_EQ(Foretell(question, {.seconds = 8, .there = 1, .not_there = 0}).if_absent, 0.4);
 }
 
-// An input settles a question where nothing of it is open afterwards, whichever way it comes out.
-TEST(SettlesTest, OnlyWhereBothAnswersAreSure) {
-  EXPECT_TRUE(Settles(Unsure(), {.if_present = 0.85, .if_absent = 0.1}));
-  EXPECT_FALSE(Settles(Unsure(), {.if_present = 0.75, .if_absent = 0.1})) << "open still if it is there";
-  EXPECT_FALSE(Settles(Unsure(), {.if_present = 0.85, .if_absent = 0.3})) << "open still if it is not";
+TEST(IsWorthALogTest, WhereTheAnswersLieApart) {
+  EXPECT_TRUE(IsWorthALog(Unsure(), {.if_present = 0.78, .if_absent = 0.2}));
+  EXPECT_FALSE(IsWorthALog(Unsure(), {.if_present = 0.56, .if_absent = 0.47}))
+      << "0.5 lies between, and nothing is told";
+  EXPECT_FALSE(IsWorthALog(Unsure(), {.if_present = 0.3, .if_absent = 0.1}));
   OpenQuestion between{.together = 0.7};
   between.next.probability = 0.35;
-  EXPECT_TRUE(Settles(between, {.if_present = 0.7, .if_absent = 0}));
-  EXPECT_FALSE(Settles(between, {.if_present = 0.7, .if_absent = 0.35})) << "told together where the second one holds";
-  EXPECT_FALSE(Settles(between, {.if_present = 0.35, .if_absent = 0})) << "told together where the first one holds";
-}
-
-TEST(LengthThatSettlesTest, TheLessAnInputSaysTheLongerItIs) {
-  std::vector<double> lengths;
-  for (const double there : {30.0, 10.0, 6.0, 1.0, 0.0})
-    lengths.push_back(LengthThatSettles(Unsure(), {.seconds = 8, .there = there}));
-  EXPECT_EQ(lengths.front(), 8);
-  EXPECT_EQ(lengths.back(), 0) << "no length does where it says nothing";
-  EXPECT_NE(std::ranges::find(lengths, 16), lengths.end());
-  EXPECT_NE(std::ranges::find(lengths, 32), lengths.end());
-  EXPECT_EQ(LengthThatSettles(Unsure(), {.seconds = 16, .there = 30.0}), 16) << "not shorter than it is";
-  // Longer and longer, then none.
-  EXPECT_TRUE(std::ranges::is_sorted(lengths, {}, [](double s) { return s == 0 ? kInfinity : s; }));
+  EXPECT_TRUE(IsWorthALog(between, {.if_present = 0.7, .if_absent = 0.35})) << "one is told alone where it is there";
+  EXPECT_FALSE(IsWorthALog(between, {.if_present = 0.35, .if_absent = 0.35}));
 }
 
 }  // namespace

@@ -26,11 +26,12 @@ int Refuse(const Error& error, bool json) {
 
 // What was printed may wait for room that a full disk behind it does not have.
 int Printed(int status, bool json) {
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+  const bool flushed = std::fflush(stdout) == 0;
+  if (flushed && std::ferror(stdout) == 0) return status;
   return Refuse({.what = "cannot write all that was to be printed",
                  .where = "standard output",
-                 .actual = std::strerror(errno),
-                 .cure = "what --out names is written all the same"},
+                 .actual = flushed ? "an earlier part is lost" : std::strerror(errno),
+                 .cure = "make room, and run it again; what --out names is written all the same"},
                 json);
 }
 

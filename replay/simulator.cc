@@ -275,7 +275,6 @@ void Simulator::Drag(const Recording& recording, Window window, const std::funct
     }
     see(row);
     if (!remembers_ || row + 1 == window.end) continue;
-    Follow(recording, row);
     m->opt.timestep = after;
     SetCommands(recording, row, time[row], time[row + 1]);
     mj_step(m, d);

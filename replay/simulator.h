@@ -65,8 +65,8 @@ class Simulator {
                 std::span<double> qpos = {});
 
   // Drags the model along the window: at each row the measured joints stand and move as the log says, under the mean
-  // command of the sample around it, and delays, lags and a supply remember what went before. `see` may move data().
-  // Where the drag cannot begin (see PreRoll) it is not called.
+  // command of the sample around it, and delays, lags and a supply remember what went before. `see` leaves positions
+  // and speeds of data() as they are. Where the drag cannot begin (see PreRoll) it is not called.
   void Drag(const Recording& recording, Window window, const std::function<void(std::size_t row)>& see);
 
   // Takes effect with the next SetParameters.

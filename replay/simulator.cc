@@ -137,6 +137,13 @@ void Simulator::SetCommands(const Recording& recording, std::size_t row, double 
         delays_s_[c] == 0 ? recording.commands[c].values[row] : MeanCommand(recording, c, from_s, to_s, held_[c]);
 }
 
+void Simulator::SetMeanCommands(const Recording& recording, std::size_t row, double from_s, double to_s) {
+  for (std::size_t c = 0; c < delays_s_.size(); ++c) {
+    std::size_t near = row;
+    data_->ctrl[model_.command_actuators()[c]] = MeanCommand(recording, c, from_s, to_s, near);
+  }
+}
+
 double Simulator::MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s,
                               std::size_t& row) const {
   const double delay_s = delays_s_[command];
@@ -215,10 +222,7 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
   const double stamp = recording.time_s[row] + recording.start_s - logged.start_s;
   const std::size_t at = recording.finer ? RowAt(logged.time_s, stamp) : row;
   const double from = logged.time_s[at > 0 ? at - 1 : 0] + stamps_.forces_s, to = stamp + stamps_.forces_s;
-  for (std::size_t c = 0; c < delays_s_.size(); ++c) {
-    std::size_t near = at;
-    d->ctrl[model_.command_actuators()[c]] = MeanCommand(logged, c, from, to, near);
-  }
+  SetMeanCommands(logged, at, from, to);
   // An actuator's own delay reads what was sent, by the time.
   if (native_delay_s_ > 0) d->time -= 0.5 * (to - from);
   if (reads_ == SignalStage::kSensors) {
@@ -256,6 +260,14 @@ void Simulator::ApplyProbe(const ProbeTorque& probe) {
       probe.amplitude_n_m * std::sin(probe.per_rad * q + probe.s_per_rad * w + u + probe.phase_rad);
 }
 
+void Simulator::DragOn(const Recording& recording, std::size_t row, int steps) {
+  const double now = recording.time_s[row], next = recording.time_s[row + 1];
+  data_->time = now;
+  mujoco_->opt.timestep = (next - now) / steps;
+  SetCommands(recording, row, now, next);
+  for (int step = 0; step < steps; ++step) mj_step(mujoco_.get(), data_.get());
+}
+
 void Simulator::Drag(const Recording& recording, Window window, const std::function<void(std::size_t row)>& see) {
   if (!Recall(recording, window)) return;
   mjModel* m = mujoco_.get();
@@ -268,16 +280,9 @@ void Simulator::Drag(const Recording& recording, Window window, const std::funct
     const double after = row + 1 < time.size() ? time[row + 1] - time[row] : before;
     Follow(recording, row);
     d->time = time[row];
-    for (std::size_t c = 0; c < delays_s_.size(); ++c) {
-      std::size_t near = held_[c];
-      d->ctrl[model_.command_actuators()[c]] =
-          MeanCommand(recording, c, time[row] - 0.5 * before, time[row] + 0.5 * after, near);
-    }
+    SetMeanCommands(recording, row, time[row] - 0.5 * before, time[row] + 0.5 * after);
     see(row);
-    if (!remembers_ || row + 1 == window.end) continue;
-    m->opt.timestep = after;
-    SetCommands(recording, row, time[row], time[row + 1]);
-    mj_step(m, d);
+    if (remembers_ && row + 1 < window.end) DragOn(recording, row, 1);
   }
   m->opt.integrator = integrator;
   for (auto& warning : d->warning) warning.number = 0;
@@ -468,12 +473,8 @@ bool Simulator::PreRoll(const Recording& recording, Window window) {
   for (std::size_t row = first; row < window.begin && followed; ++row) {
     // A transmission's motor side is free to move beside the load.
     row == first ? StandAt(recording, row) : Follow(recording, row);
-    d->time = recording.time_s[row];
     const double interval = recording.time_s[row + 1] - recording.time_s[row];
-    const int steps = apart_.empty() ? 1 : StepsOver(interval, max_step_s_);
-    m->opt.timestep = interval / steps;
-    SetCommands(recording, row, recording.time_s[row], recording.time_s[row + 1]);
-    for (int step = 0; step < steps; ++step) mj_step(m, d);
+    DragOn(recording, row, apart_.empty() ? 1 : StepsOver(interval, max_step_s_));
     followed = apart_.empty() || !RunsAway(*m, *d);
   }
   m->opt.integrator = integrator;

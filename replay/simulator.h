@@ -86,6 +86,8 @@ class Simulator {
   int StepToNext(const Recording& recording, std::size_t row);
   // False: a transmission's motor side does not follow, but runs away.
   bool PreRoll(const Recording& recording, Window window);
+  // On from a row, where the model stands, in so many steps under the mean commands up to the next row.
+  void DragOn(const Recording& recording, std::size_t row, int steps);
   // How far back the states of a run remember.
   double Past() const;
   // Measured joints as the log has them at a row.
@@ -94,6 +96,8 @@ class Simulator {
   void StandAt(const Recording& recording, std::size_t row);
   void FindEarlierCommands(const Recording& recording);
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
+  // Each command's mean over a time near the row.
+  void SetMeanCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   // Mean of what acts of a command over a time. `row` is a hint that moves with it.
   double MeanCommand(const Recording& recording, std::size_t command, double from_s, double to_s,
                      std::size_t& row) const;

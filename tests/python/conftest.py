@@ -18,7 +18,8 @@ import pytest
 if TYPE_CHECKING:
     import gapscope as gs
 
-# scripts/wheel and scripts/bench_python run the first two, the tests of engines what is in the folders.
+# scripts/wheel, scripts/bench_python and the tests of notebooks run the first three, those of engines what is in the
+# folders.
 collect_ignore = ["try_wheel.py", "bench.py", "interrupt_kernel.py", "mjlab", "isaaclab", "engines"]
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python"))

@@ -124,11 +124,8 @@ double LmRun::TryStep(const Derivatives& derivatives, const Linearization& at, c
   *trial = BentStep(derivatives, at, step);
   const double cost = Cost(*trial, residuals);
   if (cost < s_.cost) return cost;
-  // States take whole steps, however damped y is: where a window's motion tips over at the least touch, better none.
-  Residuals others;
-  const FitPoint still{.y = trial->y, .states = s_.point.states};
-  (void)Cost(still, &others);
-  return TakeBetterStates(problem_, *trial, *residuals, still, others);
+  // States take whole steps, however damped y is.
+  return ShortenStates(problem_, s_.point.states, *trial, *residuals, &s_.work);
 }
 
 // Where the linear model goes on promising what no step gains, some window's motion has a kink (a blow), and what no

@@ -57,16 +57,12 @@ class Projected {
     return last_.at.valid;
   }
 
-  // The cost and the equations at y, the states near their optimum; null: it cannot be simulated there. A window whose
-  // motion tips over at the least touch of its state keeps the better of two.
+  // The cost and the equations at y, the states near their optimum; null: it cannot be simulated there.
   const Known* At(const Eigen::VectorXd& y) {
     FitPoint point = Move(problem_, last_.point, last_.at, y - last_.point.y);
     Evaluation there = Evaluate(point);
-    if (!(there.cost < best_.cost())) {
-      const FitPoint still{.y = point.y, .states = best_.point.states};
-      Evaluation others = Evaluate(still);
-      there.cost = TakeBetterStates(problem_, point, there.residuals, still, others.residuals);
-    }
+    if (!(there.cost < best_.cost()))
+      there.cost = ShortenStates(problem_, best_.point.states, point, there.residuals, &work_);
     if (!std::isfinite(there.cost)) return nullptr;
     Follow(point, std::move(there.residuals));
     for (int step = 1; step < kPolicy.state_steps; ++step) {

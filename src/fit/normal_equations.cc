@@ -10,6 +10,7 @@
 #include "src/core/statistics.h"
 #include "src/fit/blocks.h"
 #include "src/fit/coupling.h"
+#include "src/fit/policy.h"
 
 namespace gapscope {
 namespace {
@@ -248,6 +249,24 @@ double TakeBetterStates(const FitProblem& problem, FitPoint& point, Residuals& r
     total += std::min(here, there);
   }
   return total;
+}
+
+double ShortenStates(FitProblem& problem, const std::vector<Eigen::VectorXd>& states, FitPoint& point,
+                     Residuals& residuals, Work* work) {
+  const std::vector<Eigen::VectorXd> whole = point.states;
+  WindowMask worse;  // all, then those that the whole step costs more than none
+  double cost = kInfinity;
+  for (const double share : kFitPolicy.state_shares) {
+    FitPoint shorter{.y = point.y, .states = states};
+    for (std::size_t w = 0; w < whole.size(); ++w) shorter.states[w] += share * (whole[w] - states[w]);
+    Evaluation there = problem.Evaluate(shorter, Keep::kResiduals, worse);
+    *work += there.work;
+    cost = TakeBetterStates(problem, point, residuals, shorter, there.residuals);
+    if (!worse.empty()) continue;
+    for (std::size_t w = 0; w < whole.size(); ++w) worse.push_back(point.states[w] != whole[w]);
+    if (std::ranges::find(worse, 1) == worse.end()) break;
+  }
+  return cost;
 }
 
 Eigen::VectorXd BoundedStep(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient, const Eigen::VectorXd& y,

@@ -72,6 +72,12 @@ Linearization Bend(const FitProblem& problem, const Linearization& at, const Der
 double TakeBetterStates(const FitProblem& problem, FitPoint& point, Residuals& residuals, const FitPoint& other,
                         Residuals& others);
 
+// A step that has gone to `point`, of which each window keeps what pays of its state's own way from `states`: all of
+// it, shares of it (FitPolicy::state_shares) or nothing, since a motion may tip over on the way. `residuals` are those
+// of the whole step, then of what is kept. Returns the cost there.
+double ShortenStates(FitProblem& problem, const std::vector<Eigen::VectorXd>& states, FitPoint& point,
+                     Residuals& residuals, Work* work);
+
 // What the window's own state answers to a slope of all columns (the last ones are the state's): S^-1 times their part,
 // S with what is known of them beforehand.
 Eigen::VectorXd StateAnswer(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& prior,

@@ -27,6 +27,8 @@ struct FitPolicy {
   // The pull to the start, of the sum of squares, per residual and squared range of a coordinate: only holds what the
   // logs leave open.
   double anchor = 1e-8;
+  // Of the way to where a window's state is said to be best: what is tried where all of it costs more than none.
+  static constexpr double state_shares[] = {0, 0.5, 0.25};
   // An effect's size as a logarithm: zero is out of reach, at this share of where it starts.
   double least_size_share = 1e-3;
   // Finite differences of the command shift in samples, of a zero offset in standard deviations of its signal, of a

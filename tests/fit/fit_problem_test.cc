@@ -324,6 +324,32 @@ TEST(TakeBetterStatesTest, EveryWindowKeepsTheStateThatCostsLess) {
   EXPECT_NEAR(cost, CostOf(problem, a), 1e-12 * cost);
 }
 
+// Of a quadratic cost it is known what pays: where the whole step goes 2.6 times as far as the best state, half of it;
+// 4 times, a quarter; backwards, nothing; to the best state, all.
+TEST(ShortenStatesTest, EveryWindowGoesAsFarAsPays) {
+  const Rig rig = LoadCart();
+  const std::vector<Recording> logs = {CartLog(rig, 801, 0)};
+  ThreadPool pool(1);
+  FitProblem problem(*rig.model, logs, CartOptions(rig, ObjectiveKind::kWindows), rig.model->Nominal(), pool);
+  const FitPoint best = StatesSolved(problem, problem.Start(), 3);
+  constexpr double kGoes[] = {2.6, 4, -1, 1}, kPays[] = {0.5, 0.25, 0, 1};
+  ASSERT_GE(problem.windows().size(), std::size(kGoes));
+  FitPoint from = best, whole = best, expected = best;
+  for (std::size_t w = 0; w < problem.windows().size(); ++w) {
+    const Eigen::Vector2d away(0.1, -0.2);
+    const double goes = kGoes[w % std::size(kGoes)];
+    from.states[w] += away;
+    whole.states[w] = from.states[w] - goes * away;
+    expected.states[w] = from.states[w] - kPays[w % std::size(kPays)] * goes * away;
+  }
+  Residuals residuals = problem.Evaluate(whole, Keep::kResiduals).residuals;
+  Work work;
+  const double cost = ShortenStates(problem, from.states, whole, residuals, &work);
+  for (std::size_t w = 0; w < problem.windows().size(); ++w)
+    EXPECT_LT((whole.states[w] - expected.states[w]).norm(), kRounding) << w;
+  EXPECT_NEAR(cost, CostOf(problem, expected), 1e-9 * cost);
+}
+
 // What went before a window is in the drive's states when it starts: with the true effect nothing is left but the
 // start's own small error.
 TEST(FitProblemTest, DrivesHoldTheirPastAtAWindowsStart) {

@@ -96,20 +96,22 @@ LocalFit FitLocally(const Sampled& samples, std::size_t row, double half_width_s
   const Eigen::LLT<decltype(normal.matrix)> whole(normal.matrix);
   const Powers parts = whole.matrixL().solve(normal.right);
   constexpr double kClear = 16;  // square of four standard errors
-  const auto scatter_at = [&](int degree) {
-    return std::max(normal.squares - parts.head(degree + 1).squaredNorm(), 0.0) / (normal.count - degree - 1);
+  // Few samples may scatter less about a high power than their resolution lets them.
+  const auto noise_at = [&](int degree) {
+    const double left = std::max(normal.squares - parts.head(degree + 1).squaredNorm(), 0.0);
+    return std::max(left / (normal.count - degree - 1), quantisation);
   };
   const int highest = normal.both_sides ? std::clamp((normal.count - 1) / 2, kParabola, kHighest) : kParabola;
   int degree = kParabola;
   for (int d = kParabola + 1; d <= highest; ++d) {
-    if (parts[d] * parts[d] > std::max(kClear * scatter_at(highest), normal.count * quantisation)) degree = d;
+    if (parts[d] * parts[d] > std::max(kClear * noise_at(highest), normal.count * quantisation)) degree = d;
   }
   const auto factor = whole.matrixLLT().topLeftCorner(degree + 1, degree + 1).triangularView<Eigen::Lower>();
   const Coefficients fit = factor.transpose().solve(parts.head(degree + 1));
   const double slope_variance = factor.solve(Powers::Unit(1).head(degree + 1)).squaredNorm();
   // A slope that the samples cannot tell from rest is rest: at a log's first row the fit is one-sided and weak.
   constexpr double kSignificant = 2;
-  const double slope_error = std::sqrt(std::max(scatter_at(degree), quantisation) * slope_variance);
+  const double slope_error = std::sqrt(noise_at(degree) * slope_variance);
   if (!(std::abs(fit[1]) > kSignificant * slope_error) && std::isfinite(values[row])) return rest;
   return {normal.y0 + fit[0], fit[1] / normal.scale};
 }

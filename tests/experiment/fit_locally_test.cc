@@ -71,6 +71,21 @@ TEST(FitLocallyTest, DoesNotFollowNoise) {
   EXPECT_LE(far, kTrials / 100);
 }
 
+// An encoder's counts are no high power: the slope of a parabola's motion is off by at most half a count times
+// sum |t| / sum t^2 over the eleven samples, whatever the phase.
+TEST(FitLocallyTest, FewCountsAreNoCurve) {
+  constexpr double kCount = 2 * M_PI / 2048, kStep_s = 0.004, kFarthest = kCount / 2 * 30 / (110 * kStep_s);
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> phase(0, 1), speed(-2, 2), acceleration(-10, 10);
+  for (int trial = 0; trial < 5000; ++trial) {
+    const double q = phase(random), v = speed(random), a = acceleration(random), at = 10 * kStep_s;
+    const Recording r =
+        Sampled(21, kStep_s, [&](double t) { return q + v * (t - at) + a * (t - at) * (t - at) / 2; }, kCount);
+    const double slope = Fit(r, 10).slope;
+    EXPECT_NEAR(slope, v, slope == 0 ? 2 * kFarthest : kFarthest) << q << " " << v << " " << a;
+  }
+}
+
 TEST(FitLocallyTest, IrregularStampsChangeNothing) {
   Recording r = Sampled(60, 0.002, [](double) { return 0.0; });
   double t = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <tuple>
 
@@ -299,7 +300,12 @@ class Judging {
     for (const Statement& s : result->statements) {
       if (s.probability >= kDiagnosePolicy.probability.present) present = With(present, s.use);
     }
-    for (std::size_t m = 0; m < found_.members.size(); ++m) {
+    // Sure ones first: what is there in one's place is not told as absent in another's.
+    std::vector<std::size_t> order(found_.members.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_partition(order.begin(), order.end(),
+                          [&](std::size_t m) { return Has(present, found_.members[m].use); });
+    for (const std::size_t m : order) {
       const Member& member = found_.members[m];
       const std::vector<Rival> rivals = RivalsOf(member, present);
       result->statements[m].rivals = rivals;
@@ -332,9 +338,10 @@ class Judging {
       TellWith(one.simpler, one.richer, "would not show in these logs beyond " + one.simpler.Text(), result);
   }
 
-  // Told together with a member, as likely.
+  // Told together with a member, as likely. Where that is not likely, not what is told already.
   void TellWith(const EffectUse& member, const EffectUse& use, const std::string& rule, Judgement* result) {
     Statement& own = *FindTold(member, result);
+    if (own.probability < kDiagnosePolicy.probability.present && FindTold(use, result)) return;
     if (own.group < 0) {
       own.group = static_cast<int>(result->groups.size());
       result->groups.push_back({own.use});

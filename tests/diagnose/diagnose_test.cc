@@ -61,6 +61,11 @@ Diagnosis DiagnoseLogs(const Logs& logs, DiagnoseOptions options = {}) {
   EXPECT_TRUE(result.ok()) << (result.ok() ? "" : result.error().Text());
   // No work is too much for what could stand in the place of what was found: only time can cut that.
   EXPECT_EQ(std::ranges::count(result.value().cut, "exchange"), 0);
+  for (const Statement& there : result.value().statements) {
+    if (there.answer != Answer::kPresent) continue;
+    for (const Statement& s : result.value().statements)
+      EXPECT_TRUE(s.use != there.use || s.answer == Answer::kPresent) << s.use.Text() << " is told as absent too";
+  }
   return std::move(result).value();
 }
 

@@ -18,7 +18,7 @@ Effect Effect_sensor_delay() {
                .trials = {0.002, 0.006, 0.02},
                .start = 0.004},
           },
-      .meaning = "one logged column is late",
+      .meaning = "what is measured is logged late",
       .signature = "measured late, motion right",
       .told_apart = "two sensors, torque log",
       .partners = {"command_delay"},

@@ -28,25 +28,58 @@ TEST(LimbCostTest, PartsAddUpToTheCost) {
   EXPECT_DOUBLE_EQ(scaled[1].noise, 5);
 }
 
+// Three carts apart, each pushed by the same force. `speed`: the experiment has that of b, which is not scored;
+// `logged`: the log has it too.
+struct Carts {
+  Rig rig;
+  std::vector<Recording> logs;
+  ThreadPool pool{1};
+  FitProblem problem;
+  Residuals residuals;
+  explicit Carts(bool speed, bool logged = false)
+      : rig(LoadThreeCarts(false, speed)),
+        logs(Logs(logged)),
+        problem(*rig.model, logs, {.free = rig.model->FreeParameters(), .time_step_s = kCartStep_s},
+                rig.model->Nominal(), pool),
+        residuals(problem.Evaluate(problem.Start(), Keep::kResiduals).residuals) {}
+
+  std::vector<Recording> Logs(bool speed) const {
+    Recording log = MakeLog(rig, rig.model->Nominal(), [](double) { return 1.0; }, 1, kCartStep_s, 1e-3, 1);
+    if (speed)
+      log.measured.push_back({.spec = rig.experiment.measured[3],
+                              .index = 3,
+                              .column = "vb",
+                              .values = std::vector<double>(log.rows(), 0.0)});
+    return {log};
+  }
+  std::vector<LimbCost> Limbs() {
+    std::vector<ProbeTorque> torques;
+    for (int joint = 0; joint < 3; ++joint) torques.push_back({.joint = joint, .amplitude_n_m = 0.1, .phase_rad = 1});
+    Work work;
+    return CostsByLimb(problem, residuals, Coupling::Measure(problem, problem.Start(), torques, &work));
+  }
+};
+
+// A speed that is not scored, or that no log has, has no residuals: as a limb it would cost nothing at all.
+TEST(LimbCostTest, WhatIsNotScoredIsNoLimb) {
+  for (const bool logged : {false, true}) {
+    Carts carts(true, logged);
+    const auto limbs = carts.Limbs();
+    ASSERT_EQ(limbs.size(), 3U) << logged;
+    for (const LimbCost& limb : limbs) EXPECT_GT(limb.noise, 0) << logged;
+  }
+}
+
 TEST(LimbCostTest, CartsApartCostTheirOwnSignalsSquares) {
-  const Rig rig = LoadThreeCarts(false);
-  std::vector<Recording> logs = {
-      MakeLog(rig, rig.model->Nominal(), [](double) { return 1.0; }, 1, kCartStep_s, 1e-3, 1)};
-  ThreadPool pool(1);
-  FitProblem problem(*rig.model, logs, {.free = rig.model->FreeParameters(), .time_step_s = kCartStep_s},
-                     rig.model->Nominal(), pool);
-  std::vector<ProbeTorque> torques;
-  for (int joint = 0; joint < 3; ++joint) torques.push_back({.joint = joint, .amplitude_n_m = 0.1, .phase_rad = 1});
-  Work work;
-  const Coupling coupling = Coupling::Measure(problem, problem.Start(), torques, &work);
-  Residuals residuals = problem.Evaluate(problem.Start(), Keep::kResiduals).residuals;
-  const auto limbs = CostsByLimb(problem, residuals, coupling);
+  Carts carts(false);
+  const Residuals& residuals = carts.residuals;
+  const auto limbs = carts.Limbs();
   ASSERT_EQ(limbs.size(), 3U);
   for (std::size_t limb = 0; limb < 3; ++limb) {
     double squares = 0;
     std::size_t count = 0;
     for (std::size_t w = 0; w < residuals.size(); ++w) {
-      const Eigen::Index scored = problem.windows()[w].scored();
+      const Eigen::Index scored = carts.problem.windows()[w].scored();
       for (Eigen::Index r = 0; r < scored; ++r) {
         const double value = residuals[w][static_cast<Eigen::Index>(limb) * scored + r];
         squares += value * value;

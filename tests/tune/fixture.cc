@@ -97,9 +97,9 @@ Rig LoadLink() {
   return Build(path, {});
 }
 
-Rig LoadThreeCarts(bool linked) {
+Rig LoadThreeCarts(bool linked, bool speed) {
   static const Folder owner;
-  const std::string name = linked ? "linked" : "apart";
+  const std::string name = std::string(linked ? "linked" : "apart") + (speed ? "_speed" : "");
   std::string bodies, motors, yaml = "schema: gapscope.experiment/1\nmodel: " + name + ".xml\n";
   std::string commands = "commands:\n", measured = "measured:\n", parameters = "parameters:\n", set = "set:\n";
   const std::string inertia = "<inertial pos='0 0 0' mass='2' diaginertia='1 1 1'/>";
@@ -117,6 +117,7 @@ Rig LoadThreeCarts(bool linked) {
                   ".damping: {unit: N s/m, nominal: 1, bounds: [0, 4]}\n";
     set += "  actuator/" + cart + "/gain: " + cart + ".gain\n  joint/" + cart + "/damping: " + cart + ".damping\n";
   }
+  if (speed) measured += "  - {signal: b_m_per_s, column: vb, kind: velocity, joint: b, unit: m/s, score: false}\n";
   yaml += "log: {time: {column: t, unit: s}}\n" + commands + measured + parameters + set;
   const std::string path = (owner.path / name).string();
   WriteFile(path + ".xml",

@@ -35,8 +35,8 @@ inline constexpr double kCartMass_kg = 2, kCartStiffness_n_per_m = 8, kCartStep_
 // A link on a hinge about its y axis, in gravity, whose inertia is under `inertia:`: link.alpha ... link.t3.
 Rig LoadLink();
 // Three such carts side by side, by Runge-Kutta: a, b, c; the second one drags the third along where `linked`.
-// Parameters: CART.gain, CART.damping, free.
-Rig LoadThreeCarts(bool linked);
+// Parameters: CART.gain, CART.damping, free. `speed`: that of b is measured too, and not scored.
+Rig LoadThreeCarts(bool linked, bool speed = false);
 // The cart's positions at the stamps of `command`, by an integrator of the test's own (semi-implicit Euler, as
 // MuJoCo's), without damping.
 std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command);

@@ -27,11 +27,12 @@ constexpr std::string_view kAngleWords[] = {"pos",  "position", "positions", "an
 constexpr std::string_view kSpeedWords[] = {"vel",  "velocity", "velocities", "speed", "speeds", "dot", "dq",    "qd",
                                             "qdot", "qvel",     "w",          "omega", "rate",   "rpm", "dtheta"};
 constexpr std::string_view kTorqueWords[] = {"torque", "torques", "tau", "effort", "efforts", "trq", "nm", "moment"};
-constexpr std::string_view kElectricWords[] = {"voltage", "volt", "volts", "mv",  "current",
-                                               "ma",      "amps", "amp",   "pwm", "duty"};
-constexpr std::string_view kOtherWords[] = {
-    "temp",   "temperature", "acc",  "accel",    "acceleration", "gyro",    "imu",    "quat", "flag",  "error", "err",
-    "status", "mode",        "fric", "friction", "enable",       "battery", "supply", "id",   "index", "kp",    "kd"};
+constexpr std::string_view kElectricWords[] = {"voltage", "volt", "volts", "mv",   "current", "ma",
+                                               "amps",    "amp",  "pwm",   "duty", "cur",     "curr"};
+constexpr std::string_view kOtherWords[] = {"temp", "temperature", "acc",      "accel",  "acceleration", "gyro",
+                                            "imu",  "quat",        "flag",     "error",  "err",          "status",
+                                            "mode", "fric",        "friction", "enable", "battery",      "supply",
+                                            "id",   "index",       "kp",       "kd",     "load"};
 constexpr std::string_view kFilteredWords[] = {"filt", "filtered", "smooth", "smoothed", "lp", "est", "estimated"};
 constexpr std::string_view kSharedWords[] = {"joint", "joints", "motor", "motors", "servo", "actuator", "act", "link",
                                              "drive", "axis",   "m",     "j",      "the",   "s",        "n"};
@@ -120,6 +121,13 @@ std::vector<std::string> WordsOf(const std::string& name) {
   return words;
 }
 
+bool AreSameWord(const std::string& a, const std::string& b) {
+  const auto is_letter_of = [](const std::string& letter, const std::string& word) {
+    return (letter == "l" && word == "left") || (letter == "r" && word == "right");
+  };
+  return a == b || is_letter_of(a, b) || is_letter_of(b, a);
+}
+
 std::vector<ColumnName> ReadNames(const std::vector<std::string>& names) {
   std::map<std::string, std::set<int>> families;
   for (const std::string& name : names) {
@@ -182,7 +190,7 @@ double NameMatch(const std::string& name, const std::string& element) {
     count += 1;
     for (std::size_t k = 0; k < words.size(); ++k) {
       const bool behind = !IsNumber(wanted[i]) || i == 0 || (k > 0 && words[k - 1] == wanted[i - 1]);
-      if (words[k] != wanted[i] || !behind) continue;
+      if (!AreSameWord(words[k], wanted[i]) || !behind) continue;
       hits += 1;
       break;
     }

@@ -33,6 +33,9 @@ std::string FamilyOf(const ColumnName& name);
 // "'q/*'" for a family: what is said of one of its members holds for all.
 std::string LabelOf(const std::string& name, const ColumnName& said);
 
+// Equal, or one is the other's usual letter: "l" and "left".
+bool AreSameWord(const std::string& a, const std::string& b);
+
 // All names of a log at once: which number of a name counts joints shows in its family.
 std::vector<ColumnName> ReadNames(const std::vector<std::string>& names);
 

@@ -1,15 +1,20 @@
 #include "src/draft/draft.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <map>
 #include <set>
 #include <string_view>
 
+#include "src/draft/loops.h"
 #include "src/draft/parameter_text.h"
 #include "src/draft/samples.h"
 #include "src/draft/scaling.h"
 #include "src/draft/servo_gains.h"
+#include "src/draft/torque_scale.h"
 #include "src/draft/yaml_text.h"
+#include "src/draft/zeros.h"
 #include "src/model/drive_facts.h"
 #include "src/model/element_names.h"
 #include "src/model/rig.h"
@@ -32,12 +37,46 @@ std::vector<std::string> FloatingBases(const mjModel& m) {
   return names;
 }
 
+constexpr double kOpenLoop = 0.003;  // m or rad
+
 // Whether rows of the two can be taken together.
 bool AreAlike(const DraftLog& a, const DraftLog& b) {
   constexpr double kAsFast = 0.01;  // of a step
   const double step_s = a.timeline.median_step_s;
   return std::ranges::equal(a.log.columns, b.log.columns, {}, &Column::name, &Column::name) &&
          std::abs(b.timeline.median_step_s - step_s) <= kAsFast * step_s;
+}
+
+// Experiment files call joints and actuators by their names.
+Status CheckNames(const mjModel& m) {
+  int joints = 0, named = 0;
+  for (int j = 0; j < m.njnt; ++j) {
+    const bool pairs = m.jnt_type[j] == mjJNT_HINGE || m.jnt_type[j] == mjJNT_SLIDE;
+    joints += pairs;
+    named += pairs && !NameOf(m, mjOBJ_JOINT, j).empty();
+  }
+  if (joints == 0) {
+    return Error{.what = "the model has no hinge or slide joint that columns could pair with",
+                 .where = "",
+                 .cure =
+                     "of a free body write the experiment file by hand: 'measured' takes the pose of a 'body' "
+                     "(docs/reference/experiment.md)"};
+  }
+  if (named == 0) {
+    return Error{.what = "no hinge or slide joint of the model has a name",
+                 .where = "",
+                 .cure = "name them in the MJCF: <joint name=\"hip\" ...>"};
+  }
+  for (int a = 0; a < m.nactuator; ++a) {
+    if (!NameOf(m, mjOBJ_ACTUATOR, a).empty()) continue;
+    const int joint = m.actuator_trntype[a] == mjTRN_JOINT ? m.actuator_trnid[2 * a] : -1;
+    const std::string on = joint < 0 ? "" : NameOf(m, mjOBJ_JOINT, joint);
+    return Error{.what = "an actuator of the model has no name",
+                 .where = "",
+                 .actual = "actuator " + std::to_string(a) + (on.empty() ? "" : ", on joint '" + on + "'"),
+                 .cure = "name all actuators in the MJCF: <motor name=\"" + (on.empty() ? "motor" : on) + "\" ...>"};
+  }
+  return Ok();
 }
 
 class Drafter {
@@ -51,6 +90,8 @@ class Drafter {
     guesses_ = GuessColumns(logs.front().log, timeline_, samples_);
     p_ = PairColumns(model, samples_, &guesses_);
     s_ = ScaleColumns(model, samples_, guesses_, p_);
+    FindZeros(model, samples_, guesses_, p_, &s_);
+    FindTorqueScales(model, samples_, guesses_, p_, &s_);
     proposes_ = model.nactuator == 0 && !p_.actuators.empty();
     if (proposes_) FindGains();
   }
@@ -60,12 +101,10 @@ class Drafter {
     draft_.measured = static_cast<std::size_t>(
         std::ranges::count_if(p_.positions, [&](const Pick& pick) { return pick.column >= 0 && Moves(pick); }));
     if (draft_.measured == 0) {
-      const std::string example = p_.joints.empty() ? "JOINT" : p_.joints[0].name;
-      return Error{.what = p_.joints.empty() ? "the model has no hinge or slide joint with a name"
-                                             : "no column of the log pairs with a joint of the model",
+      return Error{.what = "no column of the log pairs with a joint of the model",
                    .where = "",
                    .allowed = "an angle of at least one joint, which moves",
-                   .cure = "name a column after its joint (\"" + example +
+                   .cure = "name a column after its joint (\"" + p_.joints[0].name +
                            "_rad\"), or write the experiment file by hand (docs/reference/experiment.md)"};
     }
     draft_.head =
@@ -76,13 +115,19 @@ class Drafter {
         "}  # median step " + Num(timeline_.median_step_s) + " s\n";
     for (const std::string& name : held) y += (y.ends_with("s\n") ? "hold: [" : ", ") + Quote(name);
     if (!held.empty()) y += "]" + Unsure("a floating base is held where the MJCF puts it, as on a stand") + "\n";
+    if (LoopGap(m_, samples_, guesses_, p_, s_) > kOpenLoop)
+      y += Unsure(
+               "a loop that the MJCF closes is open at the log's first row: joints in it that are not measured "
+               "start as the MJCF has them, and jump")
+               .substr(2) +
+           "\n";
     if (proposes_) y += "actuators:\n" + ActuatorText();
     if (const std::string commands = CommandText(); !commands.empty()) y += "commands:\n" + commands;
     y += "measured:\n";
     y += SignalText({"", "", "joint", "position"}, p_.joints, p_.positions, s_.positions);
     y += SignalText({"_speed", ", kind: velocity", "joint", "speed"}, p_.joints, p_.velocities, s_.velocities);
     y += SignalText({"_torque", ", kind: torque", "actuator", "torque"}, p_.actuators, p_.torques, s_.torques);
-    y += ParameterText(m_, p_, gains_) + "replay: {mode: free_run, window_s: 1}\n";
+    y += NotUsedText() + ParameterText(m_, p_, gains_) + "replay: {mode: free_run, window_s: 1}\n";
     return std::move(draft_);
   }
 
@@ -230,6 +275,27 @@ class Drafter {
     return text;
   }
 
+  // A comment that names the columns without a place, so that one sees what was overlooked.
+  std::string NotUsedText() const {
+    constexpr std::size_t kMost = 12;
+    std::vector<std::string> labels;
+    std::map<std::string, std::vector<std::string>> families;
+    for (const Guess& guess : guesses_) {
+      if (guess.is_time || guess.used) continue;
+      const std::string label = LabelOf(guess.name, guess.said);
+      if (families[label].empty()) labels.push_back(label);
+      families[label].push_back(guess.name);
+    }
+    for (std::string& label : labels) {
+      if (families[label].size() == 1) label = "'" + families[label].front() + "'";
+    }
+    std::string text;
+    for (std::size_t i = 0; i < std::min(labels.size(), kMost); ++i) text += (i > 0 ? ", " : "") + labels[i];
+    if (labels.size() > kMost) text += " and " + std::to_string(labels.size() - kMost) + " more";
+    std::ranges::replace_if(text, [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+    return text.empty() ? "" : "# Columns without a place here: " + text + "\n";
+  }
+
   const mjModel& m_;
   std::span<const DraftLog> logs_;
   const Timeline& timeline_;
@@ -265,11 +331,13 @@ Result<Draft> DraftExperiment(const std::string& model_path, std::span<const Dra
                  .where = model_path,
                  .cure = "leave --servo out; their gains stand under 'parameters:'"};
   }
+  const auto at_model = [&](Error error) {
+    error.where = model_path;
+    return error;
+  };
+  if (const Status named = CheckNames(rig->compiled()); !named.ok()) return at_model(named.error());
   Result<Draft> draft = Drafter(rig->compiled(), logs, options).Write(held);
-  if (draft.ok()) return draft;
-  Error error = draft.error();
-  error.where = model_path;
-  return error;
+  return draft.ok() ? draft : at_model(draft.error());
 }
 
 }  // namespace gapscope

@@ -32,6 +32,30 @@ void SidesByFamily(std::vector<Guess>* guesses) {
   }
 }
 
+// "q_d" or "q_t" beside "q": the desired one, or where it is the other's derivative its speed.
+void SidesBySibling(const Samples& samples, std::vector<Guess>* guesses) {
+  std::map<std::vector<std::string>, std::size_t> by_words;
+  for (std::size_t i = 0; i < guesses->size(); ++i) by_words.emplace((*guesses)[i].said.words, i);
+  for (Guess& g : *guesses) {
+    if (g.said.side != Side::kUnknown || g.is_time) continue;
+    for (const char* letter : {"d", "t"}) {
+      std::vector<std::string> words = g.said.words;
+      if (std::erase(words, letter) != 1 || !by_words.contains(words)) continue;
+      Guess& sibling = (*guesses)[by_words[words]];
+      if (sibling.said.side == Side::kCommand || sibling.is_time) continue;
+      std::erase(g.said.own, letter);
+      const FittedLine line = LineThrough(samples.slopes(sibling.column), samples.values(g.column));
+      if (MayBe(g, Quantity::kAngle) && std::abs(line.correlation) > kIsDerivative) {
+        g.said.quantity = Quantity::kSpeed;
+      } else {
+        g.said.side = Side::kCommand;
+        sibling.said.side = Side::kMeasured;
+      }
+      break;
+    }
+  }
+}
+
 // A nameless column that is the derivative of another is a speed; of two nameless ones that move alike the one that
 // leads is the command.
 void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
@@ -55,6 +79,8 @@ void ClassifyByData(const Samples& samples, std::vector<Guess>* guesses) {
       if (a == b || !SameJoint(leader, follower, nameless.size() <= kFew) || leader.said.side != Side::kUnknown)
         continue;
       if (!MayBe(leader, Quantity::kAngle) || !MayBe(follower, Quantity::kAngle)) continue;
+      // "pos" leads "aux": it is the measured one.
+      if (leader.said.quantity != Quantity::kUnknown && follower.said.quantity == Quantity::kUnknown) continue;
       if (follower.said.side == Side::kCommand || leader.name == follower.name) continue;
       const Following f = samples.Follow(leader.column, follower.column);
       if (std::abs(f.correlation) < kIsDerivative || !(f.lag_s > 0)) continue;
@@ -83,6 +109,7 @@ std::vector<Guess> GuessColumns(const Log& log, const Timeline& timeline, const 
                        .file_unit = log.columns[c].unit,
                        .is_time = log.columns[c].name == timeline.time_column});
   }
+  SidesBySibling(samples, &guesses);
   ClassifyByData(samples, &guesses);
   return guesses;
 }

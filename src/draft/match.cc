@@ -14,11 +14,20 @@ std::string WhyOf(double score) {
   return "only a part of its name fits";
 }
 
+// A column of which no name tells what it measures is no rival of one that says it.
+bool SaysAsMuch(const Guess& rival, const Guess& taken) {
+  return rival.said.quantity != Quantity::kUnknown || taken.said.quantity == Quantity::kUnknown;
+}
+
 }  // namespace
 
-Numbers::Numbers(const std::vector<Guess>& guesses, const std::vector<int>& candidates,
+Numbers::Numbers(const std::vector<Guess>& guesses, const std::vector<int>& candidates, const std::vector<Slot>& slots,
                  std::vector<std::vector<int>> orders)
     : orders_(std::move(orders)) {
+  for (const Slot& slot : slots) {
+    words_.emplace_back();
+    for (const std::string& name : slot.names) words_.back().push_back(WordsOf(name));
+  }
   for (const int c : candidates) {
     const ColumnName& said = guesses[c].said;
     if (said.number) families_[said.stem].push_back(*said.number);
@@ -36,15 +45,45 @@ int Numbers::SlotOf(const Guess& guess, bool* loose) const {
   if (family == families_.end()) return -1;
   const std::vector<int>& members = family->second;
   const auto rank = static_cast<std::size_t>(std::ranges::find(members, *guess.said.number) - members.begin());
-  for (const auto& order : orders_) {
+  const std::vector<std::vector<int>> orders = OrdersOf(guess.said.own);
+  for (const auto& order : orders) {
     if (order.size() == members.size()) return order[rank];
   }
   *loose = true;
   // One number alone counts nothing.
   const int first = members.front() == 0 ? 0 : 1;
   const int at = *guess.said.number - first;
-  if (members.size() < 2 || orders_.empty() || at < 0 || at >= static_cast<int>(orders_.front().size())) return -1;
-  return orders_.front()[at];
+  if (members.size() < 2 || orders.empty() || at < 0 || at >= static_cast<int>(orders.front().size())) return -1;
+  return orders.front()[at];
+}
+
+std::vector<std::vector<int>> Numbers::OrdersOf(const std::vector<std::string>& own) const {
+  const auto has = [](const std::vector<std::string>& words, const std::string& word) {
+    return std::ranges::any_of(words, [&](const std::string& w) { return AreSameWord(w, word); });
+  };
+  const auto any_name = [&](int slot, const auto& fits) { return std::ranges::any_of(words_[slot], fits); };
+  std::vector<std::string> shared;
+  for (const std::string& word : own) {
+    for (int slot = 0; slot < static_cast<int>(words_.size()); ++slot) {
+      if (!any_name(slot, [&](const auto& words) { return has(words, word); })) continue;
+      shared.push_back(word);
+      break;
+    }
+  }
+  if (shared.empty()) return orders_;
+  std::vector<std::vector<int>> restricted;
+  for (const bool in_front : {true, false}) {
+    const auto fits = [&](const std::vector<std::string>& words) {
+      if (in_front) return !words.empty() && has(shared, words.front());
+      return std::ranges::all_of(shared, [&](const std::string& word) { return has(words, word); });
+    };
+    for (const std::vector<int>& order : orders_) {
+      std::vector<int> slots;
+      std::ranges::copy_if(order, std::back_inserter(slots), [&](int slot) { return any_name(slot, fits); });
+      if (!slots.empty()) restricted.push_back(std::move(slots));
+    }
+  }
+  return restricted;
 }
 
 double Score(const Guess& guess, const Slot& slot, int slot_index, const Numbers& numbers) {
@@ -78,7 +117,8 @@ std::vector<Pick> Match(const std::vector<Slot>& slots, const std::vector<int>& 
   std::vector<double> scores(slots.size(), 0);
   for (const auto& [score, s, c] : pairs) {
     if (picks[s].column >= 0) {
-      if (picks[s].runner_up < 0 && scores[s] - score < kNear) picks[s].runner_up = c;
+      const bool near = scores[s] - score < kNear && SaysAsMuch((*guesses)[c], (*guesses)[picks[s].column]);
+      if (picks[s].runner_up < 0 && near) picks[s].runner_up = c;
       continue;
     }
     if ((*guesses)[c].used) continue;

@@ -22,13 +22,19 @@ struct Slot {
 // Which slot a numbered column means: families of as many members as there are slots count them in order.
 class Numbers {
  public:
-  // `order`: slots as the numbers may count them. Several orders are tried, the first of a family's size is taken.
-  Numbers(const std::vector<Guess>& guesses, const std::vector<int>& candidates, std::vector<std::vector<int>> orders);
+  // `orders`: slots as the numbers may count them. Several orders are tried, the first of a family's size is taken. A
+  // family with words that slots have ("left_arm_3") counts these slots.
+  Numbers(const std::vector<Guess>& guesses, const std::vector<int>& candidates, const std::vector<Slot>& slots,
+          std::vector<std::vector<int>> orders);
   // -1: it means none. `loose`: the family has another size than the orders.
   int SlotOf(const Guess& guess, bool* loose) const;
 
  private:
-  std::map<std::string, std::vector<int>> families_;  // stem: its numbers, ascending
+  // Orders of those slots alone that have the family's words: in front, then anywhere; all where no slot has one.
+  std::vector<std::vector<int>> OrdersOf(const std::vector<std::string>& own) const;
+
+  std::map<std::string, std::vector<int>> families_;          // stem: its numbers, ascending
+  std::vector<std::vector<std::vector<std::string>>> words_;  // per slot, of each of its names
   std::vector<std::vector<int>> orders_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "src/draft/guess_columns.h"
 #include "src/draft/match.h"
@@ -92,7 +93,11 @@ class Pairer {
       if (OwnNumber(p_.joints[j].name)) numbered.push_back(j);
       if (!IsCoupled(p_.joints[j].joint)) free_to_move.push_back(j);
     }
-    std::ranges::stable_sort(numbered, {}, [&](int j) { return *OwnNumber(p_.joints[j].name); });
+    std::set<int> numbers;
+    for (const int j : numbered) numbers.insert(OwnNumber(p_.joints[j].name).value_or(0));
+    // "left_1" and "right_1" are counted as the model has them.
+    if (numbers.size() == numbered.size())
+      std::ranges::stable_sort(numbered, {}, [&](int j) { return *OwnNumber(p_.joints[j].name); });
     for (const ActuatorSlot& a : p_.actuators) {
       if (a.joint >= 0 && std::ranges::find(actuated, a.joint) == actuated.end()) actuated.push_back(a.joint);
     }
@@ -116,15 +121,50 @@ class Pairer {
     slots.reserve(p_.joints.size());
     for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j)
       slots.push_back({.names = {p_.joints[j].name}, .like = like_positions ? PositionGuess(j) : nullptr});
+    AddShortNames(&slots);
     return slots;
+  }
+
+  // What all names of a kind share ("rh_FFJ4", "rh_THJ1") a log may leave out.
+  static void AddShortNames(std::vector<Slot>* slots) {
+    if (slots->size() < 2) return;
+    const std::size_t kinds = slots->front().names.size();
+    for (std::size_t kind = 0; kind < kinds; ++kind) {
+      const auto has = [&](const Slot& slot, const std::string& word) {
+        if (kind >= slot.names.size()) return true;
+        const std::vector<std::string> words = WordsOf(slot.names[kind]);
+        return std::ranges::find(words, word) != words.end();
+      };
+      std::vector<std::string> shared;
+      for (const std::string& word : WordsOf(slots->front().names[kind])) {
+        if (std::ranges::all_of(*slots, [&](const Slot& slot) { return has(slot, word); })) shared.push_back(word);
+      }
+      if (shared.empty()) continue;
+      for (Slot& slot : *slots) {
+        if (kind < slot.names.size()) AddShortName(shared, slot.names[kind], &slot);
+      }
+    }
+  }
+
+  // Not where a number alone would be left.
+  static void AddShortName(const std::vector<std::string>& shared, const std::string& name, Slot* slot) {
+    std::string text;
+    bool is_word = false;
+    for (const std::string& word : WordsOf(name)) {
+      if (std::ranges::find(shared, word) != shared.end()) continue;
+      text += (text.empty() ? "" : " ") + word;
+      is_word = is_word || std::isalpha(static_cast<unsigned char>(word[0])) != 0;
+    }
+    if (is_word) slot->names.push_back(text);
   }
 
   void PairPositions() {
     const std::vector<int> candidates =
         Select(guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && MayBe(g, Quantity::kAngle); });
-    const Numbers numbers(guesses_, candidates, JointOrders());
+    const std::vector<Slot> slots = JointSlots(false);
+    const Numbers numbers(guesses_, candidates, slots, JointOrders());
     p_.positions = Match(
-        JointSlots(false), candidates, numbers,
+        slots, candidates, numbers,
         [&](int, int c) {
           const ColumnName& said = guesses_[c].said;
           return (said.side == Side::kMeasured ? 0.02 : 0) - (said.quantity == Quantity::kAngle ? 0 : 0.1);
@@ -134,13 +174,27 @@ class Pairer {
       return !guesses_[c].used && samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.filtered &&
              !IsCopy(guesses_[c].column);
     };
+    const auto goes_by_order = [&](int c) { return is_left(c) && !IsOutsider(c, candidates); };
     const bool only_one = p_.joints.size() == 1 && std::ranges::count_if(candidates, is_left) == 1;
     for (Pick& pick : p_.positions) {
-      const auto left = std::ranges::find_if(candidates, is_left);
+      const auto left = std::ranges::find_if(candidates, goes_by_order);
       if (pick.column >= 0 || left == candidates.end()) continue;
       guesses_[*left].used = true;
       pick = {.column = *left, .runner_up = -1, .certain = only_one, .why = "", .by_order = !only_one};
     }
+  }
+
+  // Names pair most columns of its family, but not this one: it is of something else than a joint or an actuator.
+  bool IsOutsider(int candidate, const std::vector<int>& candidates) const {
+    const std::string family = FamilyOf(guesses_[candidate].said);
+    const auto kin = [&](int c) { return FamilyOf(guesses_[c].said) == family; };
+    const auto paired = std::ranges::count_if(candidates, [&](int c) { return kin(c) && IsPairedByName(c); });
+    return !family.empty() && 2 * paired > std::ranges::count_if(candidates, kin);
+  }
+
+  bool IsPairedByName(int candidate) const {
+    const auto is_it = [&](const Pick& pick) { return pick.column == candidate && !pick.by_order; };
+    return std::ranges::any_of(p_.positions, is_it) || std::ranges::any_of(p_.commands, is_it);
   }
 
   // The same numbers as a column that is used already.
@@ -160,10 +214,11 @@ class Pairer {
   void PairVelocities() {
     const std::vector<int> candidates = Select(
         guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && g.said.quantity == Quantity::kSpeed; });
-    const Numbers numbers(guesses_, candidates, JointOrders());
+    const std::vector<Slot> slots = JointSlots(true);
+    const Numbers numbers(guesses_, candidates, slots, JointOrders());
     p_.velocities = Match(
-        JointSlots(true), candidates, numbers,
-        [&](int s, int c) { return FollowsSpeed(s, c) > kContradicts ? 0.05 : -0.3; }, &guesses_);
+        slots, candidates, numbers, [&](int s, int c) { return FollowsSpeed(s, c) > kContradicts ? 0.05 : -0.3; },
+        &guesses_);
     for (int j = 0; j < static_cast<int>(p_.joints.size()); ++j) {
       Pick& pick = p_.velocities[j];
       if (pick.column >= 0 && PositionGuess(j) && FollowsSpeed(j, pick.column) <= kContradicts) {
@@ -199,6 +254,7 @@ class Pairer {
       if (a.joint >= 0) slot.names.push_back(p_.joints[a.joint].name);
       slots.push_back(std::move(slot));
     }
+    AddShortNames(&slots);
     return slots;
   }
 
@@ -243,10 +299,11 @@ class Pairer {
     const std::vector<int> others =
         Select(guesses_, [](const Guess& g) { return g.said.quantity == Quantity::kOther; });
     candidates.insert(candidates.end(), others.begin(), others.end());
-    const Numbers numbers(guesses_, candidates, ActuatorOrders());
+    const std::vector<Slot> slots = ActuatorSlots();
+    const Numbers numbers(guesses_, candidates, slots, ActuatorOrders());
     p_.commands = Match(
-        ActuatorSlots(), candidates, numbers,
-        [&](int s, int c) { return Fit(p_.actuators[s].wants, guesses_[c].said.quantity); }, &guesses_);
+        slots, candidates, numbers, [&](int s, int c) { return Fit(p_.actuators[s].wants, guesses_[c].said.quantity); },
+        &guesses_);
     const auto servo_follows = [&](int s, int c) {
       const bool servo = p_.actuators[s].wants == Quantity::kAngle;
       return servo && MayBe(guesses_[c], Quantity::kAngle) ? Likeness(p_.actuators[s].joint, c) : 0;
@@ -272,10 +329,12 @@ class Pairer {
   }
 
   void PairByOrder(const std::vector<int>& candidates) {
+    const bool last = std::ranges::count(p_.commands, -1, &Pick::column) == 1;
     for (std::size_t s = 0; s < p_.commands.size(); ++s) {
       const auto is_left = [&](int c) {
         return !guesses_[c].used && Fit(p_.actuators[s].wants, guesses_[c].said.quantity) >= 0 &&
-               samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.number;
+               samples_.spread(guesses_[c].column) > 0 && !guesses_[c].said.number &&
+               (last || !IsOutsider(c, candidates));
       };
       const auto left = std::ranges::find_if(candidates, is_left);
       if (p_.commands[s].column >= 0 || left == candidates.end() || p_.actuators[s].wants == Quantity::kOther) continue;
@@ -296,8 +355,9 @@ class Pairer {
         return guesses_[c].said.quantity == quantity ||
                (quantity == Quantity::kAngle && guesses_[c].said.quantity == Quantity::kUnknown);
       });
-      const Numbers numbers(guesses_, candidates, JointOrders());
-      std::vector<Pick> found = Match(JointSlots(true), candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
+      const std::vector<Slot> slots = JointSlots(true);
+      const Numbers numbers(guesses_, candidates, slots, JointOrders());
+      std::vector<Pick> found = Match(slots, candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
       if (quantity == Quantity::kAngle) PairByData(candidates, [&](int j, int c) { return Likeness(j, c); }, &found);
       for (std::size_t j = 0; j < picks.size(); ++j) {
         if (picks[j].column >= 0 || found[j].column < 0) continue;
@@ -334,8 +394,9 @@ class Pairer {
   void PairTorques() {
     const std::vector<int> candidates = Select(
         guesses_, [](const Guess& g) { return g.said.side != Side::kCommand && g.said.quantity == Quantity::kTorque; });
-    const Numbers numbers(guesses_, candidates, ActuatorOrders());
-    p_.torques = Match(ActuatorSlots(), candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
+    const std::vector<Slot> slots = ActuatorSlots();
+    const Numbers numbers(guesses_, candidates, slots, ActuatorOrders());
+    p_.torques = Match(slots, candidates, numbers, [](int, int) { return 0.0; }, &guesses_);
     // One torque of one drive needs no name.
     if (p_.actuators.size() != 1 || candidates.size() != 1 || p_.torques[0].column >= 0) return;
     guesses_[candidates[0]].used = true;

@@ -19,16 +19,17 @@ constexpr double kServoAgrees = 0.25;  // and between a servo's target and its a
 constexpr double kClear = 0.8;         // correlation from which a regression speaks
 constexpr double kIsLinear = 0.97;     // and from which a target that is in no unit of an angle is a linear map of it
 constexpr double kFast_rad_per_s = 30;
+constexpr double kLeastGain = 0.3, kLargestGain = 1.5;  // of an angle over its target, where a servo is between them
 
 std::string CountsUnit(int per_turn) { return "counts/" + std::to_string(per_turn); }
 
-std::vector<std::string> AngleUnits() {
+// `whole`: counts too.
+std::vector<std::string> AngleUnits(bool whole = true) {
   std::vector<std::string> units = {"rad", "deg", "mrad", "rev"};
-  for (int n = 512; n <= 1 << 20; n *= 2) units.push_back(CountsUnit(n));
+  for (int n = 512; whole && n <= 1 << 20; n *= 2) units.push_back(CountsUnit(n));
   return units;
 }
-const std::vector<std::string> kSpeedUnits = {"rad/s", "deg/s", "rpm", "rev/s"};
-const std::vector<std::string> kTravelUnits = {"m", "mm"};
+const std::vector<std::string> kSpeedUnits = {"rad/s", "deg/s", "rpm", "rev/s"}, kTravelSpeedUnits = {"m/s"};
 
 double FactorOf(const std::string& unit) {
   const auto parsed = ParseUnit(unit);
@@ -59,6 +60,11 @@ Scaling Of(const std::string& unit, bool certain, const std::string& doubt) {
   return {.unit = unit, .scale = 1, .add = 0, .factor = FactorOf(unit), .certain = certain, .doubt = doubt};
 }
 
+double MostCommon(const std::vector<double>& values) {
+  const auto count = [&](double v) { return std::ranges::count(values, v); };
+  return *std::ranges::max_element(values, {}, count);
+}
+
 class Scaler {
  public:
   Scaler(const mjModel& model, const Samples& samples, const std::vector<Guess>& guesses, const Pairing& pairing)
@@ -69,7 +75,10 @@ class Scaler {
     AnglesByTheirNeighbours();
     AnglesByFamily();
     for (std::size_t j = 0; j < p_.joints.size(); ++j) scalings_.velocities.push_back(Velocity(j));
-    ScalesOfFamily(Families(p_.velocities, [](std::size_t) { return true; }), p_.velocities, &scalings_.velocities);
+    for (const bool slides : {false, true}) {
+      const auto families = Families(p_.velocities, [&](std::size_t j) { return p_.joints[j].slide == slides; });
+      ScalesOfFamily(families, p_.velocities, &scalings_.velocities);
+    }
     for (std::size_t a = 0; a < p_.actuators.size(); ++a) {
       scalings_.commands.push_back(Command(a));
       scalings_.torques.push_back(Torque(p_.torques[a]));
@@ -127,7 +136,7 @@ class Scaler {
       if (!target || !servo || !stated.certain) continue;
       const FittedLine line = LineThrough(samples_.values(target->column), samples_.values(angle.column));
       if (std::abs(line.correlation) < kClear) continue;
-      return Snap(stated.factor / line.slope, AngleUnits(), kServoAgrees);
+      return Snap(stated.factor / line.slope, AngleUnits(samples_.whole_numbers(angle.column)), kServoAgrees);
     }
     return std::nullopt;
   }
@@ -203,7 +212,7 @@ class Scaler {
   }
 
   Scaling SpeedByAngle(const Guess& speed, std::size_t j, double factor, const std::string& usual) const {
-    if (const auto unit = p_.joints[j].slide ? std::nullopt : Snap(factor, kSpeedUnits, 2 * kAgree)) {
+    if (const auto unit = Snap(factor, p_.joints[j].slide ? kTravelSpeedUnits : kSpeedUnits, 2 * kAgree)) {
       Scaling scaling = Of(*unit, scalings_.positions[j].certain, "");  // a doubt of the angle's is told there
       scaling.by_data = scaling.is_unit = true;
       return scaling;
@@ -232,11 +241,12 @@ class Scaler {
 
   std::string UsualCommand(std::size_t a, bool slide) const {
     const Guess* command = GuessOf(p_.commands[a]);
+    const bool on_joint = p_.actuators[a].joint >= 0;  // not on a tendon or a site
     switch (p_.actuators[a].wants) {
       case Quantity::kAngle:
-        return slide ? "m" : "rad";
+        return !on_joint ? "1" : slide ? "m" : "rad";
       case Quantity::kSpeed:
-        return slide ? "m/s" : "rad/s";
+        return !on_joint ? "1" : slide ? "m/s" : "rad/s";
       case Quantity::kTorque:
         return command && command->said.quantity == Quantity::kTorque ? slide ? "N" : "N m" : "1";
       default:
@@ -253,7 +263,7 @@ class Scaler {
     const Scaling& of_angle = scalings_.positions[joint];
     const double factor = of_angle.factor * line.slope;
     if (!scaling.certain) {
-      const auto unit = clear ? Snap(factor, AngleUnits(), kServoAgrees) : std::nullopt;
+      const auto unit = clear ? TargetUnit(command, of_angle, factor) : std::nullopt;
       if (unit) {
         scaling = Of(*unit, of_angle.certain, "");  // a doubt of the angle's is told there
         scaling.by_data = scaling.is_unit = true;
@@ -272,14 +282,27 @@ class Scaler {
     return scaling;
   }
 
-  // It says that it is a policy's action, or it is a linear map of the angle that no weak servo explains.
-  static bool IsMapped(const Guess& command, const FittedLine& line) {
-    const bool action = std::ranges::any_of(command.said.words, [](const std::string& word) {
+  // Its angle's, where a weak servo explains what is left; else the one that fits.
+  std::optional<std::string> TargetUnit(const Guess& command, const Scaling& angle, double factor) const {
+    if (const auto same = Snap(factor, {angle.unit}, kServoAgrees)) return same;
+    auto other = Snap(factor, AngleUnits(samples_.whole_numbers(command.column)), kServoAgrees);
+    if (other || SaysAction(command) || !IsOfAServo(factor / FactorOf(angle.unit))) return other;
+    return angle.unit;
+  }
+
+  static bool SaysAction(const Guess& command) {
+    return std::ranges::any_of(command.said.words, [](const std::string& word) {
       return word == "action" || word == "actions" || word == "policy";
     });
-    if (action) return std::abs(line.correlation) > kClear;
-    const double gain = std::abs(line.slope);
-    return std::abs(line.correlation) > kIsLinear && (gain < 0.3 || gain > 1.5);
+  }
+
+  // How far an angle goes of what its target asks for.
+  static bool IsOfAServo(double gain) { return std::abs(gain) >= kLeastGain && std::abs(gain) <= kLargestGain; }
+
+  // It says that it is a policy's action, or it is a linear map of the angle that no weak servo explains.
+  static bool IsMapped(const Guess& command, const FittedLine& line) {
+    if (SaysAction(command)) return std::abs(line.correlation) > kClear;
+    return std::abs(line.correlation) > kIsLinear && !IsOfAServo(line.slope);
   }
 
   static Scaling Action(const Guess& command, double factor, double offset) {
@@ -314,19 +337,23 @@ class Scaler {
       }
       if (units.empty() && scales.empty()) continue;
       const bool is_unit = units.size() >= scales.size();
-      const double middle = Median(is_unit ? units : scales);
-      const auto like = std::ranges::find_if(members, [&](std::size_t i) {
+      const double middle = is_unit ? MostCommon(units) : Median(scales);
+      const auto is_like = [&](std::size_t i, double factor) {
         const Scaling& s = (*all)[i];
-        return s.by_data && s.is_unit == is_unit && std::abs(s.factor) == middle;
-      });
+        return s.by_data && s.is_unit == is_unit && s.factor == factor;
+      };
+      auto like = std::ranges::find_if(members, [&](std::size_t i) { return is_like(i, middle); });
+      if (like == members.end())
+        like = std::ranges::find_if(members, [&](std::size_t i) { return is_like(i, -middle); });
       const Scaling model = (*all)[*like];
       for (const std::size_t i : members) {
         Scaling& s = (*all)[i];
-        if (s.certain || (s.by_data && s.is_unit == is_unit && is_unit)) continue;
-        const bool against = s.factor < 0 && is_unit;
+        const bool stated = s.certain && !s.by_data;
+        if (stated || (is_unit && (is_like(i, middle) || is_like(i, -middle)))) continue;
+        const bool against = is_unit || s.by_data ? s.factor < 0 : model.factor < 0;
         s = model;
-        s.factor = against ? -middle : model.factor;
-        s.scale = against ? -std::abs(model.scale) : model.scale;
+        s.factor = against ? -middle : middle;
+        s.scale = against ? -std::abs(model.scale) : std::abs(model.scale);
         if (s.add != 0) s.add = MeanOfAngle(i) - s.factor * MeanOf(picks[i]);
       }
     }

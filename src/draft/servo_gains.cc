@@ -8,60 +8,14 @@
 
 #include "src/core/mujoco_handles.h"
 #include "src/core/statistics.h"
+#include "src/draft/motion.h"
 
 namespace gapscope {
 namespace {
 
-constexpr double kHalfWidth_s = 0.03;  // of the parabolas that give speed and acceleration
 constexpr double kExplains = 0.8, kKnown = 0.2;
 constexpr double kLatest_s = 0.08, kLagStep_s = 0.004;  // of a command
 constexpr double kMadeUp_hz = 5, kDroop_rad = 0.1;
-
-// Angle, speed and acceleration of every joint of the pairing at the sampled rows, log after log, SI; empty: not
-// measured.
-using Motions = std::vector<std::vector<Samples::Motion>>;
-
-Motions MotionsOf(const std::vector<const Samples*>& logs, const std::vector<Guess>& guesses, const Pairing& p,
-                  const Scalings& s) {
-  Motions motions(p.joints.size());
-  for (std::size_t j = 0; j < p.joints.size(); ++j) {
-    if (p.positions[j].column < 0) continue;
-    const double factor = s.positions[j].factor;
-    for (const Samples* log : logs) {
-      for (const auto& m : log->MotionOf(guesses[p.positions[j].column].column, kHalfWidth_s))
-        motions[j].push_back({factor * m.value, factor * m.slope, factor * m.curvature});
-    }
-  }
-  return motions;
-}
-
-// Torque at each joint that the motion takes, at every sampled row; NaN where the motion is not known. Unmeasured
-// joints stand still.
-std::vector<std::vector<double>> TorquesOf(const mjModel& model, const Pairing& p, const Motions& motions) {
-  const ModelPtr free(mj_copyModel(nullptr, &model));
-  free->opt.disableflags |= mjDSBL_CONSTRAINT | mjDSBL_ACTUATION;
-  const DataPtr data(mj_makeData(free.get()));
-  std::vector<std::vector<double>> torques(p.joints.size());
-  std::size_t rows = 0;
-  for (const auto& motion : motions) rows = std::max(rows, motion.size());
-  for (std::size_t k = 0; k < rows; ++k) {
-    mj_resetData(free.get(), data.get());
-    bool known = true;
-    for (std::size_t j = 0; j < p.joints.size(); ++j) {
-      if (motions[j].empty()) continue;
-      const auto& [q, v, a] = motions[j][k];
-      const int joint = p.joints[j].joint;
-      known = known && std::isfinite(q + v + a);
-      data->qpos[model.jnt_qposadr[joint]] = q;
-      data->qvel[model.jnt_dofadr[joint]] = v;
-      data->qacc[model.jnt_dofadr[joint]] = a;
-    }
-    if (known) mj_inverse(free.get(), data.get());
-    for (std::size_t j = 0; j < p.joints.size(); ++j)
-      torques[j].push_back(known ? data->qfrc_inverse[model.jnt_dofadr[p.joints[j].joint]] : kNaN);
-  }
-  return torques;
-}
 
 struct Fit {
   double kp = 0, kd = 0, armature = 0, explained = 0, error = 0;  // share of variance; standard error of kp

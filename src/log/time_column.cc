@@ -42,10 +42,10 @@ constexpr std::array kUnitWords = {
     UnitWord{"min", "min"},
     UnitWord{"minutes", "min"},
 };
-constexpr std::array<std::string_view, 18> kTimeWords = {
-    "t",       "time",         "timestamp",   "timestamps", "time_stamp", "stamp",
-    "elapsed", "elapsed_time", "elapsedtime", "sim_time",   "simtime",    "header.stamp",
-    "clock",   "log_time",     "zeit",        "temps",      "tiempo",     "tempo"};
+constexpr std::array<std::string_view, 19> kTimeWords = {
+    "t",           "time",     "timestamp", "timestamps",   "time_stamp", "stamp",    "elapsed", "elapsed_time",
+    "elapsedtime", "sim_time", "simtime",   "header.stamp", "clock",      "log_time", "zeit",    "temps",
+    "tiempo",      "tempo",    "tick"};
 
 // One of the units of kUnitWords.
 double SecondsPer(std::string_view unit) {

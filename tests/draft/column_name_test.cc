@@ -77,6 +77,8 @@ TEST(ColumnNameTest, MatchesElements) {
   EXPECT_LT(NameMatch("q/left_hip_roll", "left_hip_pitch_joint"), 1);
   EXPECT_GT(NameMatch("q/left_hip_roll", "left_hip_pitch_joint"), 0);
   EXPECT_EQ(NameMatch("q/knee", "left_hip_pitch_joint"), 0);
+  EXPECT_EQ(NameMatch("r_knee_q", "right_knee"), 1);
+  EXPECT_LT(NameMatch("l_knee_q", "right_knee"), 1);
   EXPECT_GE(NameMatch("shoulderpan", "shoulder_pan"), 0.9);
 }
 

@@ -107,6 +107,106 @@ TEST_F(DraftTest, ARunnerUpIsNamed) {
   EXPECT_TRUE(IsUnsure(", not 'q")) << text_;
 }
 
+// "q_d" is a desired "q" whatever else the model has, and "q_d" that is its derivative a speed.
+TEST_F(DraftTest, ALetterBehindAnAnglesNameIsItsTargetOrItsSpeed) {
+  std::vector<std::string> names = kThree;
+  names.emplace_back("finger");
+  std::vector<Named> columns = Columns("q_d", "q", "", {"[0]", "[1]", "[2]"});
+  columns.push_back({"grip_cmd", motions_[1].target});
+  Experiment e = Drafted(Bars(names), columns);
+  ExpectPairs(e, "q_d", "q", "", {"[0]", "[1]", "[2]"});
+  e = Drafted(Bars(kThree), Columns("", "q", "q_d", {"[0]", "[1]", "[2]"}));
+  ExpectPairs(e, "", "q", "q_d", {"[0]", "[1]", "[2]"});
+}
+
+// Where names pair a family, the member that no name pairs is of something else: a telescope of several joints, say.
+TEST_F(DraftTest, AnOutsiderOfANamedFamilyGoesNowhereAndIsTold) {
+  std::vector<std::string> names = kThree;
+  names.insert(names.begin(), {"wheel", "wheel2"});
+  std::vector<Named> columns = Columns("cmd_", "pos_", "", {"hip", "knee", "left foot"});
+  columns.push_back({"pos_arm", motions_[0].speed});
+  const Experiment e = Drafted(Bars(names), columns);
+  ExpectPairs(e, "cmd_", "pos_", "", {"hip", "knee", "left foot"});
+  EXPECT_EQ(ColumnOf(e, "wheel"), "") << text_;
+  EXPECT_NE(text_.find("# Columns without a place here: 'pos_arm'\n"), text_.npos) << text_;
+}
+
+// Two arms: numbers of a family count the joints of its side, whose own numbers are there twice.
+TEST_F(DraftTest, NumbersCountThePartThatTheFamilyNames) {
+  const std::vector<std::string> names = {"left_j1", "left_j2", "left_j3", "right_j1", "right_j2", "right_j3"};
+  std::vector<Named> columns = {{"time", motions_[0].time_s}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (const std::string side : {"right", "left"}) {
+      const Motion m = Move(side == "left" ? i : i + 3, kKp, kKd);
+      columns.push_back({side + "_cmd[" + std::to_string(i) + "]", m.target});
+      columns.push_back({side + "_pos[" + std::to_string(i) + "]", m.angle});
+    }
+  }
+  const Experiment e = Drafted(Bars(names), columns);
+  for (const std::string& name : names) {
+    const std::string side = name.substr(0, name.find('_')), end = std::string(1, static_cast<char>(name.back() - 1));
+    EXPECT_EQ(ColumnOf(e, name), side + "_pos[" + end + "]") << text_;
+    EXPECT_EQ(CommandOf(e, name), side + "_cmd[" + end + "]") << text_;
+  }
+  EXPECT_FALSE(IsUnsure("is taken for")) << text_;
+}
+
+TEST_F(DraftTest, WhatAllNamesShareMayBeLeftOut) {
+  const std::vector<std::string> names = {"rh_FFJ2", "rh_FFJ1", "rh_THJ2"};
+  const Experiment e = Drafted(Bars(names), Columns("cmd.", "state.", "", {"FFJ2", "FFJ1", "THJ2"}));
+  for (const std::string& name : names) {
+    EXPECT_EQ(ColumnOf(e, name), "state." + name.substr(3)) << text_;
+    EXPECT_EQ(CommandOf(e, name), "cmd." + name.substr(3)) << text_;
+  }
+  EXPECT_FALSE(IsUnsure("is taken for")) << text_;
+}
+
+TEST_F(DraftTest, SidesMayBeLetters) {
+  const std::vector<std::string> names = {"left_knee", "right_knee", "left_hip"};
+  std::vector<Named> columns = Columns("u_", "q_", "", {"l_knee", "r_knee", "L_hip"});
+  std::ranges::reverse(columns);
+  const Experiment e = Drafted(Bars(names), columns);
+  EXPECT_EQ(ColumnOf(e, "left_knee"), "q_l_knee") << text_;
+  EXPECT_EQ(ColumnOf(e, "right_knee"), "q_r_knee") << text_;
+  EXPECT_EQ(CommandOf(e, "left_hip"), "u_L_hip") << text_;
+  EXPECT_FALSE(IsUnsure("is taken for")) << text_;
+}
+
+// Unless only one place is left for it.
+TEST_F(DraftTest, TheLastCommandGoesToTheLastActuator) {
+  std::vector<std::string> names = kThree;
+  names.emplace_back("tool");
+  std::string servos = "<actuator>";
+  for (const std::string& name : names) servos += "<position kp=\"6\" name=\"" + name + "\" joint=\"" + name + "\"/>";
+  std::vector<Named> columns = Columns("cmd_", "pos_", "", {"hip", "knee", "left foot"});
+  columns.push_back({"cmd_gripper", motions_[0].torque});
+  const Experiment e = Drafted(Bars(names, servos + "</actuator>"), columns);
+  EXPECT_EQ(CommandOf(e, "tool"), "cmd_gripper") << text_;
+  EXPECT_TRUE(IsUnsure("order")) << text_;
+}
+
+TEST_F(DraftTest, WhatDoesNotSayWhatItIsIsNoRunnerUp) {
+  std::vector<Named> columns = Columns("", "pos_", "", {"1", "2", "3"});
+  for (std::size_t i = 0; i < 3; ++i) columns.push_back({"load_" + std::to_string(i + 1), motions_[i].torque});
+  for (std::size_t i = 0; i < 3; ++i) columns.push_back({"aux_" + std::to_string(i + 1), motions_[i].torque});
+  ExpectPairs(Drafted(Bars(kThree), columns), "", "pos_", "", {"1", "2", "3"});
+  EXPECT_FALSE(IsUnsure(", not '")) << text_;
+}
+
+// The bar at 1 m is tied to the first one's end; nobody measures it.
+TEST_F(DraftTest, AnOpenLoopIsTold) {
+  const std::string tied = "<equality><connect body1=\"a\" body2=\"b\" anchor=\"0.5 0 0\"/></equality>";
+  std::string robot = Bars({"hip", "knee"}, tied);
+  for (const char* name : {"a", "b"})
+    robot.replace(robot.find("<body pos"), 9, std::string("<body name=\"") + name + "\" pos");
+  const auto open = [&](double start) {
+    Drafted(robot, {{"time", motions_[0].time_s}, {"hip", Times(motions_[0].angle, 1, start - motions_[0].angle[0])}});
+    return IsUnsure("a loop that the MJCF closes is open");
+  };
+  EXPECT_TRUE(open(0.3)) << text_;
+  EXPECT_FALSE(open(0)) << text_;
+}
+
 TEST_F(DraftTest, TorquesAreCommandsOfTorqueDrives) {
   std::vector<Named> columns = {{"time", motions_[0].time_s}};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -147,8 +247,12 @@ TEST_F(DraftTest, WhatCannotBeDraftedIsAnError) {
     ASSERT_FALSE(draft.ok());
     EXPECT_NE(draft.error().Text().find(text), std::string::npos) << draft.error().Text();
   };
-  says(TryDraft("<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>", Columns("", "q", "", {"1", "2", "3"})),
-       "no hinge or slide joint");
+  const std::vector<Named> columns = Columns("u", "q", "", {"1", "2", "3"});
+  says(TryDraft("<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>", columns), "no hinge or slide joint that");
+  says(TryDraft(Bars({"", "", ""}), columns), "no hinge or slide joint of the model has a name; name them");
+  const std::string nameless = "<actuator><motor joint=\"hip\"/><motor joint=\"knee\"/></actuator>";
+  says(TryDraft(Bars(kThree, nameless), columns),
+       "an actuator of the model has no name: got actuator 0, on joint 'hip'");
   says(TryDraft(Bars(kThree), {{"time", motions_[0].time_s}, {"temp1", motions_[0].angle}}), "no column of the log");
   says(TryDraft(Bars(kThree), {{"time", motions_[0].time_s}, {"q1", std::vector<double>(2500, 1.0)}}),
        "no column of the log");

@@ -76,6 +76,53 @@ TEST_F(UnitsTest, AFamilyHasOneUnit) {
   EXPECT_NEAR(Measured(e, "knee", SignalKind::kPosition)->factor, kDegree, 1e-9) << text_;
 }
 
+// Gravity holds the weak servo back: the angle goes 0.7 as far as its target, which is degrees over counts of 1/512.
+TEST_F(UnitsTest, ATargetHasItsAnglesUnit) {
+  const Motion weak = Move(0, kUnitsKp, kUnitsKd, {.gravity_n_m = 2.6});
+  const std::string servo = "<actuator><position name=\"m\" joint=\"hip\" kp=\"6\" kv=\"0.3\"/></actuator>";
+  const Experiment e = Drafted(
+      Bars({"hip"}, servo),
+      {{"time", weak.time_s}, {"target", Times(weak.target, 1 / kDegree)}, {"q_deg", Times(weak.angle, 1 / kDegree)}});
+  const CommandSpec* c = Command(e, "m");
+  ASSERT_NE(c, nullptr) << text_;
+  EXPECT_NEAR(c->factor, kDegree, 1e-9) << text_;
+}
+
+TEST_F(UnitsTest, TheMiddleOfASensorsTurnIsTheZeroIfTheRangeSaysSo) {
+  const auto counts = [](const std::vector<double>& angle) {
+    std::vector<double> raw = Times(angle, 1 / kCount, 2048);
+    for (double& v : raw) v = std::round(v);
+    return raw;
+  };
+  const std::string limited = "range=\"-1 1\" limited=\"true\"";
+  const std::string servo = "<actuator><position name=\"m\" joint=\"hip\" kp=\"6\" kv=\"0.3\"/></actuator>";
+  const std::vector<Named> log = {{"time", m_.time_s}, {"goal", counts(m_.target)}, {"q", counts(m_.angle)}};
+  Experiment e = Drafted(Bars({"hip"}, servo, limited), log);
+  ASSERT_NE(Measured(e, "hip", SignalKind::kPosition), nullptr) << text_;
+  EXPECT_NEAR(Measured(e, "hip", SignalKind::kPosition)->offset, -std::numbers::pi, 1e-4) << text_;
+  ASSERT_NE(Command(e, "m"), nullptr);
+  EXPECT_NEAR(Command(e, "m")->offset, -std::numbers::pi, 1e-4) << text_;
+  EXPECT_TRUE(IsUnsure("half a turn")) << text_;
+  e = Drafted(Bars({"hip"}, servo, limited), {{"time", m_.time_s}, {"q_rad", Times(m_.angle, 1, 1.2)}});
+  ASSERT_NE(Measured(e, "hip", SignalKind::kPosition), nullptr) << text_;
+  EXPECT_EQ(Measured(e, "hip", SignalKind::kPosition)->offset, 0);
+  EXPECT_TRUE(IsUnsure("'q_rad' leaves its joint's range")) << text_;
+}
+
+// The input of a motor with a gear of 2, the torque at its joint, and both with the other sign.
+TEST_F(UnitsTest, OfATorqueCommandByTheTorqueThatTheMotionTakes) {
+  const std::string motor = "<actuator><motor name=\"m\" joint=\"hip\" gear=\"2\"/></actuator>";
+  for (const auto& [raw_per_torque, factor] : {std::pair{0.5, 1.0}, {1, 0.5}, {-0.5, -1}, {-1, -0.5}}) {
+    const Experiment e = Drafted(Bars({"hip"}, motor),
+                                 {{"time", m_.time_s}, {"u", Times(m_.torque, raw_per_torque)}, {"q_rad", m_.angle}});
+    const CommandSpec* c = Command(e, "m");
+    ASSERT_NE(c, nullptr) << text_;
+    EXPECT_NEAR(c->factor, factor, 1e-9) << text_;
+    EXPECT_EQ(IsUnsure("by the torque that the motion takes"), factor != 1) << text_;
+    EXPECT_FALSE(IsUnsure("is not stated")) << text_;
+  }
+}
+
 TEST_F(UnitsTest, TimeInMicroAndMilliseconds) {
   for (const auto& [unit, factor] : {std::pair{"us", 1e6}, {"ms", 1e3}, {"s", 1.0}}) {
     const Experiment e = Drafted(Bars({"hip"}), {{"stamp", Times(m_.time_s, factor)}, {"q", m_.angle}});

@@ -100,6 +100,7 @@ TEST(TimelineTest, TimeColumnByName) {
       {{"x", "field.header.stamp"}, "field.header.stamp"},
       {{"torque", "theta", "elapsed_time"}, "elapsed_time"},
       {{"%time", "field.t"}, "%time"},
+      {{"x", "tick_ms"}, "tick_ms"},
   };
   for (const auto& row : rows) {
     Log log = MakeLog({});

@@ -206,6 +206,7 @@ class _WithModel(Run):
         *,
         timestep: float | None = None,
         draws: int | None = None,
+        draws_from: str | None = None,
         seed: int | None = None,
         experiment: str | None = None,
     ) -> Exported:
@@ -213,9 +214,11 @@ class _WithModel(Run):
 
         ``timestep``, s: of the written MJCF. ``draws``, of a tune: also OUT/randomization.json and
         OUT/randomization.npz, whose arrays of (draws, ...) are named as MuJoCo's (docs/how-to/randomize.md).
+        ``draws_from``: "covariance", "interval", "logs" or "fits", what they are of, where the result has it.
         ``experiment``: where its file has moved since.
         """
-        options = {"timestep": timestep, "draws": draws, "seed": seed, "experiment": experiment}
+        options = {"timestep": timestep, "draws": draws, "draws-from": draws_from, "seed": seed}
+        options["experiment"] = experiment
         return from_json(Exported, self._go_on("export", to=target, out=out, **options))
 
     def apply(self, out: str | os.PathLike[str], *, experiment: str | None = None) -> Applied:
@@ -307,14 +310,17 @@ class Tune(_WithTraces):
         """Of each held-out log, in the order of ``held_out``: by signal arrays of shape (rows,), SI."""
         return self._read_traces("held_out")
 
-    def samples(self, draws: int, *, target: str = "mujoco_native", seed: int = 0) -> dict[str, Floats]:
+    def samples(
+        self, draws: int, *, target: str = "mujoco_native", seed: int = 0, draws_from: str | None = None
+    ) -> dict[str, Floats]:
         """Joint draws of what the logs leave open: the arrays of randomization.npz (docs/how-to/randomize.md).
 
         "parameters" is of shape (draws, parameters), each in its own unit, in the order in which ``parameters`` has
         those that vary. The others are named and shaped as MuJoCo's, draws first: "dof_damping" of (draws, nv).
+        ``draws_from``: as `export` has it.
         """
         with tempfile.TemporaryDirectory(prefix="gapscope_") as folder:
-            self.export(target, folder, draws=draws, seed=seed)
+            self.export(target, folder, draws=draws, draws_from=draws_from, seed=seed)
             with np.load(Path(folder) / "randomization.npz", allow_pickle=False) as arrays:
                 return {name: arrays[name] for name in arrays.files}
 

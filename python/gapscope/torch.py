@@ -211,10 +211,11 @@ class Drive:
 
     Its torque is ``gain`` command - ``kp`` angle - ``kd`` speed + ``bias_n_m``, before its stages; without ``gain``,
     kp. Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command
-    are in its unit, the others in N m, rad and s. `max_delay_s` bounds both delays together. `spring` and `stop` are
-    arguments of `spring_torque` and `stop_torque`, whose torques come on top. `step` is called once a time step, under
-    an integrator that evaluates forces once (not RK4). The state is made by the first `step`; `reset` takes it from
-    environments.
+    are in its unit, the others in N m, rad and s. As MuJoCo's actuators, the drive is ``gear`` away from the joint. Its
+    command stays within ``command_low`` and ``command_high``, and what leaves it within ``force_limit_n_m``.
+    `max_delay_s` bounds both delays together. `spring` and `stop` are arguments of `spring_torque` and `stop_torque`,
+    whose torques come on top. `step` is called once a time step, under an integrator that evaluates forces once (not
+    RK4). The state is made by the first `step`; `reset` takes it from environments.
     """
 
     step_s: float
@@ -222,6 +223,9 @@ class Drive:
     kd: Value = 0.0
     gain: Value = None
     bias_n_m: Value = 0.0
+    gear: Value = 1.0
+    command_low: Value = -math.inf
+    command_high: Value = math.inf
     max_delay_s: float = 0.0
     command_delay_s: Value = 0.0
     torque_delay_s: Value = 0.0
@@ -247,6 +251,7 @@ class Drive:
     asymmetry: Value = 0.0
     efficiency_drive: Value = 1.0
     efficiency_backdrive: Value = 1.0
+    force_limit_n_m: Value = 0.0
     spring: dict[str, Value] | None = None
     stop: dict[str, Value] | None = None
 
@@ -291,8 +296,15 @@ class Drive:
     def step(self, target: Tensor, angle: Tensor, speed: Tensor, feed_forward: Tensor | None = None) -> Tensor:
         """The joint's torque in this step, N m, of shape (envs, joints): target and angle in rad, speed in rad/s.
 
-        ``feed_forward``, N m, is added to what the servo wants, as late as the target.
+        ``feed_forward``, N m, is added to what the servo wants, as late as the target and before the gear.
         """
+        torque = self.gear * self._force(target, self.gear * angle, self.gear * speed, feed_forward)
+        torque = torque + spring_torque(angle, **self.spring) if self.spring else torque
+        return torque + stop_torque(angle, **self.stop) if self.stop else torque
+
+    def _force(self, target: Tensor, angle: Tensor, speed: Tensor, feed_forward: Tensor | None) -> Tensor:
+        """As `step`, of the drive alone: what it gives before its gear, by the motion that it sees."""
+        target = torch.clamp(target, min=_like(self.command_low, target), max=_like(self.command_high, target))
         self._begin(target, angle, speed, torch.zeros_like(angle) if feed_forward is None else feed_forward)
         request = self._request(angle, speed)
         fresh = self._fresh[:, None]
@@ -307,8 +319,8 @@ class Drive:
         torque = efficiency(
             by_direction(torque, self.asymmetry), speed, self.efficiency_drive, self.efficiency_backdrive
         )
-        torque = torque + spring_torque(angle, **self.spring) if self.spring else torque
-        return torque + stop_torque(angle, **self.stop) if self.stop else torque
+        most = _like(self.force_limit_n_m, torque)
+        return soft_limit(torque, torch.where(most > 0, most, math.inf), 0.0)
 
     def _begin(self, *now: Tensor) -> None:
         if self._fresh is None:

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "src/cli/commands.h"
 #include "src/cli/print.h"
@@ -26,6 +27,7 @@ struct ExportFlags {
   std::string target = "mujoco";
   double time_step_s = 0;
   int draws = 0;
+  std::optional<DrawsFrom> draws_from;
 
   std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
@@ -89,6 +91,17 @@ Choice TargetChoice(std::string* target) {
           .get = [target] { return *target; }};
 }
 
+Status CheckDraws(const ExportFlags& flags, const ExportTarget& target) {
+  if (flags.draws > 0 && !target.mjcf)
+    return Error{.what = target.what + " has no arrays to draw",
+                 .where = "--to " + target.name + " --draws",
+                 .allowed = "an engine that reads MJCF",
+                 .cure = "leave --draws out"};
+  if (flags.draws == 0 && flags.draws_from)
+    return Error{.what = "--draws-from says what --draws draws, and that is not there", .cure = "add --draws N"};
+  return Ok();
+}
+
 Result<int> RunExport(const ExportFlags& flags) {
   GS_ASSIGN(const nlohmann::ordered_json json, ReadJson(flags.source.path));
   GS_ASSIGN(const ResultModel loaded, LoadWholeResult(json, flags.source));
@@ -101,14 +114,10 @@ Result<int> RunExport(const ExportFlags& flags) {
     return target.plugins ? model.Export(values, nullptr, {}, flags.time_step_s)
                           : model.ExportNative(values, nullptr, features);
   };
-  if (flags.draws > 0 && !target.mjcf)
-    return Error{.what = target.what + " has no arrays to draw",
-                 .where = "--to " + target.name + " --draws",
-                 .allowed = "an engine that reads MJCF",
-                 .cure = "leave --draws out"};
+  GS_RETURN_IF_ERROR(CheckDraws(flags, target));
   Uncertain uncertain;
   if (flags.draws > 0) {
-    GS_ASSIGN(uncertain, UncertainOf(model, loaded.values, json, flags.source.path));
+    GS_ASSIGN(uncertain, UncertainOf(model, loaded.values, json, flags.source.path, flags.draws_from));
   }
   GS_ASSIGN(const ExportedModel exported, make(loaded.values));
   ExportRun run{.info = {.seed = flags.common.seed},
@@ -123,6 +132,7 @@ Result<int> RunExport(const ExportFlags& flags) {
                 .logs = JudgedBy(json)};
   if (flags.draws > 0) {
     run.draws = static_cast<std::size_t>(flags.draws);
+    run.draws_from = uncertain.parameters.from;
     run.fitted_alone = uncertain.logs;
     run.not_of_each = uncertain.not_of_each;
     run.alike = uncertain.alike;
@@ -171,6 +181,13 @@ Command ExportCommand() {
                "randomization.npz, so many joint draws of all that vary",
        .more = "After --each-log of four logs or more they are of how the logs differ, else of what the fit leaves "
                "open"},
+      {.flag = "--draws-from",
+       .value = ChoiceOf(flags->draws_from),
+       .unset = "logs where the result has them, else covariance",
+       .help = "What the draws are of: one fit's covariance; its intervals, each parameter uniform; how logs differ; "
+               "the fits to each log themselves",
+       .more = "logs and fits need a tune with --each-log, of four and of two logs or more. Parameters that go "
+               "together are drawn together in all four"},
       WhileOption(flags->source.while_column),
       {.flag = "--experiment",
        .value = &flags->source.experiment,

@@ -77,7 +77,7 @@ Eigen::MatrixXd Between(const LogValues& logs) {
   return between;
 }
 
-// By the fits to each log alone: how the logs differ.
+// By the fits to each log alone: how the logs differ, or those fits as they are.
 void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
   std::vector<std::size_t> of_each;
   for (std::size_t i = 0; i < run.parameters.size(); ++i) {
@@ -91,7 +91,9 @@ void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
       uncertain->not_of_each.push_back(run.parameters[i].name);
     }
   }
-  const LogValues logs = ValuesOfLogs(run, of_each);
+  const bool themselves = uncertain->parameters.from == DrawsFrom::kFits;
+  LogValues logs = ValuesOfLogs(run, of_each);
+  if (themselves) logs.within.setZero();
   const Eigen::VectorXd mean = logs.values.rowwise().mean();
   const Eigen::MatrixXd between = Between(logs);
   std::vector<Eigen::Index> differing;
@@ -109,15 +111,30 @@ void TakeLogs(const Model& model, const TuneRun& run, Uncertain* uncertain) {
   }
   uncertain->logs = run.per_log.size();
   if (differing.empty()) return;
+  if (themselves) uncertain->parameters.fits = (logs.values.colwise() - mean)(differing, Eigen::all);
   const SymmetricEigen eigen(between(differing, differing));
   uncertain->parameters.covariance =
       eigen.vectors * eigen.values.cwiseMax(0.0).asDiagonal() * eigen.vectors.transpose();
 }
 
+// What was asked for, where the result has it.
+Result<DrawsFrom> SourceOf(const TuneRun& run, std::optional<DrawsFrom> from, const std::string& where) {
+  if (!from) return run.per_log.size() >= kEnoughLogs ? DrawsFrom::kLogs : DrawsFrom::kCovariance;
+  const std::size_t needed = *from == DrawsFrom::kLogs ? kEnoughLogs : *from == DrawsFrom::kFits ? 2 : 0;
+  if (run.per_log.size() >= needed) return *from;
+  return Error{.what = "--draws-from " + NameOf(*from) + " needs fits to each log alone",
+               .where = where,
+               .actual = run.per_log.empty() ? "none" : "of " + std::to_string(run.per_log.size()) + " logs",
+               .allowed = std::to_string(needed) + " logs or more",
+               .cure =
+                   "run `gapscope tune --each-log` with as many logs beside those held out, or give --draws-from "
+                   "covariance or interval"};
+}
+
 }  // namespace
 
 Result<Uncertain> UncertainOf(const Model& model, const std::vector<double>& values, const nlohmann::ordered_json& json,
-                              const std::string& where) {
+                              const std::string& where, std::optional<DrawsFrom> from) {
   constexpr char kCure[] = "run `gapscope tune` (--from DIR takes over what a diagnosis found), and export its result";
   if (TextIn(json, "schema") != kTuneSchema)
     return Error{.what = "only a result of tune says how its parameters vary together", .where = where, .cure = kCure};
@@ -127,7 +144,8 @@ Result<Uncertain> UncertainOf(const Model& model, const std::vector<double>& val
   for (const TuneRun::Parameter& p : run.parameters) GS_RETURN_IF_ERROR(model.Find(p.name, where));
   Uncertain uncertain;
   uncertain.values = values;
-  if (run.per_log.size() >= kEnoughLogs) {
+  GS_ASSIGN(uncertain.parameters.from, SourceOf(run, from, where));
+  if (uncertain.parameters.from == DrawsFrom::kLogs || uncertain.parameters.from == DrawsFrom::kFits) {
     TakeLogs(model, run, &uncertain);
   } else {
     TakeCovariance(model, run, &uncertain);
@@ -135,7 +153,7 @@ Result<Uncertain> UncertainOf(const Model& model, const std::vector<double>& val
   if (uncertain.parameters.parameters.empty() && !uncertain.alike.empty())
     return Error{.what = "the fits to each log alone differ no more than each leaves open: there is nothing to draw",
                  .where = where,
-                 .cure = "draw of what one fit leaves open: tune without --each-log"};
+                 .cure = "draw of what one fit leaves open: --draws-from covariance"};
   if (uncertain.parameters.parameters.empty())
     return Error{.what = "the logs know none of the parameters: there is nothing to draw",
                  .where = where,

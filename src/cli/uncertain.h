@@ -3,6 +3,7 @@
 #define GAPSCOPE_CLI_UNCERTAIN_H_
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,10 +25,11 @@ struct Uncertain {
 // From this many fits to a log alone on their mean and covariance are taken. Fewer say little of how logs differ.
 inline constexpr std::size_t kEnoughLogs = 4;
 
-// `json`: a result of tune, of this model; `where` it comes from; `values`: its own. Errors: another result, or one of
-// an earlier version; the logs know no parameter.
+// `json`: a result of tune, of this model; `where` it comes from; `values`: its own. `from`: what was asked for; else
+// the logs, where there are enough of them, and the covariance. Errors: another result, or one of an earlier version;
+// it has no fits to each log; the logs know no parameter.
 Result<Uncertain> UncertainOf(const Model& model, const std::vector<double>& values, const nlohmann::ordered_json& json,
-                              const std::string& where);
+                              const std::string& where, std::optional<DrawsFrom> from);
 
 }  // namespace gapscope::cli
 

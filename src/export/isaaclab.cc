@@ -10,6 +10,7 @@
 
 #include "src/core/statistics.h"
 #include "src/export/drive_laws.h"
+#include "src/export/isaaclab_draws.h"
 #include "src/export/isaaclab_laws.h"
 #include "src/export/python_text.h"
 #include "src/model/element_names.h"
@@ -48,10 +49,12 @@ class IsaacLabWriter {
   Error NoForm(const std::string& what, const std::string& allowed) const;
   Result<JointDrive> DriveOf(int joint) const;
   Status SetGains(int actuator, JointDrive* drive) const;
-  Status LimitBy(const mjtNum* range, JointDrive* drive) const;
+  Status LimitBy(const mjtNum* range, double gear, JointDrive* drive) const;
   std::string Configuration(int joint, const JointDrive& drive) const;
   std::optional<ScaleRange> ScaleOf(const char* field, int dof, double base) const;
   std::string Event(int joint, const std::string& name) const;
+  IsaacLabDraws Draws() const;
+  std::string Head(const std::string& events, const IsaacLabDraws& draws, bool late) const;
 
   const TargetInput& input_;
   const IsaacLabNames& names_;
@@ -66,10 +69,10 @@ Error IsaacLabWriter::NoForm(const std::string& what, const std::string& allowed
           .cure = "export to mjlab or mujoco_native"};
 }
 
-Status IsaacLabWriter::LimitBy(const mjtNum* range, JointDrive* drive) const {
+Status IsaacLabWriter::LimitBy(const mjtNum* range, double gear, JointDrive* drive) const {
   if (range[0] != -range[1])
     return NoForm("the torque limits of '" + drive->name + "' differ by direction", "the same both ways");
-  drive->limit = std::min(drive->limit, range[1]);
+  drive->limit = std::min(drive->limit, gear * range[1]);
   return Ok();
 }
 
@@ -79,29 +82,29 @@ Status IsaacLabWriter::SetGains(int actuator, JointDrive* drive) const {
   const bool affine = compiled_.actuator_biastype[actuator] == mjBIAS_AFFINE;
   const bool plain = compiled_.actuator_dyntype[actuator] == mjDYN_NONE &&
                      compiled_.actuator_gaintype[actuator] == mjGAIN_FIXED &&
-                     (affine || compiled_.actuator_biastype[actuator] == mjBIAS_NONE) &&
-                     compiled_.actuator_gear[6 * actuator] == 1 && (!affine || bias[0] == 0);
+                     (affine || compiled_.actuator_biastype[actuator] == mjBIAS_NONE) && (!affine || bias[0] == 0);
   if (!plain)
     return NoForm("the actuator '" + drive->name + "' is no plain servo or motor",
-                  "a stateless fixed gain, an affine bias without a constant, gear 1");
-  drive->stiffness = affine ? 0 - bias[1] : 0;
-  drive->damping = affine ? 0 - bias[2] : 0;
+                  "a stateless fixed gain, an affine bias without a constant");
+  const double gear = compiled_.actuator_gear[6 * actuator];
+  drive->stiffness = affine ? 0 - gear * gear * bias[1] : 0;
+  drive->damping = affine ? 0 - gear * gear * bias[2] : 0;
   const bool by_law = input_.exported.laws.contains(drive->name);
   if (by_law)
     drive->law_command = CommandField(compiled_, actuator);
   else if (drive->stiffness == 0)
-    drive->note = fmt::format("effort target: {:.6g} N m for each unit of the command", gain[0]);
-  else if (gain[0] != drive->stiffness)
-    drive->note = fmt::format("position target: {:.6g} times the command", gain[0] / drive->stiffness);
-  if (compiled_.actuator_ctrllimited[actuator]) {
+    drive->note = fmt::format("effort target: {:.6g} N m for each unit of the command", gear * gain[0]);
+  else if (gear * gain[0] != drive->stiffness)
+    drive->note = fmt::format("position target: {:.6g} times the command", gear * gain[0] / drive->stiffness);
+  if (compiled_.actuator_ctrllimited[actuator] && !by_law) {
     const mjtNum* range = compiled_.actuator_ctrlrange + 2 * compiled_.actuator_ctrladr[actuator];
     drive->note += fmt::format("{}clip commands to {:.6g} .. {:.6g} before they are sent, as the MJCF does",
                                drive->note.empty() ? "" : "; ", range[0], range[1]);
   }
   const int joint = compiled_.actuator_trnid[2 * actuator];
   if (compiled_.actuator_forcelimited[actuator] && !by_law)
-    GS_RETURN_IF_ERROR(LimitBy(compiled_.actuator_forcerange + 2 * actuator, drive));
-  if (compiled_.jnt_actfrclimited[joint]) GS_RETURN_IF_ERROR(LimitBy(compiled_.jnt_actfrcrange + 2 * joint, drive));
+    GS_RETURN_IF_ERROR(LimitBy(compiled_.actuator_forcerange + 2 * actuator, std::abs(gear), drive));
+  if (compiled_.jnt_actfrclimited[joint]) GS_RETURN_IF_ERROR(LimitBy(compiled_.jnt_actfrcrange + 2 * joint, 1, drive));
   const auto& late = input_.exported.delay_steps;
   if (const auto mine = late.find(drive->name); mine != late.end()) {
     const auto row = static_cast<std::size_t>(std::distance(late.begin(), mine));
@@ -218,6 +221,43 @@ std::string IsaacLabWriter::Event(int joint, const std::string& name) const {
       PyText(name), PyPattern(NameOf(compiled_, mjOBJ_JOINT, joint)), text);
 }
 
+IsaacLabDraws IsaacLabWriter::Draws() const {
+  std::vector<DrawnDrive> drives;
+  for (const auto& [joint, drive] : drives_)
+    drives.push_back({drive.name, joint, drive.delay_steps.has_value(), !drive.law_command.empty()});
+  return WriteIsaacLabDraws(input_, names_, drives);
+}
+
+// How it is used, and what it imports. `late`: some drive's commands are.
+std::string IsaacLabWriter::Head(const std::string& events, const IsaacLabDraws& draws, bool late) const {
+  const bool laws = !input_.exported.laws.empty(), drawn = !draws.functions.empty();
+  std::string terms = events.empty() ? "" : "EVENTS, ", use;
+  if (!events.empty()) use = "The environment's events = EVENTS, where the articulation is the scene's \"robot\".\n";
+  if (drawn) {
+    terms = std::string(draws.late ? "DRAWN_ACTUATORS, " : "") + "DRAWS, " + terms;
+    use += fmt::format("Or DRAWS{}: each environment has a joint draw, what goes together stays together.\n",
+                       draws.late ? ", with actuators=DRAWN_ACTUATORS" : "");
+  }
+  std::string text = fmt::format(
+      "\"\"\"Actuators for Isaac Lab {}, written by gapscope: friction in N m, "
+      "so Isaac Sim 5 or later.\n\n"
+      "from gapscope_isaaclab import ACTUATORS, {}SIMULATION\n"
+      "ArticulationCfg(spawn=..., actuators=ACTUATORS), of a USD made of "
+      "{}.\n{}\"\"\"\n\n",
+      names_.version, terms, input_.mjcf, use);
+  if (laws) text += "from dataclasses import MISSING\n";
+  if (drawn) text += "from pathlib import Path\n";
+  if (laws || drawn) text += "\n";
+  if (drawn) text += "import numpy as np\n";
+  if (drawn || (laws && input_.randomization)) text += "import torch\n";
+  if (laws) text += "from gapscope_torch import Drive\n";
+  text += fmt::format("from isaaclab.actuators import {}{}ImplicitActuatorCfg\n", late ? "DelayedPDActuatorCfg, " : "",
+                      laws ? "IdealPDActuator, IdealPDActuatorCfg, " : "");
+  if (!events.empty()) text += "from isaaclab.envs import mdp\n";
+  if (!events.empty() || drawn) text += "from isaaclab.managers import EventTermCfg, SceneEntityCfg\n";
+  return text;
+}
+
 std::string IsaacLabWriter::Text() const {
   const mjOption& option = input_.exported.spec->option;
   const bool late =
@@ -225,28 +265,17 @@ std::string IsaacLabWriter::Text() const {
   std::string events;
   for (const auto& [joint, drive] : drives_) events += Event(joint, drive.name);
   events += IsaacLabLawEvents(input_);
-  const bool laws = !input_.exported.laws.empty();
-  std::string text = fmt::format(
-      "\"\"\"Actuators for Isaac Lab {}, written by gapscope: friction in N m, "
-      "so Isaac Sim 5 or later.\n\n"
-      "from gapscope_isaaclab import ACTUATORS, {}SIMULATION\n"
-      "ArticulationCfg(spawn=..., actuators=ACTUATORS), of a USD made of "
-      "{}.\n{}\"\"\"\n\n{}"
-      "from isaaclab.actuators import {}{}ImplicitActuatorCfg\n",
-      names_.version, events.empty() ? "" : "EVENTS, ", input_.mjcf,
-      events.empty() ? "" : "The environment's events = EVENTS, where the articulation is the scene's \"robot\".\n",
-      IsaacLabLawImports(input_), late ? "DelayedPDActuatorCfg, " : "",
-      laws ? "IdealPDActuator, IdealPDActuatorCfg, " : "");
-  if (!events.empty())
-    text += "from isaaclab.envs import mdp\nfrom isaaclab.managers import EventTermCfg, SceneEntityCfg\n";
+  const IsaacLabDraws draws = Draws();
+  const bool laws = !input_.exported.laws.empty(), python = laws || draws.late;
+  std::string text = Head(events, draws, late);
   text += fmt::format("from isaaclab.sim import SimulationCfg\n{}\nSIMULATION = SimulationCfg(dt={}, gravity={}{})\n\n",
                       laws ? "from isaaclab.utils import configclass\n" : "", PyNumber(option.timestep),
-                      PyNumbers(option.gravity), laws ? names_.python_actuators : "");
-  text += IsaacLabLaws(input_) + "ACTUATORS = {\n";
+                      PyNumbers(option.gravity), python ? names_.python_actuators : "");
+  text += IsaacLabLaws(input_) + draws.functions + "ACTUATORS = {\n";
   for (const auto& [joint, drive] : drives_) text += Configuration(joint, drive);
   text += "}\n";
   if (!events.empty()) text += "\n# Each environment's own, times what ACTUATORS says.\nEVENTS = {\n" + events + "}\n";
-  return text;
+  return text + draws.terms;
 }
 
 }  // namespace

@@ -11,8 +11,9 @@ namespace gapscope {
 
 // Names of ActuatorBaseCfg's members: what limits the torque of a drive that Isaac Lab computes, and of one that the
 // physics engine computes. python_actuators: arguments without which SimulationCfg takes no actuator in Python.
+// by_index: the end of the names of what writes to some environments.
 struct IsaacLabNames {
-  std::string version, explicit_limit, implicit_limit, python_actuators;
+  std::string version, explicit_limit, implicit_limit, python_actuators, by_index;
 };
 
 // What its joints have, and its actuators.

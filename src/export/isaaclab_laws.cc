@@ -9,12 +9,6 @@
 
 namespace gapscope {
 
-std::string IsaacLabLawImports(const TargetInput& input) {
-  if (input.exported.laws.empty()) return "";
-  return std::string("from dataclasses import MISSING\n\n") + (input.randomization ? "import torch\n" : "") +
-         "from gapscope_torch import Drive\n";
-}
-
 std::string IsaacLabLaws(const TargetInput& input) {
   const std::string laws = LawsText(input);
   if (laws.empty()) return "";

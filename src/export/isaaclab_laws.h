@@ -8,8 +8,6 @@
 
 namespace gapscope {
 
-// What the text below needs of other modules; empty: no drive has a law.
-std::string IsaacLabLawImports(const TargetInput& input);
 // LAWS, the actuator that has them and its configuration, and the event that draws an argument.
 std::string IsaacLabLaws(const TargetInput& input);
 // Terms of EVENTS: each argument that may be drawn alone, from its parameter's 95 % range.

@@ -21,12 +21,14 @@ class LawCfg(XmlActuatorCfg):
 
 
 class LawActuator(XmlActuator):
-  """A plain motor; the law makes its torque, instead of the MJCF's own gains."""
+  """A plain motor; the law makes its torque, instead of the MJCF's own gains, gear and limits."""
 
   def edit_spec(self, spec, target_names):
     super().edit_spec(spec, target_names)
     for actuator in self._mjs_actuators:
       actuator.set_to_motor()
+      actuator.gear[0] = 1
+      actuator.ctrllimited = actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_FALSE
 
   def initialize(self, mj_model, model, data, device):
     super().initialize(mj_model, model, data, device)

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <set>
 #include <string_view>
@@ -15,6 +16,16 @@
 #include "src/fit/covariance.h"
 
 namespace gapscope {
+
+template <>
+std::span<const EnumName<DrawsFrom>> EnumNames<DrawsFrom>() {
+  static constexpr EnumName<DrawsFrom> kNames[] = {{DrawsFrom::kCovariance, "covariance"},
+                                                   {DrawsFrom::kInterval, "interval"},
+                                                   {DrawsFrom::kLogs, "logs"},
+                                                   {DrawsFrom::kFits, "fits"}};
+  return kNames;
+}
+
 namespace {
 
 // An array of a compiled model.
@@ -160,6 +171,34 @@ class Exporter {
   std::vector<bool> varies_;
 };
 
+// How far off its best value each parameter is, draw by draw.
+class Moves {
+ public:
+  Moves(const UncertainParameters& uncertain, std::uint64_t seed) : uncertain_(uncertain), random_(seed + 1) {
+    const SymmetricEigen eigen(uncertain.covariance);
+    root_ = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  }
+
+  Eigen::VectorXd Next() {
+    if (uncertain_.from == DrawsFrom::kFits) return uncertain_.fits.col(drawn_++ % uncertain_.fits.cols());
+    Eigen::VectorXd by =
+        root_ * Eigen::VectorXd::NullaryExpr(root_.cols(), [&](Eigen::Index) { return normal_(random_); });
+    if (uncertain_.from != DrawsFrom::kInterval) return by;
+    for (Eigen::Index i = 0; i < by.size(); ++i) {
+      const double deviation = std::sqrt(uncertain_.covariance(i, i));
+      if (deviation > 0) by[i] = kNormalQuantile * deviation * std::erf(by[i] / (std::numbers::sqrt2 * deviation));
+    }
+    return by;
+  }
+
+ private:
+  const UncertainParameters& uncertain_;
+  Eigen::MatrixXd root_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  Eigen::Index drawn_ = 0;
+};
+
 // Where a field's draws go.
 DrawnField FieldOf(const Array& base, std::size_t draws) {
   DrawnField field{.name = std::string(base.name), .shape = {draws}, .values = {}};
@@ -183,10 +222,7 @@ Result<Randomization> Randomize(const Model& model, std::span<const double> valu
               exporter.RangeOf(uncertain.parameters[static_cast<std::size_t>(i)], DeviationOf(uncertain, i)));
     result.ranges.push_back(std::move(range));
   }
-  const SymmetricEigen eigen(uncertain.covariance);
-  const Eigen::MatrixXd root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  std::mt19937_64 random(seed + 1);
-  std::normal_distribution<double> normal;
+  Moves moves(uncertain, seed);
   std::vector<std::size_t> varying;
   for (std::size_t f = 0; f < exporter.arrays().size(); ++f) {
     if (!exporter.Varies(f)) continue;
@@ -194,7 +230,7 @@ Result<Randomization> Randomize(const Model& model, std::span<const double> valu
     result.fields.push_back(FieldOf(exporter.arrays()[f], draws));
   }
   for (std::size_t d = 0; d < draws; ++d) {
-    const Eigen::VectorXd by = root * Eigen::VectorXd::NullaryExpr(n, [&](Eigen::Index) { return normal(random); });
+    const Eigen::VectorXd by = moves.Next();
     std::vector<double> at(values.begin(), values.end());
     for (Eigen::Index i = 0; i < n; ++i) {
       const UncertainParameter& p = uncertain.parameters[static_cast<std::size_t>(i)];

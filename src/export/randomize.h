@@ -9,9 +9,20 @@
 #include <string>
 #include <vector>
 
+#include "src/core/enum_names.h"
 #include "src/model/model.h"
 
 namespace gapscope {
+
+// What draws are of.
+enum class DrawsFrom {
+  kCovariance,  // what one fit leaves open: normal
+  kInterval,    // the same, but each parameter uniform within its 95 % interval, their ranks correlated as the fit's
+  kLogs,        // how logs differ: normal, by the mean and the covariance of the fits to each log alone
+  kFits,        // those fits themselves, in turn
+};
+template <>
+std::span<const EnumName<DrawsFrom>> EnumNames<DrawsFrom>();  // "covariance", "interval", "logs", "fits"
 
 // A parameter that varies, at its best value. Its deviation and correlations: UncertainParameters::covariance.
 struct UncertainParameter {
@@ -22,6 +33,8 @@ struct UncertainParameter {
 struct UncertainParameters {
   std::vector<UncertainParameter> parameters;
   Eigen::MatrixXd covariance;
+  DrawsFrom from = DrawsFrom::kCovariance;
+  Eigen::MatrixXd fits = {};  // of kFits: parameters x fits, off the best values in the covariance's coordinates
 };
 
 // An array beside mjModel's: ExportedModel::delay_steps, a row per drive in its order.
@@ -71,10 +84,10 @@ DelayRange RangeOfDelay(const Randomization& randomization, std::size_t drive, d
 // The MJCF with these values of all parameters.
 using MakeExport = std::function<Result<ExportedModel>(std::span<const double>)>;
 
-// `draws` of a normal distribution, kept within the parameters' bounds; of an effect's torques, whose bounds depend on
-// the rig's size, zero alone is one. The same seed gives the same draws. What follows from other numbers (inverse
-// weights, lengths) varies with them in `fields` and is not told in `ranges`. Errors: as `make`; a draw whose MJCF has
-// other elements.
+// `draws` of what `uncertain` says that they are from, kept within the parameters' bounds; of an effect's torques,
+// whose bounds depend on the rig's size, zero alone is one. The same seed gives the same draws. What follows from other
+// numbers (inverse weights, lengths) varies with them in `fields` and is not told in `ranges`. Errors: as `make`; a
+// draw whose MJCF has other elements.
 Result<Randomization> Randomize(const Model& model, std::span<const double> values,
                                 const UncertainParameters& uncertain, const MakeExport& make, std::size_t draws,
                                 std::uint64_t seed);

@@ -113,6 +113,7 @@ void AddGains(mjSpec* spec, std::map<std::string, DriveLaw>* laws) {
     law["bias_n_m"] = input->biasprm[0];
     law["kp"] = 0 - input->biasprm[1];
     law["kd"] = 0 - input->biasprm[2];
+    if (input->gear[0] != 1) law["gear"] = input->gear[0];
   }
 }
 

@@ -143,8 +143,13 @@ class Structure {
   void TellLaw(const std::string& group, const std::string& joint, const std::string& key);
   // A number in the place of what the experiment or the MJCF says of a field.
   void Put(const std::string& field, double number);
+  void NativeLag(const std::string& joint, const Terms& terms, const std::vector<mjsActuator*>& inputs);
+  // 1 - first d/dt + second d^2/dt^2, of what a delay or a lag does to feedback.
+  struct Lateness {
+    double first_s = 0, second_s2 = 0;
+  };
   // False: it has no native form, and nothing was changed.
-  bool MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs);
+  bool MakeFeedbackLate(const std::string& joint, Lateness late, const std::vector<mjsActuator*>& inputs);
   // A passive plugin acts from a body of its own, without mass, since a body carries one plugin.
   void HoldPlugin(const mjsJoint* joint, const std::string& plugin, const std::string& instance);
   void AddNumeric(const std::string& name, double value);

@@ -178,13 +178,15 @@ Result<std::string> Structure::ConvertDrive(const std::vector<mjsActuator*>& inp
   for (const mjsActuator* input : inputs) {
     const bool plain = input->gaintype == mjGAIN_FIXED && input->dyntype == mjDYN_NONE &&
                        (input->biastype == mjBIAS_NONE || input->biastype == mjBIAS_AFFINE);
-    const bool feedforward = input != drive && input->biastype == mjBIAS_NONE && input->gainprm[0] == 1;
+    const bool feedforward =
+        input != drive && input->biastype == mjBIAS_NONE && input->gainprm[0] == 1 && input->gear[0] == drive->gear[0];
     if (!plain || (input != drive && !feedforward)) {
       return Error{
           .what = "the actuator '" + NameOf(input->element) + "' cannot take motor effects",
           .where = rig_.experiment().model_path,
           .allowed =
-              "a stateless fixed-gain, affine-bias actuator, and plain motors of gain 1 beside it as feed-forward",
+              "a stateless fixed-gain, affine-bias actuator, and plain motors of gain 1 and its gear beside it as "
+              "feed-forward",
           .cure = "replace it by " + std::string(plugins::kMotorName)};
     }
     roles += input == drive ? "target" : " feedforward";

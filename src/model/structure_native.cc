@@ -18,6 +18,10 @@ bool FeedsBack(const std::vector<mjsActuator*>& inputs) {
                      [](const mjsActuator* input) { return input->biasprm[1] != 0 || input->biasprm[2] != 0; });
 }
 
+bool Limited(int flag, const double* range) {
+  return flag == mjLIMITED_TRUE || (flag == mjLIMITED_AUTO && range[0] < range[1]);
+}
+
 // What gapscope.torch calls a term of a joint's springs.
 std::string SpringArgument(const std::string& key) {
   static const std::map<std::string, std::string> kOthers = {{"stiffness_n_m_per_rad", "spring.stiffness"},
@@ -254,7 +258,7 @@ void Structure::NativeDelay(const std::string& joint, const std::string& key, do
   }
   const bool whole = std::abs(steps - std::round(steps)) < 1e-6;
   const bool late_feedback = FeedsBack(inputs) && key == "torque_delay_s";
-  if (late_feedback && !MakeFeedbackLate(joint, delay_s, inputs)) {
+  if (late_feedback && !MakeFeedbackLate(joint, {delay_s, 0.5 * delay_s * delay_s}, inputs)) {
     Tell(kMotorTerms, joint, key, Fidelity::kDropped,
          fmt::format("feedback {} late has no native form: that is too long for the joint's inertia", in_steps));
     return;
@@ -283,25 +287,27 @@ void Structure::Put(const std::string& field, double number) {
   Set(field, {ExactText(number)});
 }
 
-// kp q(t - D) + kv q'(t - D), to second order in D: kp q + (kv - kp D) q' + (kp D^2 / 2 - kv D) q''. The last term is
-// inertia. Where the armature has less than that takes off, the rest is taken off by a drive whose torques are larger
-// by as much as the joint's inertia is then too large: J q'' = T s is (J / s) q'' = T. False: there is no such drive.
-bool Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const std::vector<mjsActuator*>& inputs) {
+// kp q(t - D) + kv q'(t - D), to second order in D: kp q + (kv - kp D) q' + (kp D^2 / 2 - kv D) q''. (Of a lag D: kp
+// D^2.) The last term is inertia. Where the armature has less than that takes off, the rest is taken off by a drive
+// whose torques are larger by as much as the joint's inertia is then too large: J q'' = T s is (J / s) q'' = T. False:
+// there is no such drive.
+bool Structure::MakeFeedbackLate(const std::string& joint, Lateness late, const std::vector<mjsActuator*>& inputs) {
   constexpr double kLeastInertia = 0.3;  // share of the joint's that must be left for the series to say anything
   struct Gains {
     std::string field;
-    double gain = 0, kp = 0, kv = 0;
+    double gain = 0, kp = 0, kv = 0;  // at the drive, before its gear
   };
   std::vector<Gains> drives;
   double change = 0;
+  const double gear = inputs.front()->gear[0];
   for (const mjsActuator* input : inputs) {
     const std::string field = std::string("actuator/") + mjs_getString(mjs_getName(input->element)) + "/";
     const double kp = ValueOf(field + "kp", -ValueOf(field + "bias1", input->biasprm[1])),
                  kv = ValueOf(field + "kv", -ValueOf(field + "bias2", input->biasprm[2]));
     if (kp == 0 && kv == 0) continue;
     const double gain = ValueOf(field + "gain", ValueOf(field + "kp", input->gainprm[0]));
-    drives.push_back({field, gain, kp, kv - kp * delay_s});
-    change += 0.5 * kp * delay_s * delay_s - kv * delay_s;
+    drives.push_back({field, gain, kp, kv - kp * late.first_s});
+    change += gear * gear * (kp * late.second_s2 - kv * late.first_s);
   }
   const std::string place = "joint/" + joint + "/";
   const mjsJoint& element = *FindJoint(joint);
@@ -315,7 +321,7 @@ bool Structure::MakeFeedbackLate(const std::string& joint, double delay_s, const
     larger = inertia / (inertia + armature);
   }
   Put(place + "armature", std::max(0.0, armature));
-  const double passive = (larger - 1) * ValueOf(place + "damping", element.damping[0]);
+  const double passive = (larger - 1) * ValueOf(place + "damping", element.damping[0]) / (gear * gear);
   for (const Gains& drive : drives) {
     Put(drive.field + "kp", larger * drive.kp);
     Put(drive.field + "kv", larger * drive.kv + (&drive == &drives.front() ? passive : 0));
@@ -345,17 +351,14 @@ std::set<std::string> Structure::LawJoints() const {
 // there.
 bool Structure::TakesLaw(const std::string& joint) const {
   const std::vector<mjsActuator*> inputs = ActuatorsOn(joint);
-  const auto limited = [](int flag, const double* range) {
-    return flag == mjLIMITED_TRUE || (flag == mjLIMITED_AUTO && range[0] < range[1]);
-  };
   const bool plain = std::ranges::all_of(inputs, [&](const mjsActuator* input) {
     const bool affine = input->biastype == mjBIAS_AFFINE && input == inputs.front();
     return !input->plugin.active && input->gaintype == mjGAIN_FIXED && input->dyntype == mjDYN_NONE &&
-           (affine || input->biastype == mjBIAS_NONE) && input->gear[0] == 1;
+           (affine || input->biastype == mjBIAS_NONE) && input->gear[0] == inputs.front()->gear[0] &&
+           (input == inputs.front() || !Limited(input->ctrllimited, input->ctrlrange));
   });
   const mjsActuator& drive = *inputs.front();
-  return plain && !limited(drive.ctrllimited, drive.ctrlrange) &&
-         (!limited(drive.forcelimited, drive.forcerange) || drive.forcerange[0] == -drive.forcerange[1]);
+  return plain && (!Limited(drive.forcelimited, drive.forcerange) || drive.forcerange[0] == -drive.forcerange[1]);
 }
 
 void Structure::TellLaw(const std::string& group, const std::string& joint, const std::string& key) {
@@ -377,10 +380,14 @@ void Structure::NativeLaw(const std::string& joint) {
       TellLaw(kMotorTerms, joint, key);
     }
   }
-  if (const double most = input.forcerange[1]; most > 0) {
+  if (Limited(input.forcelimited, input.forcerange)) {
+    const double most = input.forcerange[1];
     double& limit = law["torque_limit_n_m"];
     limit = limit > 0 ? std::min(limit, most) : most;
+    law["force_limit_n_m"] = most;  // MuJoCo's own, after all that the drive does
   }
+  if (Limited(input.ctrllimited, input.ctrlrange))
+    law["command_low"] = input.ctrlrange[0], law["command_high"] = input.ctrlrange[1];
   const auto spring = spring_.find(joint);
   if (!SpringsByLaw() || spring == spring_.end()) return;
   for (const auto& [key, expression] : spring->second) {
@@ -391,18 +398,45 @@ void Structure::NativeLaw(const std::string& joint) {
     law["stop.middle_rad"] = 0.5 * (element->range[0] + element->range[1]);
 }
 
+// The command passes an activation. Feedback does not: it is late by other gains, for alone the command's lag would be
+// of the motion, which the loop takes out. On a drive without position feedback the second lag is the command's.
+void Structure::NativeLag(const std::string& joint, const Terms& terms, const std::vector<mjsActuator*>& inputs) {
+  const double lag = ValueIn(terms, "time_constant_s"), second = ValueIn(terms, "second_time_constant_s");
+  if (lag <= 0) return;
+  const auto tell = [&](Fidelity fidelity, const std::string& how) {
+    Tell(kMotorTerms, joint, "time_constant_s", fidelity, how);
+  };
+  if (!features.lags) return tell(Fidelity::kDropped, "actuators have no lag there");
+  const bool feeds_back = FeedsBack(inputs);
+  const double beyond = inputs.front()->biasprm[1] != 0 ? second : 0;
+  const Lateness late{lag + beyond, lag * lag + lag * beyond + beyond * beyond};
+  if (feeds_back && !MakeFeedbackLate(joint, late, inputs))
+    return tell(Fidelity::kDropped, "a lag of feedback has no native form: it is too long for the joint's inertia");
+  for (mjsActuator* input : inputs) {
+    input->dyntype = mjDYN_FILTEREXACT;
+    input->dynprm[0] = lag + second;
+    input->actdim = 1;
+  }
+  const bool exact = !feeds_back && second == 0;
+  tell(exact ? Fidelity::kExact : Fidelity::kApproximated,
+       feeds_back ? "one pole of the command; that of its feedback by less damping and other inertia or gains"
+       : exact    ? "an activation of one pole"
+                  : "one pole of the command for two");
+}
+
 void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
   const auto value = [&](const char* key) { return ValueIn(terms, key); };
   const auto tell = [&](const char* key, Fidelity fidelity, const std::string& how) {
     Tell(kMotorTerms, joint, key, fidelity, how);
   };
   const std::vector<mjsActuator*> inputs = ActuatorsOn(joint);
-  const bool feeds_back = FeedsBack(inputs);
   for (const char* key : {"command_delay_s", "torque_delay_s"}) {
     if (terms.contains(key)) NativeDelay(joint, key, value(key), inputs);
   }
-  if (const double limit = value("torque_limit_n_m"); limit > 0 && std::isfinite(limit)) {
-    const double most = limit * (inputs.size() == 1 ? std::abs(inputs.front()->gear[0]) : 1);
+  // A sagging limit lies between itself and 1 / (1 + sag) of it, under lasting load: their harmonic mean.
+  const double sag = value("sag_fraction");
+  if (const double limit = value("torque_limit_n_m") / (1 + 0.5 * sag); limit > 0 && std::isfinite(limit)) {
+    const double most = limit * std::abs(inputs.front()->gear[0]);
     mjsJoint* element = FindJoint(joint);
     const bool limited = element->actfrclimited == mjLIMITED_TRUE;
     element->actfrcrange[0] = limited ? std::max(element->actfrcrange[0], -most) : -most;
@@ -413,21 +447,17 @@ void Structure::NativeMotor(const std::string& joint, const Terms& terms) {
          "the joint's own limit of actuator forces" +
              (softness > 0.02 ? fmt::format(", its corner sharp where {:.2g} of it is round", softness) : ""));
   }
-  if (const double lag = value("time_constant_s"); lag > 0 && !features.lags) {
-    tell("time_constant_s", Fidelity::kDropped, "actuators have no lag there");
-  } else if (lag > 0) {
-    for (mjsActuator* input : inputs) {
-      input->dyntype = mjDYN_FILTEREXACT;
-      input->dynprm[0] = lag + value("second_time_constant_s");
-      input->actdim = 1;
-    }
-    const bool exact = !feeds_back && value("second_time_constant_s") == 0;
-    tell("time_constant_s", exact ? Fidelity::kExact : Fidelity::kApproximated,
-         exact ? "an activation of one pole" : "one pole of the command: feedback does not pass it");
-  }
+  NativeLag(joint, terms, inputs);
   NativeSent(joint, terms, inputs);
-  for (const char* key : {"droop_at_peak", "sag_fraction", "power_w"})
+  for (const char* key : {"droop_at_peak", "power_w"})
     tell(key, Fidelity::kDropped, "the drive's law has no native form");
+  const double limit = value("torque_limit_n_m");
+  const bool limited = limit > 0 && std::isfinite(limit);
+  tell("sag_fraction", limited ? Fidelity::kApproximated : Fidelity::kDropped,
+       limited ? fmt::format("a limit that does not fall: of {:.4g} N m without load and {:.4g} under lasting load the "
+                             "harmonic mean",
+                             limit, limit / (1 + sag))
+               : "the drive's law has no native form");
 }
 
 // Of a torque that nothing is fed back to, and of any command, it is the command's.

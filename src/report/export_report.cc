@@ -14,11 +14,23 @@ using nlohmann::ordered_json;
 
 namespace {
 
+// What the draws are of.
+std::string SourceText(const ExportRun& run) {
+  switch (run.draws_from) {
+    case DrawsFrom::kCovariance:
+      return " of what the logs leave open";
+    case DrawsFrom::kInterval:
+      return " within what the logs leave open, each parameter uniform in its interval";
+    case DrawsFrom::kLogs:
+      return fmt::format(" of how {} logs differ", run.fitted_alone);
+    case DrawsFrom::kFits:
+      return fmt::format(", each the fit to one of {} logs", run.fitted_alone);
+  }
+  return "";
+}
+
 std::string RangeLines(const ExportRun& run) {
-  std::string text =
-      run.fitted_alone > 0
-          ? fmt::format("  {} draws of how {} logs differ, and 95 % ranges:\n", run.draws, run.fitted_alone)
-          : fmt::format("  {} draws of what the logs leave open, and 95 % ranges:\n", run.draws);
+  std::string text = fmt::format("  {} draws{}, and 95 % ranges:\n", run.draws, SourceText(run));
   for (const ParameterRange& range : run.randomization.ranges) {
     std::vector<std::string> fields;
     for (const VaryingNumber& number : range.numbers) {
@@ -74,7 +86,7 @@ ordered_json RandomizationJson(const ExportRun& run) {
                        {"model", run.out},
                        {"draws", run.draws},
                        {"seed", run.info.seed},
-                       {"from", run.fitted_alone > 0 ? "logs" : "covariance"},
+                       {"from", NameOf(run.draws_from)},
                        {"fitted_alone", run.fitted_alone},
                        {"not_of_each", run.not_of_each},
                        {"alike", run.alike},

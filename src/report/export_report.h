@@ -27,8 +27,9 @@ struct ExportRun {
   std::string unmeasured;                   // why there are no errors; empty: there are
   FidelityErrors errors;
   std::size_t draws = 0;  // 0: no randomisation was asked for
+  DrawsFrom draws_from = DrawsFrom::kCovariance;
   Randomization randomization;
-  std::size_t fitted_alone = 0;          // logs whose fits differ so; 0: what one fit leaves open
+  std::size_t fitted_alone = 0;          // logs with a fit alone that the draws are of; 0: what one fit leaves open
   std::vector<std::string> alike;        // parameters in which logs do not differ: they stay at their mean
   std::vector<std::string> not_of_each;  // parameters that not each log alone knows: they stay as they are
 };

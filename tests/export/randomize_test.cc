@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "src/core/statistics.h"
 #include "src/export/target.h"
@@ -104,6 +105,43 @@ TEST_F(RandomizeTest, DrawsVaryTogether) {
   ASSERT_EQ(field->shape, (std::vector<std::size_t>{kDraws, 2}));
   for (std::size_t i = 0; i < kDraws; ++i) ASSERT_DOUBLE_EQ(field->values[2 * i], damping[i]);
   EXPECT_EQ(Find(drawn.value(), "body_mass"), nullptr) << "no mass varies";
+}
+
+TEST_F(RandomizeTest, DrawsOfIntervalsAreUniformAndStayTogether) {
+  constexpr std::size_t kDraws = 500;
+  uncertain_.from = DrawsFrom::kInterval;
+  const auto drawn = Draw(kDraws, 3);
+  ASSERT_TRUE(drawn.ok());
+  const std::vector<double> damping = Drawn(drawn.value(), 0), friction = Drawn(drawn.value(), 1);
+  const double half = kNormalQuantile * kOfFriction;
+  std::size_t inner = 0;
+  double unlike = 0;
+  for (std::size_t i = 0; i < kDraws; ++i) {
+    const double of_friction = (friction[i] - kFriction) / half,
+                 of_damping = std::log(damping[i] / kDamping) / (kNormalQuantile * kLog);
+    ASSERT_LE(std::abs(of_friction), 1);
+    ASSERT_LE(std::abs(of_damping), 1);
+    inner += std::abs(of_friction) < 0.5;
+    unlike += std::pow(of_friction + of_damping, 2) / kDraws;
+  }
+  constexpr double kSampling = 0.09;  // 4 standard errors of a share of a half
+  EXPECT_NEAR(static_cast<double>(inner) / kDraws, 0.5, kSampling);
+  // Two uniform numbers whose ranks are as those of normal ones with correlation rho have 6 / pi asin(rho / 2).
+  const double rho = 6 / std::numbers::pi * std::asin(kRho / 2);
+  EXPECT_NEAR(unlike, 2.0 / 3 * (1 + rho), 0.2 * 2.0 / 3 * (1 + rho));
+}
+
+TEST_F(RandomizeTest, DrawsOfFitsAreTheFitsInTurn) {
+  uncertain_.from = DrawsFrom::kFits;
+  uncertain_.fits = Eigen::MatrixXd{{-0.1, 0.3}, {2e-5, -4e-5}, {0.001, -0.002}};
+  const auto drawn = Draw(3, 3);
+  ASSERT_TRUE(drawn.ok());
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto fit = static_cast<Eigen::Index>(d % 2);
+    EXPECT_NEAR(Drawn(drawn.value(), 0)[d], kDamping * std::exp(uncertain_.fits(0, fit)), 1e-12 * kDamping);
+    EXPECT_NEAR(Drawn(drawn.value(), 1)[d], kFriction + uncertain_.fits(1, fit), 1e-12 * kFriction);
+    EXPECT_NEAR(Drawn(drawn.value(), 2)[d], 0.01 + uncertain_.fits(2, fit), 1e-12);
+  }
 }
 
 TEST_F(RandomizeTest, TheSeedMakesTheDraws) {

@@ -50,6 +50,12 @@ const std::map<std::string, double> kCubicCable = {{"cable_spring@arm.rest_rad",
 const std::map<std::string, double> kStop = {{"end_stop@arm.angle_rad", 0.02},
                                              {"end_stop@arm.stiffness_n_m_per_rad", 0.5}};
 
+// All of them reached.
+const std::map<std::string, double> kSag = {{"supply_sag@motor.limit_n_m", 10}, {"supply_sag@motor.sag_fraction", 1}};
+const std::map<std::string, double> kPower = {{"torque_speed_curve@motor.power_w", 4}};
+const std::map<std::string, double> kPayload = {{"payload@pendulum.mass_kg", 0.02}, {"payload@pendulum.z_m", -0.1}};
+const std::map<std::string, double> kTilt = {{"mount_tilt@model.x_rad", 0.2}, {"mount_tilt@model.y_rad", 0.1}};
+
 class ToXmlTest : public ::testing::TestWithParam<Export> {
  protected:
   void SetUp() override {
@@ -84,13 +90,16 @@ class ToXmlTest : public ::testing::TestWithParam<Export> {
     // The XML holds what MuJoCo's writer prints; a delay is the log's shift here and the motor's own there.
     constexpr double kPrinted = 1e-5;
     EXPECT_LT(LargestDifference(ours, theirs), kPrinted * Largest(ours));
+    if (GetParam().set.empty()) return;
+    const std::vector<double> without = Predict(*MakeModel(model_->experiment()), recording_)[0];
+    EXPECT_GT(LargestDifference(ours, without), 100 * kPrinted * Largest(ours));
   }
 
   // Whether plugins are the only form that the model's effects have.
   static bool NeedsPlugins() {
-    const std::set<std::string> natives = {"coulomb_friction", "cable_spring@arm",    "coulomb_friction@arm",
-                                           "spring_hardening", "quadratic_drag@link", "end_stop@arm",
-                                           "backlash",         "joint_compliance"};
+    const std::set<std::string> natives = {
+        "coulomb_friction", "cable_spring@arm", "coulomb_friction@arm", "spring_hardening", "quadratic_drag@link",
+        "end_stop@arm",     "backlash",         "joint_compliance",     "payload@pendulum", "mount_tilt@model"};
     return GetParam().rig == std::string("xl330") ||
            !std::ranges::all_of(GetParam().effects, [&](const char* effect) { return natives.contains(effect); });
   }
@@ -144,6 +153,9 @@ INSTANTIATE_TEST_SUITE_P(
         Export{"qube", {"cable_spring@arm", "gravity_offset@arm"}, kCubicCable},
         Export{"qube", {"dead_zone", "gravity_offset@arm"}}, Export{"qube", {"end_stop@arm", "torque_bias@arm"}, kStop},
         Export{"qube", {"end_stop@arm"}, kStop}, Export{"flexjoint", {"spring_hardening", "quadratic_drag@link"}},
+        Export{"joint", {"supply_sag"}, kSag}, Export{"joint", {"torque_speed_curve"}, kPower},
+        Export{"joint", {"torque_constant_droop", "direction_asymmetry@joint"}},
+        Export{"qube", {"payload@pendulum"}, kPayload}, Export{"qube", {"mount_tilt@model"}, kTilt},
         Export{"xl330", {"load_friction", "torque_delay"}}),
     [](const auto& test) {
       std::string name = test.param.rig;

@@ -159,6 +159,16 @@ def interrupt_after(seconds: float) -> None:
     interrupt_when(lambda: time.monotonic() >= then)
 
 
+def geared_joint(folder: Path) -> str:
+    """As `changed_joint`: its drive behind a gear of -3, its command and its force in ranges that both clip."""
+    old = '''<position name="motor" joint="joint" kp="157.1451" kv="7.0729"/>
+    <motor name="motor.feedforward" joint="joint"/>'''
+    new = '''<position name="motor" joint="joint" kp="157.1451" kv="7.0729" gear="-3" ctrlrange="-0.3 0.2"
+              forcerange="-14 14"/>
+    <motor name="motor.feedforward" joint="joint" gear="-3"/>'''
+    return changed_joint(folder, old, new)
+
+
 def changed_joint(folder: Path, old: str, new: str) -> str:
     """The experiment file of a copy of the rig `joint` whose MJCF reads otherwise."""
     shutil.copytree(ROOT / "models", folder / "models")

@@ -101,6 +101,40 @@ def test_what_each_fit_leaves_open_is_no_difference(fitted: gs.Tune, tmp_path: P
         randomization(with_fits(fitted, tmp_path / "open", values, 0.3), tmp_path / "b")
 
 
+def test_the_user_chooses_what_the_draws_are_of(fitted: gs.Tune, tmp_path: Path) -> None:
+    fits = np.array([fit[DAMPING].value for fit in fitted.per_log])
+    drawn = fitted.samples(7, draws_from="fits")["parameters"][:, 0]
+    assert drawn == pytest.approx(fits[[0, 1, 2, 3, 4, 0, 1]])
+    fitted.export("mujoco_native", tmp_path / "to", draws=7, draws_from="fits")
+    told = json.loads((tmp_path / "to" / "randomization.json").read_text())
+    check(told, "randomization")
+    assert (told["from"], told["fitted_alone"], told["alike"]) == ("fits", 5, [])
+    assert told["parameters"][0]["value"] == pytest.approx(np.exp(np.log(fits).mean()))
+    # Of the fit of all logs: far narrower than they differ, and with ends.
+    best, deviation = fitted[DAMPING].value, np.sqrt(fitted.json["spread"]["covariance"][0][0])
+    one = np.log(fitted.samples(400, draws_from="covariance")["parameters"][:, 0] / best) / deviation
+    assert one.std() == pytest.approx(1, abs=0.15) and np.abs(one).max() > 2.3
+    ends = np.log(fitted.samples(400, draws_from="interval")["parameters"][:, 0] / best) / deviation
+    assert ends.std() == pytest.approx(1.96 / np.sqrt(3), abs=0.1) and 1.9 < np.abs(ends).max() <= 1.96
+    assert np.array_equal(fitted.samples(9, draws_from="logs")["parameters"], fitted.samples(9)["parameters"])
+
+
+@pytest.mark.parametrize(("wanted", "logs_there", "needed"), [("logs", 3, "4 logs"), ("fits", 1, "2 logs")])
+def test_draws_that_the_result_has_not_are_refused(
+    fitted: gs.Tune, tmp_path: Path, wanted: str, logs_there: int, needed: str
+) -> None:
+    fewer = fitted.json
+    fewer["per_log"] = fewer["per_log"][:logs_there]
+    (tmp_path / "result.json").write_text(json.dumps(fewer))
+    with pytest.raises(gs.InputError, match=f"needs fits to each log alone(.|\n)*of {logs_there} logs(.|\n)*{needed}"):
+        dataclasses.replace(fitted, out=tmp_path).samples(3, draws_from=wanted)
+    with pytest.raises(gs.InputError, match="add --draws N"):
+        fitted.export("mujoco_native", tmp_path / "to", draws_from=wanted)
+    with pytest.raises(gs.InputError, match="covariance, interval, logs, fits"):
+        fitted.samples(3, draws_from="log")
+    assert not (tmp_path / "to").exists()
+
+
 def test_few_logs_say_what_the_fit_leaves_open(fitted: gs.Tune, tmp_path: Path) -> None:
     three = fitted.json
     three["per_log"] = three["per_log"][:3]

@@ -30,6 +30,7 @@ HANG: Values = {"gravity_offset@joint": {"torque_n_m": 20, "rest_rad": 0.3}}
 DRAG: Values = {"quadratic_drag@joint": {"drag_n_m_s2_per_rad2": 3}}
 SOFT: Values = {"joint_compliance@joint": {"stiffness_n_m_per_rad": 300}}
 LIMIT: Values = {"torque_limit@motor": {"limit_n_m": 5}}
+STOP: Values = {"end_stop@joint": {"stiffness_n_m_per_rad": 400, "angle_rad": 0.2}}
 GAP: Values = {"backlash@joint": {"gap_rad": 0.05}}
 
 
@@ -122,11 +123,13 @@ def rounding(positions: np.ndarray) -> float:
     [
         ("mujoco_warp", HARD | HANG | BIAS | DRAG | FRICTION, None),
         ("mujoco_warp", SOFT | LIMIT, None),
+        ("mujoco_warp", STOP, None),
         # Stiff ends of a gap amplify what is rounded: measured 4.4e-5, by MJX in single precision as well, whose law is
         # the same to 1e-16 in double. Without the gap it is 0.02 rad off.
         ("mujoco_warp", GAP, 1e-4),
         ("mjx", SPRING | BIAS | FRICTION, None),
         ("mjx", SOFT | LIMIT, None),
+        ("mjx", STOP, None),
         ("mjx", GAP, None),
     ],
 )

@@ -6,6 +6,7 @@ randomize_joint_parameters of envs/mdp/events.py. Their simulations need Isaac S
 `scripts/engine_env isaaclab` and `isaaclab23` were run.
 """
 
+import json
 import os
 import runpy
 import subprocess
@@ -17,7 +18,9 @@ from typing import Any
 import gapscope as gs
 import numpy as np
 import pytest
-from conftest import ROOT, changed_joint, interpreter, knowing, packages, servo_log, stock_motion
+from conftest import (
+    ROOT, changed_joint, geared_joint, interpreter, knowing, packages, servo_log, stock_motion,
+)  # fmt: skip
 
 OF_JOINT = {"joint_names_expr", "stiffness", "damping", "armature", "friction", "dynamic_friction", "viscous_friction"}
 LIMITS = {
@@ -41,6 +44,9 @@ PARAMS = {"asset_cfg", "operation", "distribution", "drive", "argument", "limits
 
 class Made(dict[str, Any]):
     __getattr__ = dict.__getitem__
+
+    def replace(self, **members: Any) -> "Made":
+        return Made(self, **members)
 
 
 def configuration(kind: str, allowed: set[str]) -> Any:
@@ -231,35 +237,135 @@ def test_isaac_labs_own_actuator_moves_as_the_plugins(
             assert off < 1e-6 if left_out is None else off > 1e-4, (left_out, off)
 
 
-def drive(target: str, folder: Path, commands: np.ndarray, beside: np.ndarray) -> dict[str, np.ndarray]:
+# Of the drive, before its gear; the asymmetry lifts what its range of forces allows above that.
+GEARED = {
+    "torque_delay@motor.delay_s": 0.0043,
+    "direction_asymmetry@motor.asymmetry": 0.4,
+    "dead_zone@motor.half_width_n_m": 2,
+    "cable_spring@joint.stiffness_n_m_per_rad": 20,
+    "cable_spring@joint.rest_rad": 0.1,
+}
+
+
+@pytest.mark.parametrize("target", list(LIMITS))
+def test_a_law_has_the_mjcfs_gear_and_ranges(tmp_path: Path, target: str) -> None:
+    run = geared_joint(tmp_path), servo_log(tmp_path, 1000)
+    lost = with_effects(*run, GEARED).export(target, tmp_path / "to", timestep=STEP_S)
+    assert {e.form for e in lost.effects} == {"exact"}
+    times = STEP_S * np.arange(1500)
+    commands = 0.5 * np.stack([np.sign(np.sin(12 * times)), np.cos(20 * times)], axis=1)
+    beside = 3 * np.stack([np.cos(15 * times), np.sin(4 * times)], axis=1)
+    angles = drive(target, tmp_path, commands, beside)["angles"]
+    model = Path(with_effects(*run, GEARED).export("mujoco", tmp_path / "own", timestep=STEP_S).model)
+    text = model.read_text()
+    for env in range(2):
+        assert np.abs(stock_motion(model, commands[:, env], beside[:, env]) - angles[0, :, env]).max() < 1e-6
+    for old, new in ((' gear="-3', ' gear="3'), ('ctrlrange="-0.3 0.2"', ""), ('forcerange="-14 14"', "")):
+        assert old in text
+        model.write_text(text.replace(old, new))
+        assert np.abs(stock_motion(model, commands[:, 0], beside[:, 0]) - angles[0, :, 0]).max() > 1e-3
+
+
+def test_a_servo_behind_a_gear(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = gs.replay(geared_joint(tmp_path), servo_log(tmp_path, 100))
+    result.export("isaaclab", tmp_path / "to")
+    drive = read(monkeypatch, "isaaclab", tmp_path / "to")["ACTUATORS"]["motor"]
+    assert (drive["stiffness"], drive["damping"]) == pytest.approx((9 * 157.1451, 9 * 7.0729))
+    assert drive["joint_effort_limit"] == 42
+    text = (tmp_path / "to" / "gapscope_isaaclab.py").read_text()
+    assert "position target: -0.333333 times the command; clip commands to -0.3 .. 0.2" in text
+
+
+def drive(
+    target: str, folder: Path, commands: np.ndarray, beside: np.ndarray, *events: str
+) -> dict[str, np.ndarray]:
     np.savez(folder / "commands.npz", commands=commands, beside=beside)
-    script = ROOT / "tests" / "python" / "isaaclab" / "law.py"
-    done = subprocess.run(
-        [interpreter(target), script, folder / "to", folder / "commands.npz", folder / "out.npz"],
-        capture_output=True, text=True, check=False, env={**os.environ, "PYTHONPATH": str(packages("torch"))},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    run_beside_torch(target, "law.py", folder / "to", folder / "commands.npz", folder / "out.npz", *events)
     return dict(np.load(folder / "out.npz"))
 
 
 WIDTH, LAG = "dead_zone@motor.half_width_n_m", "actuator_lag@motor.time_constant_s"
 
 
-@pytest.mark.parametrize("target", list(LIMITS))
-def test_each_environment_has_a_law_of_its_own(joint: tuple[str, str], tmp_path: Path, target: str) -> None:
+@pytest.mark.parametrize(
+    ("target", "events"), [("isaaclab", "EVENTS"), ("isaaclab23", "EVENTS"), ("isaaclab", "DRAWS")]
+)
+def test_each_environment_has_a_law_of_its_own(
+    joint: tuple[str, str], tmp_path: Path, target: str, events: str
+) -> None:
     freeze = ["motor.kp", "motor.kd", "joint.inertia", DAMPING]
     effects = [WIDTH.partition(".")[0], LAG.partition(".")[0]]
     fitted = gs.tune(*joint, with_=effects, freeze=freeze, starts=1, out=tmp_path / "fit")
     best = {WIDTH: 2.0, LAG: 0.02}
     knowing(fitted, best, {WIDTH: 0.5, LAG: 0.004}).export(target, tmp_path / "to", draws=3, timestep=STEP_S)
     commands = np.repeat(0.5 * np.sin(9 * STEP_S * np.arange(1500))[:, None], 3, axis=1)
-    done = drive(target, tmp_path, commands, np.zeros_like(commands))
-    for name, low, high in (("dead_zone", 1.02, 2.98), ("time_constant_s", 0.0122, 0.0279)):
-        assert len(set(done[name])) == 3 and low < done[name].min() < done[name].max() < high
+    done = drive(target, tmp_path, commands, np.zeros_like(commands), events)
+    if events == "DRAWS":
+        told = json.loads((tmp_path / "to" / "randomization.json").read_text())["parameters"]
+        rows = np.load(tmp_path / "to" / "randomization.npz")["parameters"]
+        rows = rows[:, [[p["name"] for p in told].index(name) for name in (WIDTH, LAG)]].astype(np.float32)
+        drawn = np.stack([done["dead_zone"], done["time_constant_s"]], axis=1)
+        assert len(set(drawn[:, 0])) > 1 and all(np.isclose(rows, row, rtol=1e-6).all(axis=1).any() for row in drawn)
+    else:
+        for name, low, high in (("dead_zone", 1.02, 2.98), ("time_constant_s", 0.0122, 0.0279)):
+            assert len(set(done[name])) == 3 and low < done[name].min() < done[name].max() < high
     for env in range(3):
         own = {WIDTH: float(done["dead_zone"][env]), LAG: float(done["time_constant_s"][env])}
         model = with_effects(*joint, own).export("mujoco", tmp_path / "own", timestep=STEP_S).model
         assert np.abs(stock_motion(Path(model), commands[:, env]) - done["angles"][0, :, env]).max() < 1e-6
+
+
+KT, ARM_DAMPING, MASS = "motor.kt", "arm.damping", "pendulum.mass"
+DELAY, LENGTH, ARM_FRICTION = "command_delay@motor.delay_s", "pendulum.length", "coulomb_friction@arm.friction_n_m"
+QUBE = {KT: 0.042, ARM_DAMPING: 1.5e-4, MASS: 0.024, DELAY: 0.012, ARM_FRICTION: 5e-4}
+# The class that its articulations share, or are.
+ARTICULATION = {"isaaclab": "base_articulation.py", "isaaclab23": "articulation.py"}
+
+
+@pytest.mark.parametrize("target", list(LIMITS))
+def test_a_draw_is_one_row_of_all_that_varies(demo: str, experiment: str, tmp_path: Path, target: str) -> None:
+    """By the equations of models/qube/README.md, not by what else the program wrote."""
+    log = tmp_path / "log.csv"
+    log.write_text("".join(Path(demo).read_text().splitlines(keepends=True)[:1001]))
+    fitted = gs.tune(
+        experiment, log, with_=["command_delay", "coulomb_friction@arm"], starts=1, out=tmp_path / "fit",
+        freeze=["motor.resistance", "motor.km", "arm.mass", "pendulum.damping"],
+    )  # fmt: skip
+    known = knowing(fitted, QUBE, {name: 0.1 * value for name, value in QUBE.items()})
+    to = Path(known.export(target, tmp_path / "to", draws=30, seed=4).model).parent
+    (source,) = Path(interpreter(target)).parents[1].glob(f"source/**/isaaclab/assets/*/{ARTICULATION[target]}")
+    run_beside_torch(target, "draw.py", to, source, tmp_path / "out.npz")
+    done = dict(np.load(tmp_path / "out.npz"))
+    names = [p["name"] for p in json.loads((to / "randomization.json").read_text())["parameters"]]
+    rows = np.load(to / "randomization.npz")["parameters"][done["rows"]]
+    own = {name: rows[:, names.index(name)] for name in QUBE}
+    assert set(names) == set(QUBE) and len(set(own[KT])) > 1
+    assert done["damping"] == pytest.approx(own[KT] * 0.042 / 8.4, rel=1e-5)
+    assert done["joint_friction_coeff.0"] == pytest.approx(own[ARM_FRICTION], rel=1e-5)
+    assert done["joint_dynamic_friction_coeff.0"] == pytest.approx(own[ARM_FRICTION], rel=1e-5)
+    assert done["joint_viscous_friction_coeff.0"] == pytest.approx(own[ARM_DAMPING], rel=1e-5)
+    masses, inertias = done.get("masses.2"), done.get("inertias.2")
+    if target == "isaaclab23":
+        masses, inertias = done["masses"][:, 2], done["inertias"][:, 2]
+        assert np.all(done["masses"][:, :2] == np.float32(0.024))
+        assert np.all(done["inertias"][:, :2] == np.float32(2e-5))
+    assert masses == pytest.approx(own[MASS], rel=1e-5)
+    assert inertias == pytest.approx(np.tile((2e-5 * own[MASS] / 0.024)[:, None], 9), rel=1e-5)
+    assert done["lags"][0] == pytest.approx(np.round(own[DELAY] / 0.002))
+    assert np.array_equal(done["lags"][0], done["lags"][1])
+    text = (to / "gapscope_isaaclab.py").read_text()
+    assert "As it is" not in text and 'efforts of "motor" are actuator_gainprm[row, 0, 0] times' in text
+    # A length moves a centre of mass, which no event draws: the body stays as it is, and that is said.
+    known = knowing(fitted, QUBE | {LENGTH: 0.129}, {MASS: 0.002, LENGTH: 0.002})
+    text = (Path(known.export(target, tmp_path / "to", draws=3).model).parent / "gapscope_isaaclab.py").read_text()
+    assert f"# - {MASS}: body_inertia, body_mass" in text and f"# - {LENGTH}: body_inertia, body_ipos" in text
+
+
+def run_beside_torch(target: str, script: str, *arguments: Path | str) -> None:
+    call = [interpreter(target), ROOT / "tests" / "python" / "isaaclab" / script, *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(packages("torch"))}
+    done = subprocess.run(call, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_spring_beside_a_drive_is_refused(joint: tuple[str, str], tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import gapscope as gs
 import numpy as np
 import pytest
-from conftest import ROOT, changed_joint, knowing, packages, stock_motion
+from conftest import ROOT, changed_joint, geared_joint, knowing, packages, servo_log, stock_motion
 from scipy.integrate import solve_ivp
 
 STEP_S = 2e-4
@@ -146,6 +146,23 @@ def test_laws_that_mujoco_lacks_are_pytorchs(joint: tuple[str, str], mjlab: Path
         model = gs.replay(*joint, with_=kept, set=sizes).export("mujoco", tmp_path / "own", timestep=STEP_S).model
         off = np.abs(stock_motion(Path(model), commands) - first).max()
         assert off < 1e-6 if left_out is None else off > 1e-4, (left_out, off)
+
+
+def test_a_law_has_the_mjcfs_gear_and_ranges(mjlab: Path, tmp_path: Path) -> None:
+    values = {"torque_delay@motor.delay_s": 0.0043, "direction_asymmetry@motor.asymmetry": 0.4}
+    effects = [name.partition(".")[0] for name in values]
+    result = gs.replay(geared_joint(tmp_path), servo_log(tmp_path, 1000), with_=effects, set=values)
+    lost = result.export("mjlab", tmp_path / "to", timestep=STEP_S)
+    assert {e.form for e in lost.effects} == {"exact"}
+    np.save(tmp_path / "commands.npy", commands := 0.5 * np.sign(np.sin(12 * STEP_S * np.arange(4000))))
+    run(mjlab, "law.py", tmp_path / "to", tmp_path / "commands.npy", tmp_path / "moved.npz", beside=packages("torch"))
+    angles = np.load(tmp_path / "moved.npz")["angles"][0, :, 0]
+    model = Path(result.export("mujoco", tmp_path / "own", timestep=STEP_S).model)
+    assert np.abs(stock_motion(model, commands) - angles).max() < 1e-6
+    for old, new in ((' gear="-3', ' gear="3'), ('ctrlrange="-0.3 0.2"', ""), ('forcerange="-14 14"', "")):
+        assert old in (text := model.read_text())
+        (changed := model.with_name("changed.xml")).write_text(text.replace(old, new))
+        assert np.abs(stock_motion(changed, commands) - angles).max() > 1e-3
 
 
 # Of a law's numbers, what varies: the plugin's own terms, a delay, and the gain that the law has of the servo.

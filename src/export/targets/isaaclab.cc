@@ -7,8 +7,8 @@ namespace gapscope {
 ExportTarget Target_isaaclab() {
   return {
       .name = "isaaclab", .what = "Isaac Lab 3.0", .has = IsaacLabFeatures(), .files = [](const TargetInput& input) {
-        return WriteIsaacLab(input,
-                             {"3.0", "actuator_effort_limit", "joint_effort_limit", ", use_newton_actuators=False"});
+        return WriteIsaacLab(
+            input, {"3.0", "actuator_effort_limit", "joint_effort_limit", ", use_newton_actuators=False", "_index"});
       }};
 }
 

@@ -6,7 +6,7 @@ namespace gapscope {
 ExportTarget Target_isaaclab23() {
   return {
       .name = "isaaclab23", .what = "Isaac Lab 2.3", .has = IsaacLabFeatures(), .files = [](const TargetInput& input) {
-        return WriteIsaacLab(input, {"2.3", "effort_limit", "effort_limit_sim", ""});
+        return WriteIsaacLab(input, {"2.3", "effort_limit", "effort_limit_sim", "", ""});
       }};
 }
 

@@ -1,4 +1,4 @@
-"""Run by Isaac Lab's own interpreter, with PyTorch on its path: law.py FOLDER COMMANDS.npz OUT.npz.
+"""Run by Isaac Lab's own interpreter, with PyTorch on its path: law.py FOLDER COMMANDS.npz OUT.npz [EVENTS].
 
 Isaac Lab's own actuator classes make the torque, as its articulation would call them; MuJoCo steps the first joint.
 COMMANDS: `commands` and `beside`, the efforts beside them, of (steps, environments). Twice, with a reset of the first
@@ -7,32 +7,15 @@ environment alone between. OUT: `angles`, of (runs, steps, environments), and wh
 
 import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import torch
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "mjlab"))
-import pretend  # noqa: E402
+from stand_in import pretend_isaac_sim
 
 folder, given_path, out = sys.argv[1:4]
-sys.path.insert(0, folder)
-pretend.ABSENT = {"warp", "toml", "trimesh", "yaml", "omni", "pxr", "carb", "isaacsim", "prettytable"}
-pretend.install()
-
-
-def stand_in(name: str, **members: Any) -> None:
-    """For what needs Isaac Sim, or much else."""
-    sys.modules[name] = ModuleType(name)
-    vars(sys.modules[name]).update(members)
-
-
-if "Isaac Lab 2.3" in Path(folder, "gapscope_isaaclab.py").read_text():
-    stand_in("isaaclab.sim", SimulationCfg=SimpleNamespace)
-stand_in("isaaclab.envs", mdp=SimpleNamespace(randomize_joint_parameters=None))
-stand_in("isaaclab.managers", EventTermCfg=SimpleNamespace, SceneEntityCfg=lambda name: SimpleNamespace(name=name))
+pretend_isaac_sim(folder)
 import gapscope_isaaclab as exported  # noqa: E402
 from isaaclab.actuators import IdealPDActuator  # noqa: E402
 from isaaclab.utils.types import ArticulationActions  # noqa: E402
@@ -45,12 +28,15 @@ assert isinstance(law, IdealPDActuator) and not law.is_implicit_model
 robot = SimpleNamespace(actuators={"motor": law})
 scene = type("Scene", (dict,), {"num_envs": envs})(robot=robot)
 torch.manual_seed(3)
-for event in getattr(exported, "EVENTS", {}).values():
+np.random.seed(3)
+for event in getattr(exported, (*sys.argv[4:], "EVENTS")[0], {}).values():
     if event.func is not None:
         event.func(SimpleNamespace(scene=scene, device="cpu"), None, **event.params)
 spec = mujoco.MjSpec.from_file(str(Path(folder) / "model.xml"))
-for actuator in spec.actuators:
+for actuator in spec.actuators:  # efforts act on the joint there, as they are
     actuator.set_to_motor()
+    actuator.gear[0] = 1
+    actuator.ctrllimited = actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_FALSE
 model = spec.compile()
 assert model.opt.timestep == exported.SIMULATION.dt == cfg.step_s
 angles = np.empty((2, steps, envs))

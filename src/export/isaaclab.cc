@@ -8,6 +8,7 @@
 #include <cmath>
 #include <optional>
 
+#include "src/core/collect.h"
 #include "src/core/statistics.h"
 #include "src/export/drive_laws.h"
 #include "src/export/isaaclab_draws.h"
@@ -222,9 +223,10 @@ std::string IsaacLabWriter::Event(int joint, const std::string& name) const {
 }
 
 IsaacLabDraws IsaacLabWriter::Draws() const {
-  std::vector<DrawnDrive> drives;
-  for (const auto& [joint, drive] : drives_)
-    drives.push_back({drive.name, joint, drive.delay_steps.has_value(), !drive.law_command.empty()});
+  const auto drives = Collect(drives_, [](const auto& entry) {
+    const auto& [joint, drive] = entry;
+    return DrawnDrive{drive.name, joint, drive.delay_steps.has_value(), !drive.law_command.empty()};
+  });
   return WriteIsaacLabDraws(input_, names_, drives);
 }
 

@@ -263,7 +263,7 @@ double ShortenStates(FitProblem& problem, const std::vector<Eigen::VectorXd>& st
     *work += there.work;
     cost = TakeBetterStates(problem, point, residuals, shorter, there.residuals);
     if (!worse.empty()) continue;
-    for (std::size_t w = 0; w < whole.size(); ++w) worse.push_back(point.states[w] != whole[w]);
+    for (std::size_t w = 0; w < whole.size(); ++w) worse.push_back(static_cast<char>(point.states[w] != whole[w]));
     if (std::ranges::find(worse, 1) == worse.end()) break;
   }
   return cost;

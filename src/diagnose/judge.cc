@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <tuple>
 
@@ -301,23 +300,25 @@ class Judging {
       if (s.probability >= kDiagnosePolicy.probability.present) present = With(present, s.use);
     }
     // Sure ones first: what is there in one's place is not told as absent in another's.
-    std::vector<std::size_t> order(found_.members.size());
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_partition(order.begin(), order.end(),
-                          [&](std::size_t m) { return Has(present, found_.members[m].use); });
-    for (const std::size_t m : order) {
-      const Member& member = found_.members[m];
-      const std::vector<Rival> rivals = RivalsOf(member, present);
-      result->statements[m].rivals = rivals;
-      for (const Rival& rival : rivals) {
-        const Model& base = *found_.base->model;
-        if (!AreOne(rival.use, member.use) && rival.behind > TieOf(member.gain)) continue;
-        if (IsLessLikely(rival.use, member.use, base)) continue;
-        TellWith(member.use, rival.use, "costs as little in its place", result);
-        for (const EffectUse& use : found_.uses) {
-          if (!Has(found_.chosen->effects, use) && AreOne(use, rival.use))
-            TellWith(member.use, use, "is one motion with " + rival.use.Text(), result);
-        }
+    for (const bool sure : {true, false}) {
+      for (std::size_t m = 0; m < found_.members.size(); ++m) {
+        const Member& member = found_.members[m];
+        if (Has(present, member.use) != sure) continue;
+        const std::vector<Rival> rivals = RivalsOf(member, present);
+        result->statements[m].rivals = rivals;
+        TellRivals(member, rivals, result);
+      }
+    }
+  }
+
+  void TellRivals(const Member& member, const std::vector<Rival>& rivals, Judgement* result) {
+    for (const Rival& rival : rivals) {
+      if (!AreOne(rival.use, member.use) && rival.behind > TieOf(member.gain)) continue;
+      if (IsLessLikely(rival.use, member.use, *found_.base->model)) continue;
+      TellWith(member.use, rival.use, "costs as little in its place", result);
+      for (const EffectUse& use : found_.uses) {
+        if (!Has(found_.chosen->effects, use) && AreOne(use, rival.use))
+          TellWith(member.use, use, "is one motion with " + rival.use.Text(), result);
       }
     }
   }

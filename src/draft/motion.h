@@ -15,6 +15,8 @@ namespace gapscope {
 using Motions = std::vector<std::vector<Samples::Motion>>;
 
 inline constexpr double kHalfWidth_s = 0.03;  // of the parabolas that give speed and acceleration
+// How late a command is looked for.
+inline constexpr double kLatest_s = 0.08, kLagStep_s = 0.004;
 
 Motions MotionsOf(const std::vector<const Samples*>& logs, const std::vector<Guess>& guesses, const Pairing& pairing,
                   const Scalings& scalings, double half_width_s = kHalfWidth_s);

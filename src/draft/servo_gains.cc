@@ -14,7 +14,6 @@ namespace gapscope {
 namespace {
 
 constexpr double kExplains = 0.8, kKnown = 0.2;
-constexpr double kLatest_s = 0.08, kLagStep_s = 0.004;  // of a command
 constexpr double kMadeUp_hz = 5, kDroop_rad = 0.1;
 
 struct Fit {

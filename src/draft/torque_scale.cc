@@ -11,7 +11,6 @@ namespace gapscope {
 namespace {
 
 constexpr double kClearTorque = 0.9, kAgreeTorque = 0.25;  // correlation from which a slope counts; how near it must be
-constexpr double kLatestTorque_s = 0.08, kTorqueLagStep_s = 0.004;  // of a command
 
 // What a command column is.
 enum class Choice { kOpen, kInput, kReversedInput, kJointTorque, kReversedJointTorque };
@@ -57,7 +56,7 @@ class TorqueScales {
   // By the torque that the motion takes.
   Choice ChoiceOf(std::size_t a, const std::vector<double>& torque) const {
     FittedLine best;
-    for (const int late : samples_.Lags(kLatestTorque_s, kTorqueLagStep_s)) {
+    for (const int late : samples_.Lags(kLatest_s, kLagStep_s)) {
       const FittedLine line = LineThrough(samples_.values_before(guesses_[p_.commands[a].column].column, late), torque);
       if (std::abs(line.correlation) > std::abs(best.correlation)) best = line;
     }

@@ -130,12 +130,10 @@ void Coupling::FindLimbs(std::size_t signals) {
   }
   if (groups.empty()) return;
   // What no joint moves is not scored: it is no limb of its own.
-  std::vector<std::size_t> still = {groups.front().front()};
   for (std::size_t s = 0; s < signals; ++s) {
     if (std::ranges::none_of(groups, [&](const auto& group) { return std::ranges::find(group, s) != group.end(); }))
-      still.push_back(s);
+      groups.front().push_back(s);
   }
-  groups.push_back(std::move(still));
   limbs_ = NumberParts(signals, groups);
   if (limb_count() == 1) limbs_.clear();
 }

@@ -87,11 +87,8 @@ Simulator::Simulator(const Model& model, double max_step_s)
       values_(model.Nominal()),
       earlier_(model.command_actuators().size(), 0),
       held_(model.command_actuators().size(), 0) {
-  // Friction rows written for "as stiff as the step allows" (solref -1 -1/h) follow the step that is really used.
-  for (int dof = 0; dof < mujoco_->nv; ++dof) {
-    mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
-    if (solref[0] == -1) solref[1] = -0.9999 / max_step_s_;
-  }
+  set_steps(StepKind::kOwn);
+  DivideSteps(1);
   // A motor's other inputs (supply, enable) are no commands to move: the first one is.
   for (const auto& command : model.experiment().commands) {
     const int actuator = mj_name2id(mujoco_.get(), mjOBJ_ACTUATOR, command.actuator.c_str()),
@@ -112,8 +109,21 @@ Simulator::Simulator(const Model& model, double max_step_s)
 }
 
 void Simulator::set_steps(StepKind steps) {
-  quick_ = steps == StepKind::kQuick && model_.HasQuickSteps();
-  mujoco_->opt.integrator = quick_ ? mjINT_EULER : model_.compiled().opt.integrator;
+  const int own = model_.compiled().opt.integrator;
+  const bool first_order = own != mjINT_RK4, quick = steps == StepKind::kQuick && model_.HasQuickSteps();
+  halves_ = first_order && steps == StepKind::kOwn;
+  int& integrator = mujoco_->opt.integrator = own;
+  if (first_order && steps != StepKind::kPlain && own == mjINT_EULER) integrator = mjINT_IMPLICITFAST;
+  if (!first_order && quick) integrator = mjINT_EULER;
+}
+
+void Simulator::DivideSteps(int parts) {
+  parts_ = parts;
+  // Friction rows written for "as stiff as the step allows" (solref -1 -1/h) follow the step that is really used.
+  for (int dof = 0; dof < mujoco_->nv; ++dof) {
+    mjtNum* solref = mujoco_->dof_solref + mjNREF * dof;
+    if (solref[0] == -1) solref[1] = -0.9999 * parts / max_step_s_;
+  }
 }
 
 bool Simulator::SetParameters(std::span<const double> values, const Recording& recording) {
@@ -240,7 +250,7 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
 int Simulator::StepToNext(const Recording& recording, std::size_t row) {
   mjModel* m = mujoco_.get();
   const double now = recording.time_s[row], interval = recording.time_s[row + 1] - now;
-  const int steps = StepsOver(interval, max_step_s_);
+  const int steps = parts_ * StepsOver(interval, max_step_s_);
   m->opt.timestep = interval / steps;
   if (!late_) SetCommands(recording, row, now, now);
   for (int step = 0; step < steps; ++step) {
@@ -290,12 +300,30 @@ void Simulator::Drag(const Recording& recording, Window window, const std::funct
 
 RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,
                          std::span<double> predicted, std::span<double> qpos) {
+  const std::size_t numbers = window.rows() * recording.measured.size();
+  GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= numbers);
+  GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * static_cast<std::size_t>(mujoco_->nq));
+  RunResult result = RunOnce(recording, window, start, predicted, qpos);
+  if (halves_ && result.outcome == Outcome::kCompleted) {
+    if (by_whole_.size() < numbers) by_whole_.resize(numbers);
+    std::copy_n(predicted.begin(), numbers, by_whole_.begin());
+    const std::size_t whole_steps = result.steps;
+    DivideSteps(2);
+    result = RunOnce(recording, window, start, predicted, qpos);
+    DivideSteps(1);
+    result.steps += whole_steps;
+    for (std::size_t i = 0; i < numbers; ++i) predicted[i] += predicted[i] - by_whole_[i];
+  }
+  if (mujoco_->opt.integrator != mjINT_RK4) result.steps = (result.steps + 3) / 4;
+  ApplySensors(recording, window, predicted);
+  return result;
+}
+
+RunResult Simulator::RunOnce(const Recording& recording, Window window, const InitialState& start,
+                             std::span<double> predicted, std::span<double> qpos) {
   const mjModel* m = mujoco_.get();
   mjData* d = data_.get();
-  const std::size_t signals = recording.measured.size();
-  GS_CHECK(window.begin < window.end && window.end <= recording.rows() && predicted.size() >= window.rows() * signals);
-  const std::size_t nq = static_cast<std::size_t>(m->nq);
-  GS_CHECK(qpos.empty() || qpos.size() >= window.rows() * nq);
+  const std::size_t signals = recording.measured.size(), nq = static_cast<std::size_t>(m->nq);
   const bool followed = Begin(recording, window, start);
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
@@ -320,8 +348,6 @@ RunResult Simulator::Run(const Recording& recording, Window window, const Initia
       break;
     }
   }
-  if (quick_) result.steps = (result.steps + 3) / 4;
-  ApplySensors(recording, window, predicted);
   return result;
 }
 

@@ -26,12 +26,18 @@ enum class Outcome { kCompleted, kDiverged };
 struct RunResult {
   Outcome outcome = Outcome::kCompleted;
   double diverged_at_s = 0;  // the recording's time at the last good stamp
-  std::size_t steps = 0;     // of the model's integrator, each as long as four quick ones
+  std::size_t steps = 0;     // each of four evaluations, as Runge-Kutta's: four of another integrator's are one
 };
 
-// Each step as the model's integrator makes it, or by one evaluation (semi-implicit Euler) where that one makes four: a
-// third of the time, for differences of motions that are both made so (Model::HasQuickSteps).
-enum class StepKind { kOwn, kQuick };
+// How a window's motion is made.
+enum class StepKind {
+  kOwn,    // exact to second order at least. Where the integrator is of first order, it makes whole and half steps, and
+           // twice the motion by halves less that by whole ones is without that order's error (Richardson). Euler's is
+           // the implicit one then, which nears the same motion, and bears a stiff servo's damping.
+  kQuick,  // a third of that work, for differences of motions that are both made so (Model::HasQuickSteps): semi-implicit
+           // Euler in place of Runge-Kutta, whole steps alone
+  kPlain,  // as the integrator makes it: what an engine does with the model
+};
 
 // A smooth torque that no catalogue holds: amplitude sin(per_rad q + per_speed w + per_command u + phase) on one joint,
 // held over each step. What a model may miss is judged beside such torques.
@@ -80,6 +86,11 @@ class Simulator {
   void ApplyProbe(const ProbeTorque& probe);
   // What went before the window, in all that remembers. False: as PreRoll.
   bool Recall(const Recording& recording, Window window);
+  // Each step in so many.
+  void DivideSteps(int parts);
+  // As Run, without what sensors make of it, and as the steps are divided.
+  RunResult RunOnce(const Recording& recording, Window window, const InitialState& start, std::span<double> predicted,
+                    std::span<double> qpos);
   // Everything as a window's run finds it: pre-rolled, at `start`, at its first stamp. False: as PreRoll.
   bool Begin(const Recording& recording, Window window, const InitialState& start);
   // From a row's stamp to the next one's, under its commands. Returns the steps that it took.
@@ -117,7 +128,8 @@ class Simulator {
   DataPtr data_;
   ParameterWriter writer_;
   double max_step_s_;
-  bool quick_ = false;
+  int parts_ = 1;        // of each step
+  bool halves_ = false;  // whole and half steps
   StampShift stamps_;
   std::vector<double> delays_s_;  // per command: how late it acts
   bool late_ = false;             // one of them does not act at its stamp
@@ -132,6 +144,7 @@ class Simulator {
       apart_;  // per mirrored joint: angle and speed beside its load at the start of a run
   std::vector<double> values_;
   std::vector<double> column_, shaped_;  // scratch of ApplySensors
+  std::vector<double> by_whole_;         // scratch of Run
   std::vector<bool> moves_;              // per command: drives, and does not supply or enable
   std::vector<double> earlier_;          // per command: before the log began
   bool from_nothing_ = false;            // nothing was commanded then, and something is at the first stamp

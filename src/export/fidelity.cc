@@ -8,8 +8,9 @@
 namespace gapscope {
 namespace {
 
-double ErrorOf(const Model& model, const FixedParameters& fixed, const std::vector<Recording>& logs, ThreadPool& pool) {
-  const TuneOptions fit{.window_s = model.experiment().replay.window_s};
+double ErrorOf(const Model& model, const FixedParameters& fixed, const std::vector<Recording>& logs, ThreadPool& pool,
+               StepKind steps = StepKind::kOwn) {
+  const TuneOptions fit{.window_s = model.experiment().replay.window_s, .steps = steps};
   return ReplayError(Evaluate(model, logs, fixed, ReplayMode::kWindows, fit, pool));
 }
 
@@ -77,7 +78,8 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
   // How late a log's stamps are is the log's: found anew it would make up for delays that are rounded or not there, and
   // for half of an integrator's step.
   errors.nominal = ErrorOf(*nominal, {nominal->Nominal(), stamps}, logs, pool);
-  errors.exported = ErrorOf(*exported, {of_exported, stamps}, file.sent.empty() ? logs : Sent(logs, file.sent), pool);
+  errors.exported = ErrorOf(*exported, {of_exported, stamps}, file.sent.empty() ? logs : Sent(logs, file.sent), pool,
+                            StepKind::kPlain);
   return errors;
 }
 

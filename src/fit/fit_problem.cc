@@ -199,7 +199,7 @@ bool FitProblem::Simulate(Worker& worker, const Place& place, std::vector<double
   predicted.resize(window.rows.rows() * recording.measured.size());
   worker.simulator.set_stamps(place.stamps);
   worker.simulator.set_probes(probes_);
-  worker.simulator.set_steps(options_.steps == StepKind::kQuick ? StepKind::kQuick : place.steps);
+  worker.simulator.set_steps(options_.steps == StepKind::kOwn ? place.steps : options_.steps);
   if (!worker.simulator.SetParameters(place.values, recording)) return false;
   PlaceStart(worker, place);
   const RunResult run = worker.simulator.Run(recording, window.rows, worker.start, predicted);

@@ -18,6 +18,7 @@ FitOptions MakeFitOptions(const TuneOptions& options, const std::vector<int>& fr
           .objective = objective,
           .window_s = options.window_s,
           .time_step_s = options.time_step_s,
+          .steps = options.steps,
           .fit_offsets = options.fit_offsets,
           .fit_shift = options.fit_shift,
           .fit_states = options.fit_states,

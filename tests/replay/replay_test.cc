@@ -7,6 +7,7 @@
 #include <cstring>
 #include <numeric>
 
+#include "src/core/collect.h"
 #include "tests/model/synthetic.h"
 
 namespace gapscope::testing {
@@ -171,6 +172,76 @@ Experiment SpringRig(const Scratch& scratch, const char* integrator, double stif
       "unit: rad}\n");
 }
 
+// A spring of 2 N m/rad, 0.02 kg m^2 and 0.02 N m s/rad under 1 N m from rest, as it moves in closed form.
+class StepKindTest : public ::testing::TestWithParam<const char*> {
+ protected:
+  StepKindTest()
+      : experiment_(SpringRig(scratch_, GetParam(), 2, 0.002)),
+        model_(MakeModel(experiment_)),
+        log_(MakeRecording(experiment_, 500, 0.002, [](int, double) { return 1.0; })) {}
+
+  std::vector<double> Predicted(StepKind steps, double step_s) {
+    Simulator simulator(*model_, step_s);
+    simulator.set_steps(steps);
+    EXPECT_TRUE(simulator.SetParameters(model_->Nominal(), log_));
+    std::vector<double> predicted(log_.rows());
+    EXPECT_EQ(simulator.Run(log_, {0, log_.rows()}, AtRest(*model_), predicted).outcome, Outcome::kCompleted);
+    return predicted;
+  }
+  double Error(StepKind steps, double step_s) {
+    const double rate = 0.02 / (2 * 0.02), turning = std::sqrt(2 / 0.02 - rate * rate);
+    const std::vector<double> exact = Collect(log_.time_s, [&](double t) {
+      return 0.5 * (1 - std::exp(-rate * t) * (std::cos(turning * t) + rate / turning * std::sin(turning * t)));
+    });
+    return LargestDifference(Predicted(steps, step_s), exact);
+  }
+  Scratch scratch_;
+  Experiment experiment_;
+  std::shared_ptr<const Model> model_;
+  Recording log_;
+};
+
+TEST_P(StepKindTest, AFirstOrderIntegratorIsExactToSecondOrder) {
+  const double own = Error(StepKind::kOwn, 0.002), plain = Error(StepKind::kPlain, 0.002);
+  EXPECT_NEAR(plain / Error(StepKind::kPlain, 0.001), 2, 0.1);
+  EXPECT_NEAR(own / Error(StepKind::kOwn, 0.001), 4, 0.2);
+  EXPECT_LT(own, 0.05 * plain);
+}
+
+// What remains of it: a third of the work, and the first order's error.
+TEST_P(StepKindTest, QuickMakesWholeStepsAlone) {
+  EXPECT_TRUE(model_->HasQuickSteps());
+  EXPECT_NEAR(Error(StepKind::kQuick, 0.002) / Error(StepKind::kQuick, 0.001), 2, 0.1);
+}
+
+// A servo's damping of 20 N m s/rad on 0.02 kg m^2 is gone in a millisecond: Euler's steps of 4 ms run away.
+TEST(EulerTest, AStiffServoIsBorne) {
+  const Scratch scratch;
+  const Experiment experiment = MakeExperiment(
+      scratch,
+      "<mujoco><worldbody><body><joint name=\"hinge\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"0.02 0.02 "
+      "0.02\"/></body></worldbody><actuator><position name=\"servo\" joint=\"hinge\" kp=\"200\" "
+      "kv=\"20\"/></actuator></mujoco>",
+      "commands:\n  - {actuator: servo, column: u, unit: rad}\nmeasured:\n  - {signal: q, column: q, joint: hinge, "
+      "unit: rad}\n");
+  const auto model = MakeModel(experiment);
+  const Recording log = MakeRecording(experiment, 200, 0.004, [](int, double) { return 0.1; });
+  Simulator simulator(*model, 0.004);
+  ASSERT_TRUE(simulator.SetParameters(model->Nominal(), log));
+  std::vector<double> predicted(log.rows());
+  EXPECT_EQ(simulator.Run(log, {0, log.rows()}, AtRest(*model), predicted).outcome, Outcome::kCompleted);
+  // The servo's slow pole, of 0.02 s^2 + 20 s + 200.
+  const double slow = (20 - std::sqrt(20 * 20 - 4 * 0.02 * 200)) / (2 * 0.02), fast = 20 / 0.02 - slow;
+  const double t = log.time_s.back();
+  const double exact = 0.1 * (1 - (fast * std::exp(-slow * t) - slow * std::exp(-fast * t)) / (fast - slow));
+  EXPECT_NEAR(predicted.back(), exact, 1e-5);
+  simulator.set_steps(StepKind::kPlain);
+  ASSERT_TRUE(simulator.SetParameters(model->Nominal(), log));
+  EXPECT_EQ(simulator.Run(log, {0, log.rows()}, AtRest(*model), predicted).outcome, Outcome::kDiverged);
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, StepKindTest, ::testing::Values("Euler", "implicitfast", "implicit"));
+
 class ChooseTimeStepTest : public ::testing::Test {
  protected:
   TimeStep Choose(const Experiment& experiment, double wrong, double step_s = 0.002, int rows = 400) {
@@ -193,8 +264,13 @@ TEST_F(ChooseTimeStepTest, AHigherOrderNeedsNoHalving) {
   EXPECT_LT(rk4.error_change, 0.01 * ErrorAt(rk4.step_s));
 }
 
-TEST_F(ChooseTimeStepTest, EulerIsHalvedUntilTheErrorIsTheModels) {
+TEST_F(ChooseTimeStepTest, AFirstOrderIntegratorNeedsNoHalvingEither) {
   const TimeStep euler = Choose(SpringRig(scratch_, "Euler", 20, 0.002), 1.02);
+  EXPECT_EQ(euler.step_s, 0.002);
+}
+
+TEST_F(ChooseTimeStepTest, AFastModelIsHalvedUntilTheErrorIsItsOwn) {
+  const TimeStep euler = Choose(SpringRig(scratch_, "Euler", 500, 0.002), 1.02);
   EXPECT_LT(euler.step_s, 0.002);
   EXPECT_GE(euler.step_s, 0.002 / 32);
   EXPECT_EQ(euler.error_change, std::abs(ErrorAt(euler.step_s) - ErrorAt(euler.step_s / 2)));
@@ -202,7 +278,7 @@ TEST_F(ChooseTimeStepTest, EulerIsHalvedUntilTheErrorIsTheModels) {
 
 TEST_F(ChooseTimeStepTest, AModelStepLongerThanTheSamplesHidesNothing) {
   // 10 ms in the MJCF, 2 ms in the log: halving 10 ms to 5 ms changes no step that is taken.
-  const TimeStep coarse = Choose(SpringRig(scratch_, "Euler", 20, 0.01), 1.02);
+  const TimeStep coarse = Choose(SpringRig(scratch_, "Euler", 500, 0.01), 1.02);
   EXPECT_LT(coarse.step_s, 0.002);
 }
 

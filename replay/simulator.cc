@@ -14,37 +14,12 @@
 namespace gapscope {
 namespace {
 
-constexpr PastPolicy kPast;
-
-// Even steps of at most `max_step_s`.
-int StepsOver(double interval_s, double max_step_s) {
-  return std::max(1, static_cast<int>(std::ceil(interval_s / max_step_s - 1e-6)));
-}
-
 ModelPtr CopyForReplay(const mjModel& model) {
   ModelPtr copy(mj_copyModel(nullptr, &model));
   // A divergence must be an outcome, never a silent reset; sensors are not read and islands do not pay in models this
   // small.
   copy->opt.disableflags |= mjDSBL_AUTORESET | mjDSBL_SENSOR | mjDSBL_ISLAND;
   return copy;
-}
-
-bool RunsAway(const mjModel& m, const mjData& d) {
-  for (int i = 0; i < m.nq; ++i) {
-    if (!(std::abs(d.qpos[i]) < kRunaway)) return true;
-  }
-  for (int i = 0; i < m.nv; ++i) {
-    if (!(std::abs(d.qvel[i]) < 1000 * kRunaway)) return true;
-  }
-  return false;
-}
-
-bool IsSane(const mjModel& m, const mjData& d) {
-  // A command that MuJoCo finds too large is zeroed by it: no replay of that command either.
-  for (const int bad : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL}) {
-    if (d.warning[bad].number > 0) return false;
-  }
-  return !RunsAway(m, d);
 }
 
 // Mean over [from, to] of a signal that holds values[k] from time[k] to time[k + 1], and `earlier` before the first
@@ -83,6 +58,7 @@ Simulator::Simulator(const Model& model, double max_step_s)
       data_(mj_makeData(mujoco_.get())),
       writer_(model, mujoco_.get(), data_.get()),
       max_step_s_(max_step_s > 0 ? max_step_s : model.compiled().opt.timestep),
+      damping_(model, *mujoco_),
       delays_s_(model.command_actuators().size(), 0),
       values_(model.Nominal()),
       earlier_(model.command_actuators().size(), 0),
@@ -108,12 +84,30 @@ Simulator::Simulator(const Model& model, double max_step_s)
   }
 }
 
+int Simulator::StepsOver(double interval_s) const {
+  return std::max(1, static_cast<int>(std::ceil(interval_s / max_step_s_ - 1e-6)));
+}
+
+bool Simulator::RunsAway() const {
+  const mjModel& m = *mujoco_;
+  return std::any_of(data_->qpos, data_->qpos + m.nq, [](double q) { return !(std::abs(q) < kRunaway); }) ||
+         std::any_of(data_->qvel, data_->qvel + m.nv, [](double v) { return !(std::abs(v) < 1000 * kRunaway); });
+}
+
+bool Simulator::IsSane() const {
+  // A command that MuJoCo finds too large is zeroed by it: no replay of that command either.
+  const auto warned = [&](int bad) { return data_->warning[bad].number > 0; };
+  return !warned(mjWARN_BADQPOS) && !warned(mjWARN_BADQVEL) && !warned(mjWARN_BADQACC) && !warned(mjWARN_BADCTRL) &&
+         !RunsAway();
+}
+
 void Simulator::set_steps(StepKind steps) {
   const int own = model_.compiled().opt.integrator;
   const bool first_order = own != mjINT_RK4, quick = steps == StepKind::kQuick && model_.HasQuickSteps();
+  plain_ = steps == StepKind::kPlain;
   halves_ = first_order && steps == StepKind::kOwn;
   int& integrator = mujoco_->opt.integrator = own;
-  if (first_order && steps != StepKind::kPlain && own == mjINT_EULER) integrator = mjINT_IMPLICITFAST;
+  if (own == mjINT_EULER && !plain_) integrator = mjINT_IMPLICITFAST;
   if (!first_order && quick) integrator = mjINT_EULER;
 }
 
@@ -186,15 +180,6 @@ double Simulator::Read(const SignalSource& source) const {
   return data_->actuator_force[mujoco_->actuator_outadr[source.actuator]];
 }
 
-bool Simulator::Recall(const Recording& recording, Window window) {
-  mj_resetData(mujoco_.get(), data_.get());
-  std::fill(held_.begin(), held_.end(), window.begin);
-  from_nothing_ = false;
-  if ((remembers_ || latest_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
-    FindEarlierCommands(recording);
-  return PreRoll(recording, window);
-}
-
 bool Simulator::Begin(const Recording& recording, Window window, const InitialState& start) {
   const mjModel* m = mujoco_.get();
   mjData* d = data_.get();
@@ -250,52 +235,33 @@ void Simulator::ComputeSignals(const Recording& recording, std::size_t row) {
 int Simulator::StepToNext(const Recording& recording, std::size_t row) {
   mjModel* m = mujoco_.get();
   const double now = recording.time_s[row], interval = recording.time_s[row + 1] - now;
-  const int steps = parts_ * StepsOver(interval, max_step_s_);
+  const int steps = parts_ * StepsOver(interval);
   m->opt.timestep = interval / steps;
   if (!late_) SetCommands(recording, row, now, now);
   for (int step = 0; step < steps; ++step) {
     if (late_) SetCommands(recording, row, now + step * m->opt.timestep, now + (step + 1) * m->opt.timestep);
-    for (const ProbeTorque& probe : probes_) ApplyProbe(probe);
-    mj_step(m, data_.get());
+    Step(probes_);
   }
   return steps;
 }
 
-void Simulator::ApplyProbe(const ProbeTorque& probe) {
-  const mjModel* m = mujoco_.get();
-  const int dof = m->jnt_dofadr[probe.joint];
-  const double q = data_->qpos[m->jnt_qposadr[probe.joint]], w = data_->qvel[dof];
+double Simulator::Probed(const ProbeTorque& probe) const {
+  const double q = data_->qpos[mujoco_->jnt_qposadr[probe.joint]],
+               w = data_->qvel[mujoco_->jnt_dofadr[probe.joint]];
   const double u = probe.actuator >= 0 ? probe.per_command * data_->ctrl[probe.actuator] : 0;
-  data_->qfrc_applied[dof] =
-      probe.amplitude_n_m * std::sin(probe.per_rad * q + probe.s_per_rad * w + u + probe.phase_rad);
+  return probe.amplitude_n_m * std::sin(probe.per_rad * q + probe.s_per_rad * w + u + probe.phase_rad);
 }
 
-void Simulator::DragOn(const Recording& recording, std::size_t row, int steps) {
-  const double now = recording.time_s[row], next = recording.time_s[row + 1];
-  data_->time = now;
-  mujoco_->opt.timestep = (next - now) / steps;
-  SetCommands(recording, row, now, next);
-  for (int step = 0; step < steps; ++step) mj_step(mujoco_.get(), data_.get());
+void Simulator::Apply(std::span<const ProbeTorque> probes) {
+  const auto dof_of = [&](const ProbeTorque& probe) { return mujoco_->jnt_dofadr[probe.joint]; };
+  for (const ProbeTorque& probe : probes) data_->qfrc_applied[dof_of(probe)] = 0;
+  damping_.Apply(data_.get());
+  for (const ProbeTorque& probe : probes) data_->qfrc_applied[dof_of(probe)] += Probed(probe);
 }
 
-void Simulator::Drag(const Recording& recording, Window window, const std::function<void(std::size_t row)>& see) {
-  if (!Recall(recording, window)) return;
-  mjModel* m = mujoco_.get();
-  mjData* d = data_.get();
-  const auto& time = recording.time_s;
-  const int integrator = m->opt.integrator;
-  m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
-  for (std::size_t row = window.begin; row < window.end; ++row) {
-    const double before = row > 0 ? time[row] - time[row - 1] : 0;
-    const double after = row + 1 < time.size() ? time[row + 1] - time[row] : before;
-    Follow(recording, row);
-    d->time = time[row];
-    SetMeanCommands(recording, row, time[row] - 0.5 * before, time[row] + 0.5 * after);
-    see(row);
-    if (remembers_ && row + 1 < window.end) DragOn(recording, row, 1);
-  }
-  m->opt.integrator = integrator;
-  for (auto& warning : d->warning) warning.number = 0;
+void Simulator::Step(std::span<const ProbeTorque> probes) {
+  Apply(probes);
+  mj_step(mujoco_.get(), data_.get());
 }
 
 RunResult Simulator::Run(const Recording& recording, Window window, const InitialState& start,
@@ -324,11 +290,13 @@ RunResult Simulator::RunOnce(const Recording& recording, Window window, const In
   const mjModel* m = mujoco_.get();
   mjData* d = data_.get();
   const std::size_t signals = recording.measured.size(), nq = static_cast<std::size_t>(m->nq);
+  if (!plain_) damping_.Hold(mujoco_.get());
   const bool followed = Begin(recording, window, start);
   RunResult result;
   for (std::size_t row = window.begin; row < window.end; ++row) {
     const double now = recording.time_s[row];
     d->time = now;
+    if (damping_.held()) Apply(probes_);
     ComputeSignals(recording, row);
     double* out = predicted.data() + (row - window.begin) * signals;
     for (std::size_t s = 0; s < signals; ++s) out[s] = Read(model_.source(recording.measured[s].index));
@@ -339,7 +307,7 @@ RunResult Simulator::RunOnce(const Recording& recording, Window window, const In
     if (row + 1 == window.end) break;
 
     if (followed) result.steps += static_cast<std::size_t>(StepToNext(recording, row));
-    if (!followed || !IsSane(*m, *d)) {
+    if (!followed || !IsSane()) {
       result.outcome = Outcome::kDiverged;
       result.diverged_at_s = now;
       std::fill(out + signals, predicted.data() + window.rows() * signals, kNaN);
@@ -348,6 +316,7 @@ RunResult Simulator::RunOnce(const Recording& recording, Window window, const In
       break;
     }
   }
+  damping_.Release(mujoco_.get());
   return result;
 }
 
@@ -415,97 +384,6 @@ void Simulator::CompareTurns(const Recording& recording, Window window, std::siz
         known ? LogRotation(Conjugate(ExpRotation(m)) * q) : NearestTurn(LogRotation(q), {p[0], p[1], p[2]});
     for (std::size_t e = 0; e < kTurns; ++e) p[e] = known ? m[e] + turn[e] : turn[e];
   }
-}
-
-double Simulator::Past() const {
-  double past_s = mujoco_->na > 0 && model_.memories().empty() ? kPast.unknown_states_s : kPast.delays_s;
-  if (!apart_.empty()) past_s = std::max(past_s, kPast.transmission_s);
-  for (const int i : model_.memories())
-    past_s = std::max(past_s, std::min(kPast.time_constants * values_[i], kPast.longest_s));
-  return std::max({past_s, latest_s_, native_delay_s_ + kPast.delays_s});
-}
-
-void Simulator::Follow(const Recording& recording, std::size_t row) {
-  for (const auto& measured : recording.measured) {
-    const SignalSource& source = model_.source(measured.index);
-    if (!TraitsOf(source.kind).gives_angle) continue;
-    const LocalFit fit = FitLocally(recording, measured, row, kInitialFitHalfWidth_s);
-    data_->qpos[source.qpos] = fit.value - (source.offset >= 0 ? values_[source.offset] : 0);
-    data_->qvel[source.dof] = fit.slope;
-  }
-  const auto nq = static_cast<std::size_t>(mujoco_->nq), nv = static_cast<std::size_t>(mujoco_->nv);
-  PlaceFreeBodies(model_, recording, row, values_, {data_->qpos, nq}, {data_->qvel, nv});
-}
-
-void Simulator::StandAt(const Recording& recording, std::size_t row) {
-  Follow(recording, row);
-  const mjModel& m = *mujoco_;
-  for (const auto& [joint, of] : model_.mirrored_joints()) {
-    data_->qpos[m.jnt_qposadr[joint]] = data_->qpos[m.jnt_qposadr[of]];
-    data_->qvel[m.jnt_dofadr[joint]] = data_->qvel[m.jnt_dofadr[of]];
-  }
-}
-
-// What was commanded before the log began. A mechanism that stands still at the first stamp had been held there: by no
-// command, where the model accelerates less under none than under the first one (a step at the first stamp; a held
-// weight's first command is what holds it). One that moves was driven by nobody knows what: by the first command.
-void Simulator::FindEarlierCommands(const Recording& recording) {
-  mjModel* m = mujoco_.get();
-  mjData* d = data_.get();
-  const auto& actuators = model_.command_actuators();
-  for (std::size_t c = 0; c < earlier_.size(); ++c) earlier_[c] = recording.commands[c].values.front();
-  bool measured = false, still = true, commanded = false;
-  for (const auto& signal : recording.measured) {
-    if (!TraitsOf(model_.source(signal.index).kind).gives_angle) continue;
-    measured = true;
-    still = still && FitLocally(recording, signal, 0, kInitialFitHalfWidth_s).slope == 0;
-  }
-  for (std::size_t c = 0; c < earlier_.size(); ++c) commanded = commanded || (moves_[c] && earlier_[c] != 0);
-  if (!measured || !still || !commanded) return;
-  const auto acceleration = [&](bool with_first) {
-    StandAt(recording, 0);
-    for (std::size_t c = 0; c < earlier_.size(); ++c)
-      d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
-    mj_forward(m, d);
-    const double norm = mju_norm(d->qacc, static_cast<int>(m->nv));
-    mj_resetData(m, d);
-    return norm;
-  };
-  from_nothing_ = acceleration(false) < kRestShare * acceleration(true);
-  for (std::size_t c = 0; c < earlier_.size(); ++c) {
-    if (from_nothing_ && moves_[c]) earlier_[c] = 0;
-  }
-}
-
-// Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log
-// for a while, so that they hold what the log says and not nothing.
-bool Simulator::PreRoll(const Recording& recording, Window window) {
-  mjModel* m = mujoco_.get();
-  mjData* d = data_.get();
-  if (!remembers_ && apart_.empty()) return true;
-  const double from = recording.time_s[window.begin] - Past();
-  std::size_t first = window.begin;
-  while (first > 0 && recording.time_s[first - 1] >= from) --first;
-  const int integrator = m->opt.integrator;
-  if (apart_.empty()) m->opt.integrator = mjINT_EULER;  // one evaluation a row: the state is the log's anyway
-  if (remembers_ && first == 0 && from_nothing_ && recording.rows() > 1) {
-    StandAt(recording, 0);
-    for (std::size_t c = 0; c < earlier_.size(); ++c) d->ctrl[model_.command_actuators()[c]] = earlier_[c];
-    m->opt.timestep = std::min(max_step_s_, recording.time_s[1] - recording.time_s[0]);
-    d->time = recording.time_s.front() - m->opt.timestep;
-    mj_step(m, d);
-  }
-  bool followed = true;
-  for (std::size_t row = first; row < window.begin && followed; ++row) {
-    // A transmission's motor side is free to move beside the load.
-    row == first ? StandAt(recording, row) : Follow(recording, row);
-    const double interval = recording.time_s[row + 1] - recording.time_s[row];
-    DragOn(recording, row, apart_.empty() ? 1 : StepsOver(interval, max_step_s_));
-    followed = apart_.empty() || !RunsAway(*m, *d);
-  }
-  m->opt.integrator = integrator;
-  for (auto& warning : d->warning) warning.number = 0;
-  return followed;
 }
 
 }  // namespace gapscope

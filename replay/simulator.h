@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "replay/initial_state.h"
+#include "replay/servo_damping.h"
 #include "src/core/mujoco_handles.h"
 #include "src/experiment/recording.h"
 #include "src/model/model.h"
@@ -83,9 +84,16 @@ class Simulator {
   mjData& data() { return *data_; }
 
  private:
-  void ApplyProbe(const ProbeTorque& probe);
+  // What acts beside the model's own forces; a step under it.
+  void Apply(std::span<const ProbeTorque> probes);
+  void Step(std::span<const ProbeTorque> probes);
+  double Probed(const ProbeTorque& probe) const;
   // What went before the window, in all that remembers. False: as PreRoll.
   bool Recall(const Recording& recording, Window window);
+  // Even steps of at most max_step_s, before they are divided.
+  int StepsOver(double interval_s) const;
+  bool RunsAway() const;
+  bool IsSane() const;
   // Each step in so many.
   void DivideSteps(int parts);
   // As Run, without what sensors make of it, and as the steps are divided.
@@ -130,6 +138,8 @@ class Simulator {
   double max_step_s_;
   int parts_ = 1;        // of each step
   bool halves_ = false;  // whole and half steps
+  ServoDamping damping_;
+  bool plain_ = false;  // steps of StepKind::kPlain
   StampShift stamps_;
   std::vector<double> delays_s_;  // per command: how late it acts
   bool late_ = false;             // one of them does not act at its stamp

@@ -82,8 +82,11 @@ FitOptions Workbench::Options(const Model& model, bool train) const {
                      .bounds = *bounds,
                      .huber = 0};
   if (by_windows) options.fold = train ? Fold::kTrain : Fold::kHeldOut;
-  // Two bodies on a stiff link ask for a finer step.
-  if (!model.mirrored_joints().empty()) options.time_step_s = time_step_s / 2;
+  // Two bodies on a stiff link ask for a finer step, and a first-order integrator for no coarser one than the MJCF's.
+  if (!model.mirrored_joints().empty()) {
+    const mjOption& own = model.compiled().opt;
+    options.time_step_s = std::min(time_step_s / 2, own.integrator == mjINT_RK4 ? kInfinity : own.timestep);
+  }
   if (train) options.free = FreeParameters(model);
   return options;
 }

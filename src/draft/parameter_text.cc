@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <set>
 
+#include "src/core/mujoco_handles.h"
 #include "src/draft/yaml_text.h"
 #include "src/experiment/added_actuators.h"
 #include "src/model/element_names.h"
@@ -15,6 +16,18 @@ struct Proposal {
   double nominal, low, high;
   std::string field = "", comment = "";  // an added actuator's parameters set their fields themselves
 };
+
+// What the joint carries, weighed at the distance of its centre of mass: about as much torque as its drive is made for.
+double WeightOn(const mjModel& m, int joint) {
+  const DataPtr data(mj_makeData(&m));
+  mj_kinematics(&m, data.get());
+  mj_comPos(&m, data.get());
+  const int body = m.jnt_bodyid[joint];
+  const double weight = m.body_subtreemass[body] * mju_norm3(m.opt.gravity);
+  return m.jnt_type[joint] == mjJNT_SLIDE
+             ? weight
+             : weight * mju_dist3(data->subtree_com + 3 * body, data->xanchor + 3 * joint);
+}
 
 class Writer {
  public:
@@ -82,8 +95,10 @@ class Writer {
                armature > 0 ? std::max(5 * armature, inertia) : 5 * inertia, field + "armature"});
     if (const double k = m_.jnt_stiffness[joint.joint]; k > 0)
       Propose({name + ".stiffness", unit + per, k, 0.2 * k, 5 * k, field + "stiffness"});
+    // An MJCF's dry friction is often a guess, far below what a gear has.
     if (const double f = m_.dof_frictionloss[dof]; f > 0)
-      Propose({name + ".frictionloss", unit, f, 0, 10 * f, field + "frictionloss"});
+      Propose({name + ".frictionloss", unit, f, 0, std::max(10 * f, WeightOn(m_, joint.joint)),
+               field + "frictionloss"});
   }
 
   void OfActuator(int a) {

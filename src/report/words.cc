@@ -66,16 +66,18 @@ const SignalScore* Worst(const Comparison& comparison) {
 }
 
 std::string TitleOf(const Diagnosis& d, const std::string& found) {
+  const Remainder& left = d.remainder;
+  const char* most = left.systematic > left.explained ? " Most of the misfit no known effect explains." : "";
   switch (d.verdict) {
     case Verdict::kNone:
       return "Nothing is missing: the model explains these logs down to what the sensors can show.";
     case Verdict::kParameters:
       return "No effect is missing: other parameter values close the gap.";
     case Verdict::kEffects:
-      return "The model lacks " + found + ".";
+      return "The model lacks " + found + "." + most;
     case Verdict::kAmbiguous:
       return "The model lacks " + Listed(Collect(SentencesOf(d), [](const Sentence& s) { return s.what; })) +
-             ". These logs cannot tell which, where it says or.";
+             ". These logs cannot tell which, where it says or." + most;
     case Verdict::kUnknown:
       return "Something is missing that no known effect explains.";
   }

@@ -71,6 +71,18 @@ TEST_F(DraftTest, WhatNothingMovesOrMeasuresHasNoParameters) {
   EXPECT_TRUE(std::ranges::any_of(sprung.parameters, of_finger)) << text_;
 }
 
+// 1 kg at 0.2 m of the joint is 1.96 N m.
+TEST_F(DraftTest, DryFrictionHasRoomUpToTheWeight) {
+  const auto most = [&](const std::string& friction) {
+    const Experiment e = Drafted(Bars(kThree, "", "pos='0.2 0 0' frictionloss='" + friction + "'"),
+                                 Columns("target/", "q/", "", kThree));
+    const auto at = std::ranges::find(e.parameters, "hip.frictionloss", &Parameter::name);
+    return at == e.parameters.end() ? 0 : at->high;
+  };
+  EXPECT_NEAR(most("0.1"), 0.2 * 9.81, 1e-5) << text_;
+  EXPECT_NEAR(most("0.5"), 5, 1e-9);
+}
+
 TEST_F(DraftTest, ForeignNamesGoByOrderAndSaySo) {
   const std::vector<std::string> ends = {"Rotation", "Pitch", "Jaw"};
   const Experiment e = Drafted(Bars(kThree), Columns("control/positions/", "positions/", "velocities/", ends));

@@ -53,6 +53,17 @@ TEST(HeadlineTest, OneTitleForEachVerdict) {
   for (const auto& [verdict, title] : titles) EXPECT_EQ(HeadlineOf(MadeDiagnosis(verdict)).title, title);
 }
 
+TEST(HeadlineTest, ASmallFindingIsNoCompleteOne) {
+  for (const Verdict verdict : {Verdict::kEffects, Verdict::kAmbiguous}) {
+    DiagnoseRun run = MadeDiagnosis(verdict);
+    const std::string title = HeadlineOf(run).title;
+    run.diagnosis.remainder = {.explained = 0.02, .systematic = 0.96, .sensors = 0.02};
+    EXPECT_EQ(HeadlineOf(run).title, title + " Most of the misfit no known effect explains.");
+    run.diagnosis.remainder = {.explained = 0.6, .systematic = 0.38, .sensors = 0.02};
+    EXPECT_EQ(HeadlineOf(run).title, title);
+  }
+}
+
 TEST(HeadlineTest, ADiagnosisSaysHowFarTheErrorGoesDown) {
   const Headline headline = HeadlineOf(MadeDiagnosis(Verdict::kEffects));
   EXPECT_EQ(Join(headline.sentences),

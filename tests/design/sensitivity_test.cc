@@ -61,12 +61,13 @@ TEST(ForetoldFitTest, WhatStandsStillIsKnownByItsBounds) {
   EXPECT_NEAR(fit.Deviations({0})[0], gain.high - gain.low, kTolerance * (gain.high - gain.low));
 }
 
-// The cart is linear in its gain: a cart of another gain imitates it to rounding with one Jacobian, where what is known
-// beforehand is little beside the log; a start beyond the bounds is a start.
+// The cart is linear in its gain: a cart of another gain imitates it with one Jacobian, where what is known beforehand
+// is little beside the log; a start beyond the bounds is a start. A few hundred floors of motion have 1e-10 of themselves
+// from Runge-Kutta's steps.
 TEST(ForetoldFitTest, AnotherGainIsImitated) {
   const Cart cart(1);
   const std::vector<double> floors = {kFloor_m};
-  EXPECT_LT(ForetoldFit(cart.With(1.5), {cart.Log(), floors}).Misfit(1), 1e-9);
+  EXPECT_LT(ForetoldFit(cart.With(1.5), {cart.Log(), floors}).Misfit(1), 1e-7);
   const Hypothesis other = cart.With(12);
   const std::vector<double> far = CartMotion(12 - 1.5, 0, 0, cart.command);
   double square = 0;

@@ -12,7 +12,7 @@ namespace gapscope::testing {
 namespace {
 
 const char kCartXml[] = R"(<mujoco>
-  <option timestep="0.004" integrator="Euler" gravity="0 0 0"><flag contact="disable"/></option>
+  <option timestep="0.004" integrator="RK4" gravity="0 0 0"><flag contact="disable"/></option>
   <worldbody><body>
     <joint name="cart" type="slide" axis="1 0 0" stiffness="8"/>
     <inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
@@ -130,11 +130,14 @@ Rig LoadThreeCarts(bool linked, bool speed) {
 }
 
 std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command) {
+  const double rate = std::sqrt(kCartStiffness_n_per_m / kCartMass_kg), sine = std::sin(rate * kCartStep_s),
+               cosine = std::cos(rate * kCartStep_s);
   std::vector<double> q = {q0};
   double v = v0;
   for (std::size_t k = 0; k + 1 < command.size(); ++k) {
-    v += kCartStep_s * (gain * command[k] - kCartStiffness_n_per_m * q.back()) / kCartMass_kg;
-    q.push_back(q.back() + kCartStep_s * v);
+    const double rest = gain * command[k] / kCartStiffness_n_per_m, beside = q.back() - rest;
+    q.push_back(rest + beside * cosine + v / rate * sine);
+    v = v * cosine - beside * rate * sine;
   }
   return q;
 }

@@ -37,8 +37,7 @@ Rig LoadLink();
 // Three such carts side by side, by Runge-Kutta: a, b, c; the second one drags the third along where `linked`.
 // Parameters: CART.gain, CART.damping, free. `speed`: that of b is measured too, and not scored.
 Rig LoadThreeCarts(bool linked, bool speed = false);
-// The cart's positions at the stamps of `command`, by an integrator of the test's own (semi-implicit Euler, as
-// MuJoCo's), without damping.
+// The cart's positions at the stamps of `command`, each held to the next, in closed form, without damping.
 std::vector<double> CartMotion(double gain, double q0, double v0, const std::vector<double>& command);
 
 // A log of `rig` made by its own simulator: `command(t)` on the first actuator at `period_s`, from rest at the initial

@@ -8,9 +8,9 @@
 
 namespace gapscope {
 
-// A plugin's forces are explicit in speed, and an explicit step does not bear a damping that is gone within it. Held, the
-// damping of each servo that a plugin stands for is its joint's, in which steps are implicit, and a torque against it is
-// applied: the motion is the same but for the step's own error.
+// A plugin's forces are explicit in speed, and an explicit step does not bear a damping that is gone within it. Held,
+// the damping of each servo that a plugin stands for is its joint's, in which steps are implicit, and a torque against
+// it is applied: the motion is the same but for the step's own error.
 class ServoDamping {
  public:
   // As the servos of the MJCF have it before effects. By Runge-Kutta, which evaluates forces within a step: none.

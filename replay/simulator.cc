@@ -246,8 +246,7 @@ int Simulator::StepToNext(const Recording& recording, std::size_t row) {
 }
 
 double Simulator::Probed(const ProbeTorque& probe) const {
-  const double q = data_->qpos[mujoco_->jnt_qposadr[probe.joint]],
-               w = data_->qvel[mujoco_->jnt_dofadr[probe.joint]];
+  const double q = data_->qpos[mujoco_->jnt_qposadr[probe.joint]], w = data_->qvel[mujoco_->jnt_dofadr[probe.joint]];
   const double u = probe.actuator >= 0 ? probe.per_command * data_->ctrl[probe.actuator] : 0;
   return probe.amplitude_n_m * std::sin(probe.per_rad * q + probe.s_per_rad * w + u + probe.phase_rad);
 }

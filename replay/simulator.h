@@ -35,8 +35,8 @@ enum class StepKind {
   kOwn,    // exact to second order at least. Where the integrator is of first order, it makes whole and half steps, and
            // twice the motion by halves less that by whole ones is without that order's error (Richardson). Euler's is
            // the implicit one then, which nears the same motion, and bears a stiff servo's damping.
-  kQuick,  // a third of that work, for differences of motions that are both made so (Model::HasQuickSteps): semi-implicit
-           // Euler in place of Runge-Kutta, whole steps alone
+  kQuick,  // a third of that work, for differences of motions that are both made so (Model::HasQuickSteps):
+           // semi-implicit Euler in place of Runge-Kutta, whole steps alone
   kPlain,  // as the integrator makes it: what an engine does with the model
 };
 

@@ -24,9 +24,8 @@ double WeightOn(const mjModel& m, int joint) {
   mj_comPos(&m, data.get());
   const int body = m.jnt_bodyid[joint];
   const double weight = m.body_subtreemass[body] * mju_norm3(m.opt.gravity);
-  return m.jnt_type[joint] == mjJNT_SLIDE
-             ? weight
-             : weight * mju_dist3(data->subtree_com + 3 * body, data->xanchor + 3 * joint);
+  return m.jnt_type[joint] == mjJNT_SLIDE ? weight
+                                          : weight * mju_dist3(data->subtree_com + 3 * body, data->xanchor + 3 * joint);
 }
 
 class Writer {
@@ -97,8 +96,8 @@ class Writer {
       Propose({name + ".stiffness", unit + per, k, 0.2 * k, 5 * k, field + "stiffness"});
     // An MJCF's dry friction is often a guess, far below what a gear has.
     if (const double f = m_.dof_frictionloss[dof]; f > 0)
-      Propose({name + ".frictionloss", unit, f, 0, std::max(10 * f, WeightOn(m_, joint.joint)),
-               field + "frictionloss"});
+      Propose(
+          {name + ".frictionloss", unit, f, 0, std::max(10 * f, WeightOn(m_, joint.joint)), field + "frictionloss"});
   }
 
   void OfActuator(int a) {

@@ -97,8 +97,8 @@ class Model {
   const std::vector<FreeStart>& held_starts() const { return held_starts_; }
   // Whether its bodies could touch each other.
   bool MayCollide() const;
-  // Whether quick steps (StepKind) are another thing than its own: by Runge-Kutta two bodies on a stiff link always take
-  // their own.
+  // Whether quick steps (StepKind) are another thing than its own: by Runge-Kutta two bodies on a stiff link always
+  // take their own.
   bool HasQuickSteps() const { return compiled().opt.integrator != mjINT_RK4 || mirrored_.empty(); }
 
   // The tuned MJCF with its plugin elements: loads in any MuJoCo with the plugin library. `values` as Nominal(),

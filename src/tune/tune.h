@@ -23,7 +23,7 @@ struct TuneOptions {
   double huber = 4;        // see FitOptions
   double time_step_s = 0;  // 0: chosen
   StepKind steps = StepKind::kOwn;
-  int starts = 2;          // the given values, then random ones inside the bounds
+  int starts = 2;  // the given values, then random ones inside the bounds
   SolveOptions solve;
   std::string journal;  // file; empty: none
   bool resume = false;

@@ -62,8 +62,8 @@ TEST(ForetoldFitTest, WhatStandsStillIsKnownByItsBounds) {
 }
 
 // The cart is linear in its gain: a cart of another gain imitates it with one Jacobian, where what is known beforehand
-// is little beside the log; a start beyond the bounds is a start. A few hundred floors of motion have 1e-10 of themselves
-// from Runge-Kutta's steps.
+// is little beside the log; a start beyond the bounds is a start. A few hundred floors of motion have 1e-10 of
+// themselves from Runge-Kutta's steps.
 TEST(ForetoldFitTest, AnotherGainIsImitated) {
   const Cart cart(1);
   const std::vector<double> floors = {kFloor_m};

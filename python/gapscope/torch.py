@@ -133,6 +133,46 @@ def winding(voltage: Tensor, speed: Tensor, kt: Value, ke: Value, resistance: Va
     return gear * kt * (voltage - ke * gear * speed) / resistance
 
 
+def duty_torque(
+    error: Tensor,
+    seen_speed: Tensor,
+    speed: Tensor,
+    duty_gain: Value,
+    kt: Value,
+    ke: Value,
+    resistance: Value,
+    supply_v: Value,
+    duty_damping: Value = 0.0,
+    duty_limit: Value = 1.0,
+    gear: Value = 1.0,
+) -> Tensor:
+    """The torque of a servo that sets its duty cycle by its ``error``, rad: N m, shape (envs, joints), as `winding`.
+
+    The duty is ``duty_gain`` error - ``duty_damping`` speed within +-``duty_limit``, 1/rad and s/rad, of ``supply_v``.
+    Its damping is by ``seen_speed``, which may be late; the winding's back-EMF is by ``speed``, both in rad/s.
+    """
+    duty = duty_gain * error - duty_damping * seen_speed
+    limit = _like(duty_limit, duty)
+    return winding(torch.clamp(duty, min=-limit, max=limit) * supply_v, speed, kt, ke, resistance, gear)
+
+
+def gear_friction(
+    torque: Tensor,
+    speed: Tensor,
+    slope_n_m_s_per_rad: Value,
+    load_coefficient: Value = 0.0,
+    hump_n_m: Value = 0.0,
+    hump_speed_rad_per_s: Value = 0.05,
+) -> Tensor:
+    """Friction by load and its hump at low speed, for a simulator whose own has neither: N m, shape (envs, joints).
+
+    Its level is that of `dry_level`: ``load_coefficient`` times ``torque``, and a hump that ends at about
+    ``hump_speed_rad_per_s``. At a speed below level / slope it is damping by the slope: it creeps where friction holds.
+    """
+    level = dry_level(speed, 0.0, hump_n_m, hump_speed_rad_per_s, load_n_m=torque, load_coefficient=load_coefficient)
+    return torch.clamp(slope_n_m_s_per_rad * speed, min=-level, max=level)
+
+
 def dry_level(
     speed: Tensor,
     coulomb_n_m: Value,
@@ -210,16 +250,18 @@ class Drive:
     """A servo as gapscope.motor has it: its parameters, all neutral at their defaults, and its state.
 
     Its torque is ``gain`` command - ``kp`` angle - ``kd`` speed + ``bias_n_m``, before its stages; without ``gain``,
-    kp. Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command
-    are in its unit, the others in N m, rad and s. As MuJoCo's actuators, the drive is ``gear`` away from the joint. Its
-    command stays within ``command_low`` and ``command_high``, and what leaves it within ``force_limit_n_m``.
-    `max_delay_s` bounds both delays together. `spring` and `stop` are arguments of `spring_torque` and `stop_torque`,
-    whose torques come on top. `step` is called once a time step, under an integrator that evaluates forces once (not
-    RK4). The state is made by the first `step`; `reset` takes it from environments.
+    kp. With `duty`, arguments of `duty_torque`, it is that of a servo by its duty cycle, whose supply sags too.
+    Parameters are named as the plugin's and broadcast to (envs, joints); of limits 0 is none. Those of the command are
+    in its unit, the others in N m, rad and s. As MuJoCo's actuators, the drive is ``gear`` away from the joint. Its
+    command stays within ``command_low`` and ``command_high``, and what leaves it within ``force_limit_n_m``. Before
+    that `friction`, arguments of `gear_friction`, is taken off. `max_delay_s` bounds both delays together. `spring` and
+    `stop` are arguments of `spring_torque` and `stop_torque`, whose torques come on top. `step` is called once a time
+    step, under an integrator that evaluates forces once (not RK4). The state is made by the first `step`; `reset` takes
+    it from environments.
     """
 
     step_s: float
-    kp: Value
+    kp: Value = 0.0
     kd: Value = 0.0
     gain: Value = None
     bias_n_m: Value = 0.0
@@ -252,11 +294,14 @@ class Drive:
     efficiency_drive: Value = 1.0
     efficiency_backdrive: Value = 1.0
     force_limit_n_m: Value = 0.0
+    duty: dict[str, Value] | None = None
+    friction: dict[str, Value] | None = None
     spring: dict[str, Value] | None = None
     stop: dict[str, Value] | None = None
 
     def __post_init__(self) -> None:
-        self.spring, self.stop = dict(self.spring or {}), dict(self.stop or {})
+        for group in ("duty", "friction", "spring", "stop"):
+            setattr(self, group, dict(getattr(self, group) or {}))
         self._fresh: Tensor = None  # of shape (envs,): the next step is the first one
         self._past: list[Tensor] = []  # commands, angles, speeds and feed-forward torques
         self._lags: dict[str, Tensor] = {}  # states, by the names of their time constants
@@ -306,19 +351,23 @@ class Drive:
         """As `step`, of the drive alone: what it gives before its gear, by the motion that it sees."""
         target = torch.clamp(target, min=_like(self.command_low, target), max=_like(self.command_high, target))
         self._begin(target, angle, speed, torch.zeros_like(angle) if feed_forward is None else feed_forward)
-        request = self._request(angle, speed)
-        fresh = self._fresh[:, None]
-        self._sag = torch.where(fresh, self._resting_sag(request, speed), self._sag)
+        seen = self._seen(angle)
+        request = self._request(seen, speed, 1.0)
+        self._sag = torch.where(self._fresh[:, None], self._resting_sag(request, speed), self._sag)
+        ceiling = 1 - self.sag_fraction * self._sag
+        request = self._request(seen, speed, ceiling) if self.duty else request
         torque = self._lagged("second_time_constant_s", self._lagged("time_constant_s", request))
         self._fresh = torch.zeros_like(self._fresh)
         torque = dead_zone(torque, self.dead_zone)
         limit = self.limit(torque, speed)
-        torque = soft_limit(torque, limit * (1 - self.sag_fraction * self._sag), self.limit_softness)
-        self._sag = lag_next(self._sag, _load(torque, limit), self.sag_time_constant_s, self.step_s)
+        torque = soft_limit(torque, limit * ceiling, self.limit_softness)
+        self._sag = lag_next(self._sag, self._load(torque, limit), self.sag_time_constant_s, self.step_s)
         torque = droop(torque, self.droop_at_peak, self.droop_reference_n_m, self.droop_exponent)
         torque = efficiency(
             by_direction(torque, self.asymmetry), speed, self.efficiency_drive, self.efficiency_backdrive
         )
+        if self.friction:
+            torque = torque - gear_friction(torque, speed, **self.friction)
         most = _like(self.force_limit_n_m, torque)
         return soft_limit(torque, torch.where(most > 0, most, math.inf), 0.0)
 
@@ -334,15 +383,22 @@ class Drive:
             shifted = torch.cat([now[i][None], self._past[i][:-1]])
             self._past[i] = torch.where(self._fresh[None, :, None], before.expand_as(shifted), shifted)
 
-    def _request(self, angle: Tensor, speed: Tensor) -> Tensor:
-        """What the servo wants before its stages: of a late command, and of a motion that it sees late."""
+    def _seen(self, angle: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """What the servo's computer has: a late command, angle and speed, and the feed-forward torque."""
         delay = _like(self.command_delay_s, angle) + self.torque_delay_s
         command = self._lagged("command_time_constant_s", late_command(self._past[0], delay, self.step_s))
         command = by_direction(dead_zone(command, self.command_dead_zone), self.command_asymmetry)
-        angle, speed = late_motion(self._past[1], self._past[2], self.torque_delay_s, self.step_s)
+        motion = late_motion(self._past[1], self._past[2], self.torque_delay_s, self.step_s)
+        return command, *motion, late_command(self._past[3], delay, self.step_s)
+
+    def _request(self, seen: tuple[Tensor, ...], speed: Tensor, supply: Value) -> Tensor:
+        """What the servo wants before its stages, by `_seen`; ``supply`` is the share of its volts that is left."""
+        command, angle, seen_speed, beside = seen
+        if self.duty:
+            volts = {"supply_v": supply * self.duty["supply_v"]}
+            return duty_torque(command - angle, seen_speed, speed, **{**self.duty, **volts}) + beside
         gain = self.kp if self.gain is None else self.gain
-        torque = gain * command - self.kp * angle - self.kd * speed + self.bias_n_m
-        return torque + late_command(self._past[3], delay, self.step_s)
+        return gain * command - self.kp * angle - self.kd * seen_speed + self.bias_n_m + beside
 
     def _lagged(self, name: str, request: Tensor) -> Tensor:
         """The lag's output in this step; its state goes on."""
@@ -352,10 +408,14 @@ class Drive:
         return lag_output(state, request, constant, self.step_s)
 
     def _resting_sag(self, request: Tensor, speed: Tensor) -> Tensor:
-        return torch.minimum(_load(request, self.limit(request, speed)), 1 / (1 + _like(self.sag_fraction, request)))
+        load = self._load(request, self.limit(request, speed))
+        return torch.minimum(load, 1 / (1 + _like(self.sag_fraction, request)))
 
-
-def _load(torque: Tensor, limit: Tensor) -> Tensor:
-    """The torque as a share of its limit, 0 .. 1; 0 where there is none."""
-    there = (limit > 0) & ~torch.isinf(limit)
-    return torch.where(there, torch.clamp(torque.abs() / torch.where(there, limit, 1.0), max=1), 0.0)
+    def _load(self, torque: Tensor, limit: Tensor) -> Tensor:
+        """The torque as a share of its limit, else of a duty's stall torque, 0 .. 1; 0 where there is neither."""
+        stall = _like(0.0, torque)
+        if self.duty:
+            volts = self.duty.get("duty_limit", 1.0) * self.duty["supply_v"]
+            stall = winding(volts, stall, self.duty["kt"], 0.0, self.duty["resistance"], self.duty.get("gear", 1.0))
+        ceiling = torch.where(torch.isinf(limit), stall.abs(), limit)
+        return torch.where(ceiling > 0, torch.clamp(torque.abs() / torch.where(ceiling > 0, ceiling, 1.0), max=1), 0.0)

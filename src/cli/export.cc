@@ -32,7 +32,7 @@ struct ExportFlags {
   std::string Path(const std::string& file) const { return (std::filesystem::path(common.out) / file).string(); }
 };
 
-Status Measure(const Model& model, const std::vector<double>& values, ExportRun* run, ThreadPool& pool) {
+Status Measure(const TargetInput& input, ExportRun* run, ThreadPool& pool) {
   std::error_code failed;
   for (const std::string& log : run->logs) {
     if (!std::filesystem::exists(log, failed)) {
@@ -44,16 +44,9 @@ Status Measure(const Model& model, const std::vector<double>& values, ExportRun*
     run->unmeasured = "the result names no logs";
     return Ok();
   }
-  GS_ASSIGN(const auto recordings, LoadRecordings(model.experiment(), run->logs, pool));
-  const bool mjcf = TargetOf(run->target).mjcf;
-  ExportedFile file{.path = mjcf ? run->out : "", .host = {}, .delays_s = {}, .sent = run->sent};
-  for (const auto& [drive, steps] : run->delay_steps) file.delays_s[drive] = steps * run->time_step_s;
-  for (const NativeEffect& effect : run->effects) {
-    const bool beside = mjcf ? effect.fidelity == Fidelity::kHost : effect.fidelity != Fidelity::kDropped;
-    // The plugin stands in for a law beside the MJCF, as it was stepped beside it (tests/python/test_torch.py).
-    if ((beside && !effect.by_sender) || effect.by_law) file.host.push_back(effect.use);
-  }
-  GS_ASSIGN(run->errors, MeasureFidelity(model, values, file, recordings, pool));
+  GS_ASSIGN(const auto recordings, LoadRecordings(input.model.experiment(), run->logs, pool));
+  const ExportedFile file = FileOf(input.exported, TargetOf(run->target).mjcf ? run->out : "");
+  GS_ASSIGN(run->errors, MeasureFidelity(input.model, input.values, file, recordings, pool));
   return Ok();
 }
 
@@ -139,15 +132,14 @@ Result<int> RunExport(const ExportFlags& flags) {
     GS_ASSIGN(run.randomization,
               Randomize(model, uncertain.values, uncertain.parameters, make, run.draws, flags.common.seed));
   }
-  GS_RETURN_IF_ERROR(WriteFiles(flags,
-                                {.model = model,
-                                 .values = loaded.values,
-                                 .exported = exported,
-                                 .randomization = run.draws > 0 ? &run.randomization : nullptr,
-                                 .mjcf = "model.xml"},
-                                &run));
+  const TargetInput input{.model = model,
+                          .values = loaded.values,
+                          .exported = exported,
+                          .randomization = run.draws > 0 ? &run.randomization : nullptr,
+                          .mjcf = "model.xml"};
+  GS_RETURN_IF_ERROR(WriteFiles(flags, input, &run));
   ThreadPool pool(WorkersOf(flags.common));
-  GS_RETURN_IF_ERROR(Measure(model, loaded.values, &run, pool));
+  GS_RETURN_IF_ERROR(Measure(input, &run, pool));
   const std::string text = JsonText(ToJson(run));
   GS_RETURN_IF_ERROR(WriteFile(flags.Path("fidelity.json"), text));
   Print(stdout, "{}", flags.common.json ? text : ToTable(run));

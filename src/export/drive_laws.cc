@@ -47,7 +47,9 @@ double MostDelay_s(const TargetInput& input, const std::string& drive) {
 std::vector<LawArgument> LawArguments(const ExportedModel& exported) {
   std::vector<LawArgument> arguments;
   for (const auto& [drive, law] : exported.laws) {
-    for (const auto& [name, value] : law) arguments.push_back({drive, name, arguments.size(), value});
+    for (const auto& [name, value] : law) {
+      if (name != kFrictionSlope) arguments.push_back({drive, name, arguments.size(), value});
+    }
   }
   return arguments;
 }

@@ -9,7 +9,7 @@
 
 namespace gapscope {
 
-// One argument of a drive's law, and its row in kLaws.
+// One argument of a drive's law that may vary, and its row in kLaws.
 struct LawArgument {
   std::string drive, name;
   std::size_t row = 0;

@@ -1,6 +1,7 @@
 #include "src/export/fidelity.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "src/experiment/expression.h"
 #include "src/tune/tune.h"
@@ -43,6 +44,24 @@ std::vector<Recording> Sent(std::vector<Recording> logs, const std::map<std::str
 
 }  // namespace
 
+ExportedFile FileOf(const ExportedModel& exported, const std::string& path) {
+  ExportedFile file{.path = path, .host = {}, .delays_s = {}, .sent = exported.sent};
+  for (const auto& [drive, steps] : exported.delay_steps) file.delays_s[drive] = steps * exported.spec->option.timestep;
+  for (const NativeEffect& effect : exported.native) {
+    const bool beside =
+        path.empty() ? effect.fidelity != Fidelity::kDropped : effect.fidelity == Fidelity::kHost && !effect.by_sender;
+    // The plugin stands in for a law beside the MJCF, as it was stepped beside it (tests/python/test_torch.py).
+    if (beside || effect.by_law) file.host.push_back(effect.use);
+  }
+  constexpr std::string_view kGroup = "friction.";
+  for (const auto& [drive, law] : exported.laws) {
+    for (const auto& [argument, number] : law) {
+      if (argument.starts_with(kGroup)) file.friction[drive]["friction_" + argument.substr(kGroup.size())] = number;
+    }
+  }
+  return file;
+}
+
 double FidelityErrors::Lost() const {
   return nominal > model ? std::max(0.0, (exported - model) / (nominal - model)) : kNaN;
 }
@@ -64,7 +83,7 @@ Result<FidelityErrors> MeasureFidelity(const Model& model, std::span<const doubl
     beside.push_back(delay_of(drive));
     late[beside.back().Text() + ".delay_s"] = delay_s;
   }
-  GS_ASSIGN(const auto exported, Model::Build(std::move(rig), beside, {}));
+  GS_ASSIGN(const auto exported, Model::Build(std::move(rig), beside, {}, Contacts::kAsTheMjcf, file.friction));
   std::vector<double> of_exported = exported->Nominal();
   for (std::size_t i = 0; i < of_exported.size(); ++i) {
     const std::string& name = exported->parameters()[i].name;

@@ -27,9 +27,12 @@ struct FidelityErrors {
 struct ExportedFile {
   std::string path;  // empty: the rig's own model, with the effects of `host`
   std::vector<EffectUse> host;
-  std::map<std::string, double> delays_s;        // by drive
-  std::map<std::string, SentCommand> sent = {};  // by drive, what is sent for the log's commands
+  std::map<std::string, double> delays_s;         // by drive
+  std::map<std::string, SentCommand> sent = {};   // by drive, what is sent for the log's commands
+  std::map<std::string, DriveLaw> friction = {};  // by drive, what its law has of friction, by keys of gapscope.motor
 };
+// That of an exported model, at `path`; empty: as above.
+ExportedFile FileOf(const ExportedModel& exported, const std::string& path);
 
 // The file is read back as any program would, and driven by the experiment's commands. Errors: it does not load; a
 // signal or a command of the experiment is not in it.

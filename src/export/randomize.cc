@@ -11,8 +11,10 @@
 #include <string_view>
 #include <type_traits>
 
+#include "src/core/collect.h"
 #include "src/core/dense.h"
 #include "src/core/statistics.h"
+#include "src/export/drive_laws.h"
 #include "src/fit/covariance.h"
 
 namespace gapscope {
@@ -106,9 +108,7 @@ Result<Compiled> CompileWith(const MakeExport& make, std::span<const double> val
   GS_ASSIGN(ExportedModel exported, make(values));
   Compiled compiled{.model = std::move(exported.compiled)};
   for (const auto& [drive, steps] : exported.delay_steps) compiled.delay_steps.push_back(steps);
-  for (const auto& [drive, law] : exported.laws) {
-    for (const auto& [argument, number] : law) compiled.laws.push_back(number);
-  }
+  compiled.laws = Collect(LawArguments(exported), &LawArgument::value);
   compiled.arrays = ArraysOf(*compiled.model, compiled.delay_steps, compiled.laws);
   return compiled;
 }

@@ -54,17 +54,12 @@ void MakeRoomForDigits(mjsBody* body) {
 }
 
 // Whether a body's frame is its inertia's decides what MuJoCo compiles: inertias that move go into the spec itself.
-// False as ParameterWriter::Write.
-bool BakeInertias(const Model& model, std::span<const double> values, const std::map<std::string, double>& log_values,
-                  Structure* structure, ExportedModel* result) {
-  const ModelPtr written(mj_copyModel(nullptr, &model.compiled()));
-  const DataPtr scratch(mj_makeData(written.get()));
-  const bool good = ParameterWriter(model, written.get(), scratch.get()).Write(values, log_values);
+void BakeInertias(const Model& model, const mjModel& written, Structure* structure, ExportedModel* result) {
   std::erase_if(structure->settings, [&](const FieldSetting& setting) {
     mjsBody* body = BodyOfInertia(*structure->spec, setting.field);
     if (!body) return false;
-    const int id = mj_name2id(written.get(), mjOBJ_BODY, ElementOfField(setting.field).c_str());
-    const BodyInertia before = InertiaOf(model.compiled(), id), after = InertiaOf(*written, id);
+    const int id = mj_name2id(&written, mjOBJ_BODY, ElementOfField(setting.field).c_str());
+    const BodyInertia before = InertiaOf(model.compiled(), id), after = InertiaOf(written, id);
     if (setting.field.ends_with("/ipos")) {  // mass and moments may be settings too, of a log that is not here
       BodyInertia moved = before;
       moved.centre_m = after.centre_m;
@@ -76,7 +71,6 @@ bool BakeInertias(const Model& model, std::span<const double> values, const std:
         {setting.field, Read(setting.expressions, Collect(model.parameters(), &Parameter::name))});
     return true;
   });
-  return good;
 }
 
 // An MJCF that holds a robot alone has no sky: what is dark would be drawn on black.
@@ -167,6 +161,14 @@ Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const do
     const auto value = EvaluateOnce(expression, numbers, "export");
     return value.ok() ? value.value() : kNaN;
   };
+  const std::map<std::string, double> none;
+  const ModelPtr written(mj_copyModel(nullptr, compiled_.get()));
+  const DataPtr scratch(mj_makeData(written.get()));
+  const bool good = ParameterWriter(*this, written.get(), scratch.get()).Write(values, log_values ? *log_values : none);
+  structure.inertia_of = [&](const std::string& joint) {
+    const int id = mj_name2id(written.get(), mjOBJ_JOINT, joint.c_str());
+    return id < 0 ? kNaN : 1 / written->dof_invweight0[written->jnt_dofadr[id]];
+  };
   for (const auto& use : effects_) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
   GS_RETURN_IF_ERROR(structure.Finish());
   ExportedModel result;
@@ -178,8 +180,7 @@ Result<ExportedModel> Model::ExportFrom(Structure& structure, std::span<const do
       return depends;
     });
   }
-  const std::map<std::string, double> none;
-  const bool good = BakeInertias(*this, values, log_values ? *log_values : none, &structure, &result);
+  BakeInertias(*this, *written, &structure, &result);
   Model exported;
   exported.rig_ = rig_;
   GS_RETURN_IF_ERROR(exported.Compile(&structure));

@@ -81,13 +81,17 @@ Result<std::shared_ptr<const Model>> Model::Load(const Experiment& experiment) {
 }
 
 Result<std::shared_ptr<const Model>> Model::Build(std::shared_ptr<const Rig> rig, const std::vector<EffectUse>& effects,
-                                                  const ScaleTable& scales, Contacts contacts) {
+                                                  const ScaleTable& scales, Contacts contacts,
+                                                  const std::map<std::string, DriveLaw>& drives) {
   std::shared_ptr<Model> model(new Model);
   model->rig_ = std::move(rig);
   model->effects_ = effects;
   Structure structure(*model->rig_);
   GS_RETURN_IF_ERROR(CheckTogether(effects, *model->rig_));
   for (const auto& use : effects) GS_RETURN_IF_ERROR(ApplyEffect(structure, use, scales));
+  for (const auto& [drive, numbers] : drives) {
+    for (const auto& [key, number] : numbers) GS_RETURN_IF_ERROR(structure.AddMotorTerm(drive, key, ExactText(number)));
+  }
   GS_RETURN_IF_ERROR(structure.Finish());
   GiveRoomToDelays(structure.spec.get());
   LeaveOutPictures(structure.spec.get());

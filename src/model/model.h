@@ -56,12 +56,14 @@ enum class Contacts { kAsTheMjcf, kNone };
 
 class Model {
  public:
-  // The rig with effects added. Errors: a name in the experiment that the MJCF lacks (file:line and the nearest),
-  // effects that do not go together, an expression that does not parse, a model that does not compile.
+  // The rig with effects added, and numbers of gapscope.motor that drives have beside them. Errors: a name in the
+  // experiment that the MJCF lacks (file:line and the nearest), effects that do not go together, an expression that
+  // does not parse, a model that does not compile.
   static Result<std::shared_ptr<const Model>> Build(std::shared_ptr<const Rig> rig,
                                                     const std::vector<EffectUse>& effects = {},
                                                     const ScaleTable& scales = {},
-                                                    Contacts contacts = Contacts::kAsTheMjcf);
+                                                    Contacts contacts = Contacts::kAsTheMjcf,
+                                                    const std::map<std::string, DriveLaw>& drives = {});
   // The experiment's model as it stands: of a rig of its own. Errors: as Rig::Load and Build.
   static Result<std::shared_ptr<const Model>> Load(const Experiment& experiment);
 

@@ -53,8 +53,11 @@ struct SentCommand {
   double Of(double command) const;
 };
 
-// The arguments of gapscope.torch's Drive, by name; with "spring." or "stop." before it, of its parameter of that name.
+// The arguments of gapscope.torch's Drive, by name; with "friction.", "spring." or "stop." before it, of
+// its parameter of that name.
 using DriveLaw = std::map<std::string, double>;
+// Of those of its friction the one that is the time step's, not the mechanism's.
+inline constexpr char kFrictionSlope[] = "friction.slope_n_m_s_per_rad";
 
 }  // namespace gapscope
 

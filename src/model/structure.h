@@ -82,6 +82,8 @@ class Structure {
   Form form = Form::kReplay;
   const EffectUse* entering = nullptr;                 // whose terms are being added
   std::function<double(const std::string&)> value_of;  // of a form that is written: numbers of expressions
+  // Of kNative: a joint's inertia where it starts, all others free, kg m2.
+  std::function<double(const std::string&)> inertia_of;
   // Of kNative: what the engine has, and what became of the effects that added terms.
   NativeFeatures features;
   std::vector<NativeEffect> told;
@@ -140,6 +142,7 @@ class Structure {
   bool SpringsByLaw() const { return features.drive_laws && features.passive_motors == PassiveMotors::kHost; }
   bool TakesLaw(const std::string& joint) const;
   void NativeLaw(const std::string& joint);
+  void NativeLawFriction(const std::string& joint, DriveLaw* law);
   void TellLaw(const std::string& group, const std::string& joint, const std::string& key);
   // A number in the place of what the experiment or the MJCF says of a field.
   void Put(const std::string& field, double number);

@@ -33,6 +33,8 @@ std::string SpringArgument(const std::string& key) {
   return other == kOthers.end() ? "spring." + key : other->second;
 }
 
+constexpr double kShareOfStop = 0.5;  // of the speed that a law's friction may take away in a step
+
 std::string Term(const std::string& group, const std::string& place, const std::string& key) {
   return fmt::format("{}/{}/{}", group, place, key);
 }
@@ -237,6 +239,9 @@ Status Structure::NativeFriction(const std::string& joint, const Terms& terms) {
   for (const char* key : {"friction_positive_n_m", "friction_negative_n_m"})
     tell(key, both ? Fidelity::kExact : Fidelity::kApproximated,
          both ? "dry friction of the mean, and a constant torque" : "dry friction of the mean");
+  const auto drive = ActuatorsOn(joint);
+  const auto law = drive.empty() ? laws.end() : laws.find(mjs_getString(mjs_getName(drive.front()->element)));
+  if (law != laws.end() && law->second.contains(kFrictionSlope)) return Ok();
   tell("breakaway_n_m", Fidelity::kApproximated, "dry friction of its level at speed: it breaks away at that");
   tell("load_coefficient", Fidelity::kDropped, "friction in proportion to a load has no native form");
   return Ok();
@@ -388,6 +393,7 @@ void Structure::NativeLaw(const std::string& joint) {
   }
   if (Limited(input.ctrllimited, input.ctrlrange))
     law["command_low"] = input.ctrlrange[0], law["command_high"] = input.ctrlrange[1];
+  NativeLawFriction(joint, &law);
   const auto spring = spring_.find(joint);
   if (!SpringsByLaw() || spring == spring_.end()) return;
   for (const auto& [key, expression] : spring->second) {
@@ -396,6 +402,36 @@ void Structure::NativeLaw(const std::string& joint) {
   }
   if (const mjsJoint* element = FindJoint(joint); law.contains("stop.stop_rad"))
     law["stop.middle_rad"] = 0.5 * (element->range[0] + element->range[1]);
+}
+
+// Friction that the engine's solver lacks, of a drive that has a law anyway: for it alone the gains would be explicit,
+// which costs more than it brings. Sliding, it is the plugin's. Where that holds, the law is damping, so steep that it
+// takes a share of the speed away in a step.
+void Structure::NativeLawFriction(const std::string& joint, DriveLaw* law) {
+  const auto friction = friction_.find(joint);
+  if (friction == friction_.end()) return;
+  const Terms& terms = friction->second;
+  const double gear = std::abs(ActuatorsOn(joint).front()->gear[0]),
+               slope = kShareOfStop * inertia_of(joint) / spec->option.timestep;
+  if (!terms.contains("load_coefficient") && !terms.contains("breakaway_n_m")) return;
+  if (!(slope > 0)) return;  // a log says the inertia
+  const auto told_as = [&](const char* key, const char* what) {
+    Tell(kFrictionTerms, joint, key, Fidelity::kApproximated,
+         fmt::format("{} by the drive's law in PyTorch, which creeps where it should hold: damping of {:.3g} N m s/rad",
+                     what, slope));
+  };
+  (*law)[kFrictionSlope] = slope / (gear * gear);
+  if (terms.contains("load_coefficient")) {
+    (*law)["friction.load_coefficient"] = ValueIn(terms, "load_coefficient");
+    told_as("load_coefficient", "dry friction in proportion to the drive's torque");
+  }
+  if (terms.contains("breakaway_n_m")) {
+    const double level =
+        ValueIn(terms, "friction_n_m") + ValueOf("joint/" + joint + "/frictionloss", FindJoint(joint)->frictionloss);
+    (*law)["friction.hump_n_m"] = std::max(0.0, ValueIn(terms, "breakaway_n_m") - level) / gear;
+    (*law)["friction.hump_speed_rad_per_s"] = gear * ValueIn(terms, "stribeck_speed_rad_per_s");
+    told_as("breakaway_n_m", "the hump of dry friction");
+  }
 }
 
 // The command passes an activation. Feedback does not: it is late by other gains, for alone the command's lag would be

@@ -86,6 +86,11 @@ TEST_P(MotorStaticTest, TorqueIsTheFormula) {
 }
 
 const Attributes kTorqueLaw = {{"law", "torque"}};
+const Attributes kGearFriction = {{"friction_slope_n_m_s_per_rad", "10"},
+                                  {"friction_load_coefficient", "0.2"},
+                                  {"friction_hump_n_m", "0.5"},
+                                  {"friction_hump_speed_rad_per_s", "1"}};
+
 Attributes Torque(Attributes more) {
   more["law"] = "torque";
   return more;
@@ -213,6 +218,8 @@ INSTANTIATE_TEST_SUITE_P(
              3 * 0.6 * 1.2},
         Case{"driving", Torque({{"efficiency_drive", "0.7"}, {"efficiency_backdrive", "0.4"}}), {2}, 0, 3, 1.4},
         Case{"driven back", Torque({{"efficiency_drive", "0.7"}, {"efficiency_backdrive", "0.4"}}), {2}, 0, -3, 0.8},
+        Case{"gear friction that slides", Torque(kGearFriction), {2}, 0, -1, 2 + 0.2 * 2 + 0.5 * std::exp(-1)},
+        Case{"gear friction that creeps", Torque(kGearFriction), {2}, 0, 0.01, 2 - 10 * 0.01},
         Case{"limit before droop before asymmetry",
              Torque({{"torque_limit_n_m", "2"},
                      {"droop_at_peak", "0.5"},

@@ -148,6 +148,36 @@ def test_laws_that_mujoco_lacks_are_pytorchs(joint: tuple[str, str], mjlab: Path
         assert off < 1e-6 if left_out is None else off > 1e-4, (left_out, off)
 
 
+def test_a_law_takes_friction_that_the_solver_lacks(joint: tuple[str, str], mjlab: Path, tmp_path: Path) -> None:
+    values = {
+        "torque_delay@motor.delay_s": 0.0043,
+        "load_friction@joint.coefficient": 0.2,
+        "stribeck_friction@joint.friction_n_m": 2,
+        "stribeck_friction@joint.breakaway_n_m": 6,
+        "stribeck_friction@joint.stribeck_speed_rad_per_s": 0.5,
+    }
+    effects = list(dict.fromkeys(name.partition(".")[0] for name in values))
+    lost = gs.replay(*joint, with_=effects, set=values).export("mjlab", tmp_path / "to", timestep=STEP_S)
+    assert {e.name: e.form for e in lost.effects} == {
+        "torque_delay": "exact",
+        "load_friction": "approximated",
+        "stribeck_friction": "approximated",
+    }
+    np.save(tmp_path / "commands.npy", commands := np.array([target(t) for t in STEP_S * np.arange(8000)]))
+    run(mjlab, "law.py", tmp_path / "to", tmp_path / "commands.npy", tmp_path / "moved.npz", beside=packages("torch"))
+    moved = np.load(tmp_path / "moved.npz")["angles"][0, :, 0]
+
+    def off(law: str, without: tuple[str, ...]) -> float:
+        left = {name: 0 if name in without else value for name, value in values.items()}
+        result = gs.replay(*joint, with_=effects, set=left)
+        model = Path(result.export("mujoco", tmp_path / law, timestep=STEP_S).model)
+        return float(np.sqrt(np.mean((stock_motion(model, commands) - moved) ** 2)))
+
+    of_all = off("own", ())
+    for name in ("load_friction@joint.coefficient", "stribeck_friction@joint.breakaway_n_m"):
+        assert off("less", (name,)) > 5 * of_all, name
+
+
 def test_a_law_has_the_mjcfs_gear_and_ranges(mjlab: Path, tmp_path: Path) -> None:
     values = {"torque_delay@motor.delay_s": 0.0043, "direction_asymmetry@motor.asymmetry": 0.4}
     effects = [name.partition(".")[0] for name in values]

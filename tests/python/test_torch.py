@@ -40,6 +40,10 @@ DRIVE: Values = {
     "asymmetry": [0.1, -0.05, 0.2],
     "efficiency_drive": [0.9, 0.8, 0.95],
     "efficiency_backdrive": [1.1, 0.7, 1.05],
+    "friction_slope_n_m_s_per_rad": [40, 20, 10],
+    "friction_load_coefficient": [0.1, 0.2, 0.3],
+    "friction_hump_n_m": [2, 1, 3],
+    "friction_hump_speed_rad_per_s": [0.3, 0.5, 0.2],
 }
 # A drive in volts, by the plugin's keys of a native actuator's law.
 VOLTS: Values = {
@@ -58,6 +62,25 @@ VOLTS_NAMES = {
     "bias0": "bias_n_m",
     "dead_zone": "command_dead_zone",
     "second_time_constant_s": "command_time_constant_s",
+}
+# A servo by its duty cycle, of which nothing but its supply limits the torque.
+DUTY: Values = {
+    "duty_gain": [2, 3, 1.5],
+    "duty_damping": [0.05, 0.02, 0.1],
+    "duty_limit": [0.9, 1, 0.8],
+    "supply_v": [12, 7.4, 5],
+    "kt": [2, 1.5, 4],
+    "ke": [2.2, 1.5, 3],
+    "resistance": [2, 1, 3],
+    "gear": [1.5, -2, 1],
+    "command_delay_s": [0.0113, 0.02, 0.0007],
+    "torque_delay_s": [0.0043, 0.006, 0.0005],
+    "command_asymmetry": [0.05, -0.1, 0.02],
+    "time_constant_s": [0.004, 0.0005, 0.02],
+    "second_time_constant_s": [0.003, 0.006, 0.0008],
+    "dead_zone": [0.5, 0.2, 0.1],
+    "sag_fraction": [0.3, 0.5, 0.2],
+    "sag_time_constant_s": [0.1, 0.05, 0.2],
 }
 SPRING: Values = {
     "stiffness_n_m_per_rad": [20, 10, 4],
@@ -97,8 +120,16 @@ NAMES = {
     "friction_negative_n_m": "negative_n_m",
     "stop_n_m_per_rad": "stiffness",
 }
+NEEDED_BY_DUTY = {"duty_gain", "supply_v", "kt", "ke", "resistance"}
 SPEEDS, TORQUES = [1.0, 3.0, 8.0], [10.0, 7.0, 1.0]
 WINDING = {"kt": 0.4, "ke": 0.3, "resistance": 5.0, "gear": 2.0}
+
+
+def in_torch(name: str, others: dict[str, str] | None = None) -> str:
+    """What `Drive` calls a parameter of the plugin: those of a group follow a point."""
+    if name in DUTY and name not in DRIVE:
+        return f"duty.{name}"
+    return (others or {}).get(name, name.replace("friction_", "friction.", 1))
 
 
 def extension(plugin: str, joint: int, values: Values, more: str = "") -> str:
@@ -186,17 +217,28 @@ def in_volts() -> dict[str, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
+def by_duty() -> dict[str, np.ndarray]:
+    return moved(DUTY, config_of({"law": "duty"}))
+
+
+@pytest.fixture(scope="module")
 def laws(
-    plugins: dict[str, np.ndarray], in_volts: dict[str, np.ndarray], tmp_path_factory: pytest.TempPathFactory
+    plugins: dict[str, np.ndarray],
+    in_volts: dict[str, np.ndarray],
+    by_duty: dict[str, np.ndarray],
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> dict[str, np.ndarray]:
     python, folder = interpreter("torch"), tmp_path_factory.mktemp("laws")
     given: dict[str, object] = {"step_s": STEP_S, "speeds": SPEEDS, "torques": TORQUES, "load": plugins["force"]}
-    given |= {name: plugins[name] for name in ("target", "angle", "speed", "free_speed")}
-    given |= {f"{name}_in_volts": in_volts[name] for name in ("target", "angle", "speed")}
-    given |= {f"volts.{VOLTS_NAMES.get(name, name)}": np.array(numbers) for name, numbers in VOLTS.items()}
+    given["free_speed"] = plugins["free_speed"]
+    for prefix, motion in (("drive", plugins), ("volts", in_volts), ("duty", by_duty)):
+        given |= {f"{name} of {prefix}": motion[name] for name in ("target", "angle", "speed")}
+    given |= {f"drive.{in_torch(name)}": np.array(numbers, float) for name, numbers in DRIVE.items()}
+    given |= {f"volts.{in_torch(name, VOLTS_NAMES)}": np.array(numbers) for name, numbers in VOLTS.items()}
+    given |= {f"duty.{in_torch(name)}": np.array(numbers, float) for name, numbers in DUTY.items()}
     del given["volts.bias2"]  # it is -kd
     given |= {"volts.kp": np.zeros(JOINTS), "volts.kd": -np.array(VOLTS["bias2"])}
-    for prefix, values in (("drive", DRIVE), ("spring", SPRING), ("friction", FRICTION)):
+    for prefix, values in (("spring", SPRING), ("friction", FRICTION)):
         for name, numbers in values.items():
             whose, _, rest = name.partition("_")
             key = f"{prefix}.{NAMES.get(name, name)}"
@@ -219,21 +261,22 @@ DIGITS = 1e-11  # of torques of up to 40 N m
 ROUNDING = 1e-9
 
 
-def test_a_drive_gives_the_plugins_torque(plugins: dict[str, np.ndarray], laws: dict[str, np.ndarray]) -> None:
-    assert np.abs(laws["drive."] - plugins["force"]).max() < ROUNDING
-    assert np.abs(plugins["force"]).max(axis=(0, 1)).min() > 5
-    for name in DRIVE.keys() - {"kp"}:  # each stage counts: without it the torque is another
-        off = np.abs(laws[f"drive.{name}"] - plugins["force"]).max()
-        assert off > 1e6 * ROUNDING, (name, off)
-
-
-def test_a_drive_in_volts_gives_the_plugins_torque(
-    in_volts: dict[str, np.ndarray], laws: dict[str, np.ndarray]
+def test_a_drive_gives_the_plugins_torque(
+    plugins: dict[str, np.ndarray],
+    in_volts: dict[str, np.ndarray],
+    by_duty: dict[str, np.ndarray],
+    laws: dict[str, np.ndarray],
 ) -> None:
-    assert np.abs(laws["volts."] - in_volts["force"]).max() < ROUNDING
-    for name in VOLTS.keys() - {"gain", "bias2"}:
-        off = np.abs(laws[f"volts.{VOLTS_NAMES.get(name, name)}"] - in_volts["force"]).max()
-        assert off > 1e6 * ROUNDING, (name, off)
+    assert np.abs(plugins["force"]).max(axis=(0, 1)).min() > 5
+    for prefix, moved_by, values, needed, others in (
+        ("drive", plugins, DRIVE, {"kp", "friction_slope_n_m_s_per_rad"}, {}),
+        ("volts", in_volts, VOLTS, {"gain", "bias2"}, VOLTS_NAMES),
+        ("duty", by_duty, DUTY, NEEDED_BY_DUTY, {}),
+    ):
+        assert np.abs(laws[f"{prefix}."] - moved_by["force"]).max() < ROUNDING
+        for name in values.keys() - needed:  # each stage counts: without it the torque is another
+            off = np.abs(laws[f"{prefix}.{in_torch(name, others)}"] - moved_by["force"]).max()
+            assert off > 1e6 * ROUNDING, (prefix, name, off)
 
 
 def test_parameters_may_be_numbers(plugins: dict[str, np.ndarray], laws: dict[str, np.ndarray]) -> None:

@@ -7,6 +7,7 @@
 
 #include "src/plugins/common/refusal.h"
 #include "src/plugins/common/register.h"
+#include "src/plugins/friction/law.h"
 
 namespace gapscope::plugins {
 namespace {
@@ -58,6 +59,7 @@ std::unique_ptr<Motor> Motor::Create(const mjModel* m, int instance) {
   motor->command_asymmetry_ = active({kCommandAsymmetry});
   motor->softness_ = active({kLimitSoftness});
   motor->efficiency_ = active({kEfficiencyDrive, kEfficiencyBackdrive});
+  motor->friction_ = active({kFrictionSlope});
   motor->supply_ = config.law == MotorLaw::kDuty || config.input_of[kSupply] >= 0 || active({kSupplyV});
   motor->enable_ = config.input_of[kEnable] >= 0;
   return motor;
@@ -193,6 +195,13 @@ double Motor::Delivered(const mjModel* m, double torque, double speed) const {
     torque = Droop(torque, Parameter(m, kDroopAtPeak), Parameter(m, kDroopReference), Parameter(m, kDroopExponent));
   if (asymmetry_) torque *= 1 + (torque > 0 ? 1 : -1) * Parameter(m, kAsymmetry);
   if (efficiency_) torque *= Parameter(m, torque * speed < 0 ? kEfficiencyBackdrive : kEfficiencyDrive);
+  if (friction_) {
+    const DryFriction law{.breakaway_n_m = Parameter(m, kFrictionHump),
+                          .stribeck_speed_rad_per_s = Parameter(m, kFrictionHumpSpeed),
+                          .load_coefficient = Parameter(m, kFrictionLoad)};
+    const double level = DryLevel(law, speed, 0, torque, torque);
+    torque -= mju_clip(Parameter(m, kFrictionSlope) * speed, -level, level);
+  }
   return torque;
 }
 

@@ -2,8 +2,8 @@
 //
 // command -> delay -> [dead zone] -> [asymmetry] -> law -> delay in the servo's loop -> lag(s) -> [dead zone] -> limits
 // (torque, power, torque-speed curve, all sagging) -> the drive's own estimate -> droop -> asymmetry -> gear efficiency
-// -> joint. Every stage is neutral at its default and skipped by one branch when it can only be neutral. Equations,
-// sources and attributes: README.md.
+// -> gear friction -> joint. Every stage is neutral at its default and skipped by one branch when it can only be
+// neutral. Equations, sources and attributes: README.md.
 #ifndef GAPSCOPE_PLUGINS_MOTOR_MOTOR_H_
 #define GAPSCOPE_PLUGINS_MOTOR_MOTOR_H_
 
@@ -76,7 +76,7 @@ class Motor {
   int lag_ = -1, second_lag_ = -1, sag_ = -1;  // addresses in act; -1: stage neutral
   // Stages that may not be neutral.
   bool history_, dead_zone_, limits_, trapeze_, forcerange_, droop_, asymmetry_, command_asymmetry_, softness_,
-      efficiency_, supply_, enable_;
+      efficiency_, friction_, supply_, enable_;
 };
 
 }  // namespace gapscope::plugins

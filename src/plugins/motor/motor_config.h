@@ -52,6 +52,10 @@ enum MotorParameter {
   kAsymmetry,
   kCommandAsymmetry,
   kLimitSoftness,
+  kFrictionSlope,
+  kFrictionLoad,
+  kFrictionHump,
+  kFrictionHumpSpeed,
   kMotorParameters
 };
 inline constexpr std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
@@ -91,6 +95,10 @@ inline constexpr std::array<ParameterSpec, kMotorParameters> kMotorSpecs = {{
     {"asymmetry", "1", 0, -1, 1},
     {"command_asymmetry", "1", 0, -1, 1},
     {"limit_softness", "1", 0, 0, 1},
+    {"friction_slope_n_m_s_per_rad", "N m s/rad", 0, 0, 1e9},
+    {"friction_load_coefficient", "1", 0, 0, 10},
+    {"friction_hump_n_m", "N m", 0, 0, 1e9},
+    {"friction_hump_speed_rad_per_s", "rad/s", 0.05, 0, 1e9},
 }};
 
 struct MotorConfig {

@@ -107,6 +107,13 @@ std::vector<double> Workbench::Nominal(const Model& model) const {
   return nominal;
 }
 
+double Workbench::PriorOf(const EffectUse& use) const {
+  for (const std::string& name : {use.Text(), use.effect}) {
+    if (const auto given = priors.find(name); given != priors.end()) return given->second;
+  }
+  return Statement{}.prior;
+}
+
 Result<Candidate> MakeCandidate(const Workbench& bench, const std::vector<EffectUse>& effects) {
   Candidate candidate{.effects = effects};
   std::vector<EffectUse> all = bench.known;

@@ -82,6 +82,8 @@ struct Workbench {
   std::vector<int> FreeParameters(const Model& model) const;
   // Where fits start: nominal values, and those that are known better; known effects where an effect's trial starts.
   std::vector<double> Nominal(const Model& model) const;
+  // A statement's probability before the logs were seen: even odds, or as the user says.
+  double PriorOf(const EffectUse& use) const;
   // By limb, whether it can move by the effect.
   std::vector<char> LimbsOf(const EffectUse& use) const { return coupling->LimbsOf(coupling->OfPlace(use.on, *rig)); }
   // `share` of the work is spent, or the time where one was asked for.

@@ -456,4 +456,14 @@ double Imitated(const ColumnTable& table, const Trial& trial, const Trial& by) {
   return std::clamp(cross.dot(Ldlt(square).Solve(cross)) / own, 0.0, 1.0);
 }
 
+double Imitated(const ColumnTable& table, const EffectUse& use, const EffectUse& by) {
+  double most = 0;
+  for (const Trial& x : table.trials) {
+    for (const Trial& y : table.trials) {
+      if (x.use == use && y.use == by) most = std::max(most, Imitated(table, x, y));
+    }
+  }
+  return most;
+}
+
 }  // namespace gapscope

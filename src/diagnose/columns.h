@@ -81,6 +81,8 @@ BoundedSolution SolveSet(const ColumnTable& table, const std::vector<std::size_t
 
 // Share of a trial's column (its larger one) that another effect's columns hold, y taken out.
 double Imitated(const ColumnTable& table, const Trial& trial, const Trial& by);
+// The most of any of their trials.
+double Imitated(const ColumnTable& table, const EffectUse& use, const EffectUse& by);
 
 }  // namespace gapscope
 

@@ -31,6 +31,9 @@ struct Judgement {
   Verdict verdict = Verdict::kNone;
   double probability = 0;    // of the verdict as a whole
   VerdictEvidence evidence;  // of the refitted base model; what is left is the final set's
+
+  // The first statement about a use; null: there is none.
+  Statement* Find(const EffectUse& use);
 };
 
 Judgement Judge(const Workbench& bench, SearchResult& found, const Say& say);

@@ -3,6 +3,7 @@
 #ifndef GAPSCOPE_DIAGNOSE_SEARCH_H_
 #define GAPSCOPE_DIAGNOSE_SEARCH_H_
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
@@ -37,6 +38,8 @@ struct SearchResult {
   LoggedSignals logged;
   bool uneven = false;           // training and held-out logs show the gap very differently
   std::vector<std::string> cut;  // what the budget left out
+
+  bool HasMember(const EffectUse& use) const { return std::ranges::find(members, use, &Member::use) != members.end(); }
 };
 
 // What `with` has and `without` lacks gains: ln(cost without / cost with), limb by limb.

@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,17 @@ struct Pairing {
   std::vector<ActuatorSlot> actuators;
   std::vector<Pick> commands, torques;  // per actuator
 };
+
+// Indices of picks by the family of their columns (FamilyOf), of those that have a column and that `accept` takes.
+template <class Accept>
+std::map<std::string, std::vector<std::size_t>> FamiliesOf(const std::vector<Pick>& picks,
+                                                           const std::vector<Guess>& guesses, const Accept& accept) {
+  std::map<std::string, std::vector<std::size_t>> families;
+  for (std::size_t i = 0; i < picks.size(); ++i) {
+    if (picks[i].column >= 0 && accept(i)) families[FamilyOf(guesses[picks[i].column].said)].push_back(i);
+  }
+  return families;
+}
 
 // Without actuators in the model one is proposed for each joint that a command column pairs with.
 Pairing PairColumns(const mjModel& model, const Samples& samples, std::vector<Guess>* guesses);

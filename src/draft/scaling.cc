@@ -76,7 +76,8 @@ class Scaler {
     AnglesByFamily();
     for (std::size_t j = 0; j < p_.joints.size(); ++j) scalings_.velocities.push_back(Velocity(j));
     for (const bool slides : {false, true}) {
-      const auto families = Families(p_.velocities, [&](std::size_t j) { return p_.joints[j].slide == slides; });
+      const auto families =
+          FamiliesOf(p_.velocities, guesses_, [&](std::size_t j) { return p_.joints[j].slide == slides; });
       ScalesOfFamily(families, p_.velocities, &scalings_.velocities);
     }
     for (std::size_t a = 0; a < p_.actuators.size(); ++a) {
@@ -87,7 +88,7 @@ class Scaler {
       const int joint = p_.actuators[a].joint;
       return p_.actuators[a].wants == Quantity::kAngle && joint >= 0 && !p_.joints[joint].slide;
     };
-    ScalesOfFamily(Families(p_.commands, has_target), p_.commands, &scalings_.commands);
+    ScalesOfFamily(FamiliesOf(p_.commands, guesses_, has_target), p_.commands, &scalings_.commands);
     return std::move(scalings_);
   }
 
@@ -143,7 +144,8 @@ class Scaler {
 
   // What is left: a family has the unit of one member that is certain, else one that suits all of them.
   void AnglesByFamily() {
-    for (const auto& joints : Families(p_.positions, [&](std::size_t j) { return !p_.joints[j].slide; })) {
+    for (const auto& [family, joints] :
+         FamiliesOf(p_.positions, guesses_, [&](std::size_t j) { return !p_.joints[j].slide; })) {
       const auto sure = std::ranges::find_if(joints, [&](std::size_t j) { return scalings_.positions[j].certain; });
       std::string unit = sure != joints.end() ? scalings_.positions[*sure].unit : UnitByRange(joints);
       for (const std::size_t j : joints) {
@@ -314,22 +316,10 @@ class Scaler {
     return scaling;
   }
 
-  template <class Accept>
-  std::vector<std::vector<std::size_t>> Families(const std::vector<Pick>& picks, const Accept& accept) const {
-    std::map<std::string, std::vector<std::size_t>> families;
-    for (std::size_t i = 0; i < picks.size(); ++i) {
-      if (GuessOf(picks[i]) && accept(i)) families[FamilyOf(GuessOf(picks[i])->said)].push_back(i);
-    }
-    std::vector<std::vector<std::size_t>> all;
-    all.reserve(families.size());
-    for (auto& [family, members] : families) all.push_back(std::move(members));
-    return all;
-  }
-
   // A family has one unit, or one scale: what most of its members tell by regression. The scale is the middle one.
-  void ScalesOfFamily(const std::vector<std::vector<std::size_t>>& families, const std::vector<Pick>& picks,
+  void ScalesOfFamily(const std::map<std::string, std::vector<std::size_t>>& families, const std::vector<Pick>& picks,
                       std::vector<Scaling>* all) const {
-    for (const auto& members : families) {
+    for (const auto& [family, members] : families) {
       std::vector<double> units, scales;
       for (const std::size_t i : members) {
         const Scaling& s = (*all)[i];

@@ -27,10 +27,7 @@ class TorqueScales {
       : m_(model), samples_(samples), guesses_(guesses), p_(pairing), s_(*scalings) {}
 
   void Run() {
-    std::map<std::string, std::vector<std::size_t>> families;
-    for (std::size_t a = 0; a < p_.actuators.size(); ++a) {
-      if (IsMotor(a)) families[FamilyOf(guesses_[p_.commands[a].column].said)].push_back(a);
-    }
+    const auto families = FamiliesOf(p_.commands, guesses_, [&](std::size_t a) { return IsMotor(a); });
     if (families.empty()) return;
     choices_.assign(p_.actuators.size(), Choice::kOpen);
     // A wider parabola sees slow motion through more noise.
@@ -49,8 +46,7 @@ class TorqueScales {
   bool IsMotor(std::size_t a) const {
     const ActuatorSlot& slot = p_.actuators[a];
     return slot.actuator >= 0 && m_.actuator_plugin[slot.actuator] < 0 && slot.wants == Quantity::kTorque &&
-           slot.joint >= 0 && p_.positions[slot.joint].column >= 0 && p_.commands[a].column >= 0 &&
-           GainOf(m_, slot.actuator) != 0;
+           slot.joint >= 0 && p_.positions[slot.joint].column >= 0 && GainOf(m_, slot.actuator) != 0;
   }
 
   // By the torque that the motion takes.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <string>
 
@@ -25,12 +24,8 @@ class Zeros {
       : m_(model), samples_(samples), guesses_(guesses), p_(pairing), s_(*scalings) {}
 
   void Run() {
-    std::map<std::string, std::vector<std::size_t>> families;
-    for (std::size_t j = 0; j < p_.joints.size(); ++j) {
-      if (p_.positions[j].column >= 0 && !p_.joints[j].slide)
-        families[FamilyOf(guesses_[p_.positions[j].column].said)].push_back(j);
-    }
-    for (const auto& [family, joints] : families) OfFamily(joints);
+    const auto turns = [&](std::size_t j) { return !p_.joints[j].slide; };
+    for (const auto& [family, joints] : FamiliesOf(p_.positions, guesses_, turns)) OfFamily(joints);
     for (std::size_t a = 0; a < p_.actuators.size(); ++a) OfTarget(a);
   }
 

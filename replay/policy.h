@@ -2,6 +2,8 @@
 #ifndef GAPSCOPE_REPLAY_POLICY_H_
 #define GAPSCOPE_REPLAY_POLICY_H_
 
+#include <cstddef>
+
 namespace gapscope {
 
 // The choice of a time step: the log's own sample time is halved until halving it once more changes little.
@@ -17,6 +19,10 @@ struct PastPolicy {
   double unknown_states_s = 1.5;  // states whose time constant is nobody's parameter
   double time_constants = 5;      // of each known one: 0.7 % of a step is left
   double longest_s = 6;
+  // A first command moves a mechanism at once that goes at least kRestShare of the way that the model would, when that
+  // is so many counts and rows long. Later than at_once_s that says nothing of a delay.
+  double at_once_s = 0.02, at_once_counts = 6;
+  std::size_t at_once_rows = 3;
 };
 
 // What was commanded before a log that begins at rest: nothing, where the model accelerates less than this share under

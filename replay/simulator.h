@@ -114,6 +114,8 @@ class Simulator {
   // The same, each transmission's motor side with its load.
   void StandAt(const Recording& recording, std::size_t row);
   void FindEarlierCommands(const Recording& recording);
+  // Whether the log begins to move at its first stamp as the model does, where it stands.
+  bool MovesAtOnce(const Recording& recording) const;
   void SetCommands(const Recording& recording, std::size_t row, double from_s, double to_s);
   // Each command's mean over a time near the row.
   void SetMeanCommands(const Recording& recording, std::size_t row, double from_s, double to_s);

@@ -4,6 +4,7 @@
 
 #include "replay/policy.h"
 #include "replay/simulator.h"
+#include "src/core/statistics.h"
 #include "src/experiment/local_fit.h"
 
 namespace gapscope {
@@ -81,7 +82,8 @@ void Simulator::StandAt(const Recording& recording, std::size_t row) {
 
 // What was commanded before the log began. A mechanism that stands still at the first stamp had been held there: by no
 // command, where the model accelerates less under none than under the first one (a step at the first stamp; a held
-// weight's first command is what holds it). One that moves was driven by nobody knows what: by the first command.
+// weight's first command is what holds it). One that moves was driven by nobody knows what: by the first command. So
+// was one that the first command moves at once: it was late before the log began, or is not late.
 void Simulator::FindEarlierCommands(const Recording& recording) {
   mjModel* m = mujoco_.get();
   mjData* d = data_.get();
@@ -95,19 +97,40 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   }
   for (std::size_t c = 0; c < earlier_.size(); ++c) commanded = commanded || (moves_[c] && earlier_[c] != 0);
   if (!measured || !still || !commanded) return;
-  const auto acceleration = [&](bool with_first) {
+  const auto accelerate = [&](bool with_first) {
+    mj_resetData(m, d);
     StandAt(recording, 0);
     for (std::size_t c = 0; c < earlier_.size(); ++c)
       d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
     mj_forward(m, d);
-    const double norm = mju_norm(d->qacc, static_cast<int>(m->nv));
-    mj_resetData(m, d);
-    return norm;
+    return mju_norm(d->qacc, static_cast<int>(m->nv));
   };
-  from_nothing_ = acceleration(false) < kRestShare * acceleration(true);
+  const double under_none = accelerate(false);
+  from_nothing_ = under_none < kRestShare * accelerate(true) && !MovesAtOnce(recording);
+  mj_resetData(m, d);
   for (std::size_t c = 0; c < earlier_.size(); ++c) {
     if (from_nothing_ && moves_[c]) earlier_[c] = 0;
   }
+}
+
+// Of the signal that shows it best: as soon as the way of the model's present acceleration is clear of the counts.
+bool Simulator::MovesAtOnce(const Recording& recording) const {
+  const auto& time = recording.time_s;
+  double clearest = 0, share = 0;
+  for (const auto& signal : recording.measured) {
+    const SignalSource& source = model_.source(signal.index);
+    if (!TraitsOf(source.kind).gives_angle) continue;
+    const double acceleration = data_->qacc[source.dof], count = signal.spec.resolution;
+    for (std::size_t row = 1; row < recording.rows() && time[row] - time[0] <= kPast.at_once_s; ++row) {
+      const double passed = time[row] - time[0], way = 0.5 * acceleration * passed * passed;
+      if (row < kPast.at_once_rows || std::abs(way) < kPast.at_once_counts * count) continue;
+      if (!(std::abs(acceleration) > clearest * count)) break;
+      clearest = count > 0 ? std::abs(acceleration) / count : kInfinity;
+      share = (signal.values[row] - signal.values[0]) / way;
+      break;
+    }
+  }
+  return share >= kRestShare;
 }
 
 // Delays, lags and a sagging supply remember what went before: at a window's start the model is dragged along the log

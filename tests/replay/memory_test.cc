@@ -53,10 +53,18 @@ TEST_F(DelayTest, ALogThatBeginsAtRestBeganWithoutACommand) {
   const double step = 0.7, delay_s = 0.0137;
   Recording recording = MakeRecording(experiment_, 300, 0.002, [&](int, double) { return step; });
   EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, 0)), 3e-5);
-  // It moves off at once, on a sensor whose resolution nobody states.
-  for (std::size_t k = 0; k < recording.rows(); ++k)
-    recording.measured[0].values[k] = 50 * std::pow(recording.time_s[k], 2) + (k % 2 == 0 ? 0 : 1e-4);
+  // It moves off after that time, on a sensor whose resolution nobody states.
+  const auto move_off = [&](double late_s) {
+    for (std::size_t k = 0; k < recording.rows(); ++k) {
+      recording.measured[0].values[k] =
+          0.5 * step / kInertia * std::pow(std::max(0.0, recording.time_s[k] - late_s), 2) + (k % 2 == 0 ? 0 : 1e-4);
+    }
+  };
+  move_off(delay_s);
   EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, 0)), 3e-5);
+  // At once, under its first command: however late commands are, that one was there before.
+  move_off(0);
+  EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, step)), 3e-5);
   // One that begins in motion was driven by nobody knows what: by the first command.
   for (std::size_t k = 0; k < recording.rows(); ++k) recording.measured[0].values[k] = 2 * recording.time_s[k];
   EXPECT_LT(WorstAngle(Delayed(recording, "command_delay", delay_s)[0], Exact(recording, delay_s, step)), 3e-5);

@@ -126,6 +126,10 @@ struct Statement {
   std::string rule;
   std::string caveat = {};  // what the logs' clocks leave open of it; empty: nothing
 };
+// Whether it is unseen in these logs for want of an input that shows it.
+inline bool IsForAnInput(const Statement& s) {
+  return s.answer == Answer::kUnseen && s.rule != kNotSimulated && s.rule != kNotTried && s.rule != kOutOfSight;
+}
 
 // Shares of the refitted base model's squared misfit, held out. NaN: these logs do not say.
 struct Remainder {

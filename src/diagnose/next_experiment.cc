@@ -85,9 +85,10 @@ ForetoldMisfit MisfitOf(const InputScore& best, const std::vector<Hypothesis>& r
   return misfit;
 }
 
-Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& bench, const std::vector<double>& noise) {
+Result<NextExperiment> Design(const OpenQuestion& question, double duration_s, const Workbench& bench,
+                              const std::vector<double>& noise) {
   NextExperiment next = question.next;
-  OptimalOptions options{.duration_s = kDiagnosePolicy.next.duration_s,
+  OptimalOptions options{.duration_s = duration_s,
                          .floors = noise,
                          .window_s = bench.window_s,
                          .time_step_s = bench.time_step_s,
@@ -123,6 +124,18 @@ Result<NextExperiment> Design(const OpenQuestion& question, const Workbench& ben
   }
   next.command = CommandFor(experiment.path, options.rehearsal, best) + " --out next_experiment.csv";
   next.input_csv = InputCsv(experiment, best.rehearsal);
+  return next;
+}
+
+// A rig that an effect drives to its limits by itself keeps them in a shorter input.
+NextExperiment DesignLongest(const OpenQuestion& question, const Workbench& bench, const std::vector<double>& noise) {
+  NextExperiment next = question.next;
+  for (double duration_s = kDiagnosePolicy.next.duration_s; duration_s >= kDiagnosePolicy.next.least_duration_s;
+       duration_s /= 2) {
+    auto designed = Design(question, duration_s, bench, noise);
+    if (designed.ok()) return std::move(designed).value();
+    if (next.problem.empty()) next.problem = designed.error().Text();
+  }
   return next;
 }
 
@@ -174,13 +187,13 @@ bool IsWorthALog(const OpenQuestion& question, const Foretold& foretold) {
 
 NextExperiment DesignNext(const AskNext& ask, const Workbench& bench, const std::vector<double>& noise) {
   std::optional<NextExperiment> first;
-  while (const auto question = ask()) {
-    auto designed = Design(*question, bench, noise);
+  for (std::size_t designs = 0; designs < kDiagnosePolicy.next.designs;) {
+    const auto question = ask();
+    if (!question) break;
     NextExperiment next = question->next;
-    if (designed.ok()) {
-      next = std::move(designed).value();
-    } else {
-      next.problem = designed.error().Text();
+    if (next.problem.empty()) {
+      next = DesignLongest(*question, bench, noise);
+      ++designs;
     }
     if (next.problem.empty()) return next;
     if (!first) first = std::move(next);

@@ -1,6 +1,9 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <utility>
 
 #include "src/core/collect.h"
 #include "src/core/statistics.h"
@@ -22,14 +25,50 @@ class Asking {
       : bench_(bench), found_(found), judgement_(judgement) {}
 
   std::optional<OpenQuestion> Next() {
-    constexpr std::array kKinds{&Asking::Together, &Asking::Unsure, &Asking::OfOneLog, &Asking::Unseen};
-    while (kind_ < kKinds.size()) {
-      if (auto question = (this->*kKinds[kind_++])()) return question;
+    if (!std::exchange(listed_, true)) List();
+    while (next_ < asked_.size()) {
+      const auto& [why, of] = asked_[next_++];
+      if (auto question = Ask(why, *of)) return question;
     }
     return std::nullopt;
   }
 
  private:
+  // One question a group.
+  void List() {
+    std::vector<const Statement*> by_gain;
+    for (const Statement& s : judgement_.statements) by_gain.push_back(&s);
+    std::ranges::stable_sort(by_gain, std::greater(), [](const Statement* s) { return s->numbers.gain; });
+    std::set<int> groups;
+    for (const Why why : {Why::kTogether, Why::kUnsure, Why::kOneLog, Why::kUnseen}) {
+      for (const Statement* s : by_gain) {
+        if (IsOpen(why, *s) && (why != Why::kTogether || groups.insert(s->group).second)) asked_.emplace_back(why, s);
+      }
+    }
+  }
+
+  bool IsOpen(Why why, const Statement& s) const {
+    const bool present = s.answer == Answer::kPresent;
+    switch (why) {
+      case Why::kNothing:
+        return false;
+      case Why::kTogether:
+        return present && s.group >= 0;
+      case Why::kUnsure:
+        return s.probability > kDiagnosePolicy.next.absent && s.probability < kDiagnosePolicy.next.sure && s.sets;
+      case Why::kOneLog:
+        return present && IsOfOneLog(s);
+      case Why::kUnseen:
+        return IsForAnInput(s);
+    }
+    return false;
+  }
+
+  std::optional<OpenQuestion> Ask(Why why, const Statement& s) {
+    if (why == Why::kTogether) return Between(why, judgement_.groups[static_cast<std::size_t>(s.group)], s);
+    return why == Why::kUnseen ? Unseen(s) : WhetherThere(why, s, s.sets->with, s.sets->without);
+  }
+
   OpenQuestion Empty(Why why) const {
     OpenQuestion question{.next = {.why = why}};
     for (const auto& recording : bench_.data->train) question.seconds += recording.duration_s();
@@ -47,7 +86,13 @@ class Asking {
       if (Has(found_.chosen->effects, use)) members = With(members, use);
     }
     const Candidate* first = nullptr;
+    std::vector<Explanation> never;  // told from the first one, by any log of these signals
     for (const EffectUse& use : uses) {
+      if (!question.next.separates.empty() &&
+          AreOneMotion(*question.next.separates.front(), use, *found_.base->model, found_.logged)) {
+        never.emplace_back(use);
+        continue;
+      }
       std::optional<RunModel> tried = Beyond(members, use);
       if (!tried) {
         const Candidate* fitted =
@@ -61,9 +106,14 @@ class Asking {
       question.next.models.push_back(*std::move(tried));
       if (question.next.models.size() == kMost) break;
     }
-    if (question.next.models.size() < 2) return std::nullopt;
+    auto& separates = question.next.separates;
+    if (separates.size() == 1 && !never.empty()) {
+      separates.insert(separates.end(), never.begin(), never.end());
+      question.next.problem = "as long as the same signals are logged they are one motion. Another signal may tell.";
+    }
+    if (separates.size() < 2) return std::nullopt;
     question.together = of.probability;
-    question.next.probability = of.probability / static_cast<double>(question.next.models.size());
+    question.next.probability = of.probability / static_cast<double>(separates.size());
     question.tie = TieOf(of.numbers.gain);
     return question;
   }
@@ -105,61 +155,32 @@ class Asking {
     return question;
   }
 
-  std::optional<OpenQuestion> Together() {
-    const Statement* first = nullptr;
-    for (const Statement& s : judgement_.statements) {
-      if (s.group < 0 || s.answer != Answer::kPresent) continue;
-      if (!first || s.numbers.gain > first->numbers.gain) first = &s;
-    }
-    if (!first) return std::nullopt;
-    return Between(Why::kTogether, judgement_.groups[static_cast<std::size_t>(first->group)], *first);
-  }
-
-  std::optional<OpenQuestion> Unsure() {
-    const Statement* first = nullptr;
-    for (const Statement& s : judgement_.statements) {
-      const bool open =
-          s.probability > kDiagnosePolicy.next.absent && s.probability < kDiagnosePolicy.next.sure && s.sets;
-      if (open && (!first || s.numbers.gain > first->numbers.gain)) first = &s;
-    }
-    if (!first) return std::nullopt;
-    return WhetherThere(Why::kUnsure, *first, first->sets->with, first->sets->without);
-  }
-
-  std::optional<OpenQuestion> OfOneLog() {
-    if (bench_.data->held_out.size() < 2) return std::nullopt;
-    for (const Statement& s : judgement_.statements) {
-      if (s.answer != Answer::kPresent || !s.sets || s.sets->blocks.empty()) continue;
-      std::map<std::string, double> logs;
-      for (const BlockGain& block : s.sets->blocks) logs[block.log] += block.share;
-      if (std::any_of(logs.begin(), logs.end(),
-                      [](const auto& log) { return log.second > kDiagnosePolicy.next.of_one_log; }))
-        return WhetherThere(Why::kOneLog, s, s.sets->with, s.sets->without);
-    }
-    return std::nullopt;
+  bool IsOfOneLog(const Statement& s) const {
+    if (bench_.data->held_out.size() < 2 || !s.sets) return false;
+    std::map<std::string, double> logs;
+    for (const BlockGain& block : s.sets->blocks) logs[block.log] += block.share;
+    return std::ranges::any_of(logs, [](const auto& log) { return log.second > kDiagnosePolicy.next.of_one_log; });
   }
 
   // At the size in the middle of those that a search tries.
-  std::optional<OpenQuestion> Unseen() {
-    for (const Statement& s : judgement_.statements) {
-      if (s.answer != Answer::kUnseen) continue;
-      const auto middle = Collect(PlacedParameters(s.use, *bench_.rig, bench_.scales), [](const PlacedParameter& p) {
-        return p.trials.empty() ? p.start : p.trials[p.trials.size() / 2];
-      });
-      const auto with = WithValues(With(found_.chosen->effects, s.use), s.use, middle);
-      if (!with) continue;
-      OpenQuestion question = WhetherThere(Why::kUnseen, s, *with, ModelOf(*found_.chosen));
-      question.numbers.dry = EffectOf(s.use, *bench_.rig).character == EffectCharacter::kDryFriction;
-      question.numbers.smooth = EffectOf(s.use, *bench_.rig).of_motion;
-      return question;
-    }
-    return std::nullopt;
+  std::optional<OpenQuestion> Unseen(const Statement& s) {
+    const auto middle = Collect(PlacedParameters(s.use, *bench_.rig, bench_.scales), [](const PlacedParameter& p) {
+      return p.trials.empty() ? p.start : p.trials[p.trials.size() / 2];
+    });
+    const auto with = WithValues(With(found_.chosen->effects, s.use), s.use, middle);
+    if (!with) return std::nullopt;
+    OpenQuestion question = WhetherThere(Why::kUnseen, s, *with, ModelOf(*found_.chosen));
+    question.numbers.dry = EffectOf(s.use, *bench_.rig).character == EffectCharacter::kDryFriction;
+    question.numbers.smooth = EffectOf(s.use, *bench_.rig).of_motion;
+    return question;
   }
 
   const Workbench& bench_;
   SearchResult& found_;
   const Judgement& judgement_;
-  std::size_t kind_ = 0;
+  bool listed_ = false;
+  std::vector<std::pair<Why, const Statement*>> asked_;
+  std::size_t next_ = 0;
 };
 
 }  // namespace

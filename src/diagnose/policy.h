@@ -86,12 +86,13 @@ struct VerdictPolicy {
 
 // Of the next experiment.
 struct NextPolicy {
-  double absent = 0.2, sure = 0.8;  // probabilities between which a statement is open
-  double of_one_log = 0.9;          // share of what an effect gains, above which one log alone shows it
-  double duration_s = 8;            // of the input
-  double answers = 0.5;             // least difference of P with the effect and without, for an input to be proposed
-  double apart = 0.5;               // of what an effect gains, what random torques do not, where the logs do not say
-  double beyond_tie = 2;            // what a foretold log must tell apart, over what ties: forecasts are rough
+  double absent = 0.2, sure = 0.8;              // probabilities between which a statement is open
+  double of_one_log = 0.9;                      // share of what an effect gains, above which one log alone shows it
+  double duration_s = 8, least_duration_s = 1;  // of the input
+  std::size_t designs = 6;                      // questions that an input is looked for
+  double answers = 0.5;   // least difference of P with the effect and without, for an input to be proposed
+  double apart = 0.5;     // of what an effect gains, what random torques do not, where the logs do not say
+  double beyond_tie = 2;  // what a foretold log must tell apart, over what ties: forecasts are rough
 };
 
 struct DiagnosePolicy {

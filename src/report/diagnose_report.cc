@@ -344,6 +344,8 @@ ordered_json JsonPolicy() {
                                {"next.sure", policy.next.sure},
                                {"next.of_one_log", policy.next.of_one_log},
                                {"next.duration_s", policy.next.duration_s},
+                               {"next.least_duration_s", policy.next.least_duration_s},
+                               {"next.designs", policy.next.designs},
                                {"next.answers", policy.next.answers},
                                {"next.apart", policy.next.apart},
                                {"next.beyond_tie", policy.next.beyond_tie}};

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <set>
 
@@ -83,10 +82,7 @@ std::string Sentence::Text() const {
 }
 
 std::string WhyOf(const Statement& s) {
-  const auto is_rule = [&](const char* rule) { return s.rule == rule; };
-  const bool by_input =
-      s.answer == Answer::kUnseen && std::ranges::none_of(std::array{kNotSimulated, kNotTried, kOutOfSight}, is_rule);
-  const std::string input = by_input ? InputThatTells(s.use) : "";
+  const std::string input = IsForAnInput(s) ? InputThatTells(s.use) : "";
   return s.rule + (input.empty() ? "" : "; what would show it: " + input);
 }
 

@@ -83,5 +83,32 @@ TEST(IsWorthALogTest, WhereTheAnswersLieApart) {
   EXPECT_FALSE(IsWorthALog(between, {.if_present = 0.35, .if_absent = 0.35}));
 }
 
+TEST(DesignNextTest, WhatNoInputTellsIsSaidWithoutOne) {
+  ThreadPool pool(1);
+  const ScaleTable scales;
+  const Workbench bench{.rig = nullptr, .data = nullptr, .scales = scales, .pool = pool};
+  std::vector<OpenQuestion> questions(2);
+  questions[0].next = {.why = NextExperiment::Why::kTogether, .problem = "they are one motion"};
+  questions[1].next = {.why = NextExperiment::Why::kUnseen, .problem = "another problem"};
+  std::size_t asked = 0;
+  const NextExperiment next = DesignNext(
+      [&]() -> std::optional<OpenQuestion> {
+        if (asked == questions.size()) return std::nullopt;
+        return questions[asked++];
+      },
+      bench, {});
+  EXPECT_EQ(asked, questions.size()) << "a later question may have an input";
+  EXPECT_EQ(next.why, NextExperiment::Why::kTogether);
+  EXPECT_EQ(next.problem, "they are one motion");
+  EXPECT_TRUE(next.input_csv.empty());
+}
+
+TEST(IsForAnInputTest, WhatTheLogsDoNotMoveButNotWhatWasNotTried) {
+  EXPECT_TRUE(IsForAnInput({.answer = Answer::kUnseen, .rule = "these logs do not move what it acts on"}));
+  EXPECT_FALSE(IsForAnInput({.answer = Answer::kUnseen, .rule = kNotTried}));
+  EXPECT_FALSE(IsForAnInput({.answer = Answer::kUnseen, .rule = kOutOfSight}));
+  EXPECT_FALSE(IsForAnInput({.answer = Answer::kAbsent, .rule = "gains too little"}));
+}
+
 }  // namespace
 }  // namespace gapscope

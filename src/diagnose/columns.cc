@@ -427,6 +427,18 @@ std::vector<std::vector<TrialSet>> BeamSearch(const ColumnTable& table, std::siz
   return levels;
 }
 
+std::size_t BestTrial(const ColumnTable& table, const EffectUse& use, std::vector<std::size_t> beside) {
+  std::size_t best = table.trials.size();
+  double least = kInfinity;
+  beside.push_back(best);
+  for (std::size_t t = 0; t < table.trials.size(); ++t) {
+    if (table.trials[t].use != use) continue;
+    beside.back() = t;
+    if (const double cost = SetCost(table, beside); cost < least) least = cost, best = t;
+  }
+  return best;
+}
+
 BoundedSolution SolveSet(const ColumnTable& table, const std::vector<std::size_t>& trials) {
   std::vector<Eigen::Index> set(static_cast<std::size_t>(table.gram.parameters));
   std::iota(set.begin(), set.end(), 0);

@@ -76,6 +76,8 @@ struct TrialSet {
 std::vector<std::vector<TrialSet>> BeamSearch(const ColumnTable& table, std::size_t most, std::size_t width);
 // Cost of one set.
 double SetCost(const ColumnTable& table, const std::vector<std::size_t>& trials);
+// The trial of the use that costs least beside others; the number of trials: it has none.
+std::size_t BestTrial(const ColumnTable& table, const EffectUse& use, std::vector<std::size_t> beside);
 // Coefficients of the set's columns, and y's step, y inside its bounds.
 BoundedSolution SolveSet(const ColumnTable& table, const std::vector<std::size_t>& trials);
 

@@ -10,25 +10,12 @@
 namespace gapscope {
 namespace {
 
-// The trial of `use` that costs least beside `others`, at the end of these; false: it has none.
-bool AddBestTrial(const ColumnTable& table, const EffectUse& use, std::vector<std::size_t>* others) {
-  std::size_t best = table.trials.size();
-  double least = kInfinity;
-  for (std::size_t t = 0; t < table.trials.size(); ++t) {
-    if (table.trials[t].use != use) continue;
-    std::vector<std::size_t> tried = *others;
-    tried.push_back(t);
-    if (const double cost = SetCost(table, tried); cost < least) least = cost, best = t;
-  }
-  if (best < table.trials.size()) others->push_back(best);
-  return best < table.trials.size();
-}
-
 // The trials of the chosen set with `use` in the place of `members`, that of `use` last; empty: it has no column.
 std::vector<std::size_t> TrialsInPlace(const SearchResult& found, const EffectSet& members, const EffectUse& use) {
-  std::vector<std::size_t> trials;
-  for (const EffectUse& other : Without(found.chosen->effects, members)) AddBestTrial(found.columns, other, &trials);
-  if (!AddBestTrial(found.columns, use, &trials)) trials.clear();
+  std::vector<std::size_t> trials = TrialsOf(found, Without(found.chosen->effects, members));
+  const std::size_t of_use = BestTrial(found.columns, use, trials);
+  if (of_use == found.columns.trials.size()) return {};
+  trials.push_back(of_use);
   return trials;
 }
 
@@ -78,6 +65,15 @@ void RefitBeyond(const Workbench& bench, Ledger& ledger, const EffectSet& set, c
 }
 
 }  // namespace
+
+std::vector<std::size_t> TrialsOf(const SearchResult& found, const EffectSet& set) {
+  const ColumnTable& table = found.columns;
+  std::vector<std::size_t> trials;
+  for (const EffectUse& use : set) {
+    if (const std::size_t t = BestTrial(table, use, trials); t < table.trials.size()) trials.push_back(t);
+  }
+  return trials;
+}
 
 Candidate* RefitInPlace(const Workbench& bench, SearchResult& found, const EffectSet& members, const EffectUse& use,
                         Effort effort) {

@@ -19,6 +19,9 @@ void SetValues(const Workbench& bench, const Trial& trial, const BoundedSolution
 std::vector<std::vector<double>> UsualBeyond(const Workbench& bench, const Candidate& at, const EffectUse& simpler,
                                              const EffectUse& richer);
 
+// Trials that stand for a set, at the base: of each effect the one that costs least beside those before.
+std::vector<std::size_t> TrialsOf(const SearchResult& found, const EffectSet& set);
+
 // The chosen set with `use` in the place of `members`, begun from the chosen set's optimum: a set that starts elsewhere
 // and is not at its end looks exactly like a worse one. `use` starts at the trial that does best beside the other
 // members, by arithmetic at the base, and at what it usually is beyond a member. Null: it has no column there, or the

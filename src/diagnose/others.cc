@@ -3,33 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "src/diagnose/exchange.h"
 #include "src/diagnose/policy.h"
 
 namespace gapscope {
 namespace {
-
-// The trial of the use that explains most beside others; the end of the table's where it has none.
-std::size_t BestTrial(const ColumnTable& table, const EffectUse& use, std::vector<std::size_t> beside) {
-  std::size_t best = table.trials.size();
-  double least = kInfinity;
-  beside.push_back(best);
-  for (std::size_t t = 0; t < table.trials.size(); ++t) {
-    if (table.trials[t].use != use) continue;
-    beside.back() = t;
-    if (const double cost = SetCost(table, beside); cost < least) least = cost, best = t;
-  }
-  return best;
-}
-
-// Trials that stand for the final set.
-std::vector<std::size_t> TrialsOfSet(const SearchResult& found) {
-  std::vector<std::size_t> trials;
-  for (const EffectUse& member : found.chosen->effects) {
-    if (const std::size_t t = BestTrial(found.columns, member, trials); t < found.columns.trials.size())
-      trials.push_back(t);
-  }
-  return trials;
-}
 
 // Whether the search ended before a fit of the use that its columns promise something of, beside the set's trials.
 bool WasNotReached(SearchResult& found, const EffectUse& use, std::vector<std::size_t> set) {
@@ -48,7 +26,7 @@ bool WasNotReached(SearchResult& found, const EffectUse& use, std::vector<std::s
 void TellOthers(const Workbench& bench, SearchResult& found, Judgement* result) {
   const ColumnTable& table = found.columns;
   if (!table.valid) return;  // nothing was looked at
-  const std::vector<std::size_t> set = TrialsOfSet(found);
+  const std::vector<std::size_t> set = TrialsOf(found, found.chosen->effects);
   for (const EffectUse& use : found.uses) {
     if (result->Find(use)) continue;
     if (WasNotReached(found, use, set)) {

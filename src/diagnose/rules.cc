@@ -203,6 +203,14 @@ bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, co
   return sprung || (!logged.torque && AreServoJoints(a, model));
 }
 
+bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model) {
+  const auto lists = [&](const EffectUse& one, const EffectUse& other) {
+    const auto& partners = Of(one, model).partners;
+    return std::ranges::find(partners, other.effect) != partners.end();
+  };
+  return (lists(a, b) || lists(b, a)) && JointOf(a.on, model) == JointOf(b.on, model);
+}
+
 bool IsLessLikely(const EffectUse& a, const EffectUse& b, const Model& model) {
   if (Of(a, model).unlikely_beside != b.effect || a.on != b.on) return false;
   const mjModel& m = model.compiled();

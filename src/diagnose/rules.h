@@ -47,6 +47,8 @@ std::set<std::string> JointsOutOfSight(const Model& base, const std::vector<Reco
 // that sensor is all that is measured, or where all commands, and all sensors, are late alike; Coulomb friction and
 // friction by direction on a joint that a servo or a spring holds, apart by a zero offset.
 bool AreOneMotion(const EffectUse& a, const EffectUse& b, const Model& model, const LoggedSignals& logged);
+// Whether the catalogue has each of them down for what is mistaken for the other one (Effect::partners), at one joint.
+bool ArePartners(const EffectUse& a, const EffectUse& b, const Model& model);
 // Whether `a` is the less likely of two that explain the logs equally well: gravity on a joint whose axis stands
 // upright, where only a tilted rig would feel it, beside a cable.
 bool IsLessLikely(const EffectUse& a, const EffectUse& b, const Model& model);

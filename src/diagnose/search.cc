@@ -338,29 +338,28 @@ class Searcher {
     }
   }
 
-  // What could stand in a member's place: what its columns hold of it, or what costs as little by arithmetic.
+  // What could stand in a member's place: its partners, and those whose columns hold most of it. Columns are of small
+  // sizes at the base, which hides what partners are together with other parameters.
   std::vector<EffectUse> Shortlist(const Member& member) const {
-    const ColumnTable& table = result_.columns;
+    const Model& base = *result_.base->model;
+    std::vector<EffectUse> partners;
     std::vector<std::pair<double, EffectUse>> ranked;
     for (const EffectUse& use : result_.uses) {
       if (Has(result_.chosen->effects, use)) continue;
-      const bool one = AreOneMotion(use, member.use, *result_.base->model, result_.logged) ||
-                       Contains(member.use, use, *bench_.rig) || Contains(use, member.use, *bench_.rig);
-      double most = one ? 1 : 0;
-      for (const Trial& own : table.trials) {
-        if (own.use != member.use) continue;
-        for (const Trial& by : table.trials) {
-          if (by.use == use) most = std::max(most, Imitated(table, own, by));
-        }
+      const bool one = AreOneMotion(use, member.use, base, result_.logged) || Contains(member.use, use, *bench_.rig) ||
+                       Contains(use, member.use, *bench_.rig);
+      const double held = one ? 1 : Imitated(result_.columns, member.use, use);
+      if (held < kPolicy.imitates) continue;
+      if (ArePartners(use, member.use, base)) {
+        partners.push_back(use);
+      } else {
+        ranked.emplace_back(-held, use);
       }
-      if (most >= kPolicy.imitates) ranked.emplace_back(-most, use);
     }
-    std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    std::vector<EffectUse> uses;
-    for (const auto& [imitated, use] : ranked) {
-      if (uses.size() < kPolicy.rivals) uses.push_back(use);
-    }
-    return uses;
+    std::ranges::stable_sort(ranked, {}, [](const auto& one) { return one.first; });
+    if (ranked.size() > kPolicy.rivals) ranked.resize(kPolicy.rivals);
+    for (const auto& [held, use] : ranked) partners.push_back(use);
+    return partners;
   }
 
   Candidate* RefitRival(const Member& member, const EffectUse& use) {

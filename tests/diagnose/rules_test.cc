@@ -156,6 +156,22 @@ TEST(RulesTest, FrictionByDirectionIsCoulombFrictionOnAServo) {
   EXPECT_FALSE(AreOneMotion({"coulomb_friction", "arm"}, {"direction_asymmetry", "arm"}, *drive.model, {}));
 }
 
+// By the catalogue, whichever of the two lists the other one, on a joint with its drive and its signals.
+TEST(RulesTest, PartnersAreWhatIsMistakenForTheEffect) {
+  const Rig rig = LoadRig("qube");
+  const auto are = [&](const EffectUse& a, const EffectUse& b) {
+    const bool both = ArePartners(a, b, *rig.model);
+    EXPECT_EQ(ArePartners(b, a, *rig.model), both) << a.Text() << ", " << b.Text();
+    return both;
+  };
+  EXPECT_TRUE(are({"cable_spring", "arm"}, {"gravity_offset", "arm"}));
+  EXPECT_FALSE(are({"cable_spring", "arm"}, {"gravity_offset", "pendulum"})) << "another joint";
+  EXPECT_TRUE(are({"command_delay", "motor"}, {"sensor_delay", "arm_rad"}));
+  EXPECT_FALSE(are({"command_delay", "motor"}, {"sensor_delay", "pendulum_rad"}));
+  EXPECT_TRUE(are({"dead_zone", "motor"}, {"coulomb_friction", "arm"}));
+  EXPECT_FALSE(are({"cable_spring", "arm"}, {"coulomb_friction", "arm"}));
+}
+
 TEST(RulesTest, GravityIsUnlikelyOnAnUprightAxis) {
   const Rig rig = LoadRig("qube");
   EXPECT_TRUE(IsLessLikely({"gravity_offset", "arm"}, {"cable_spring", "arm"}, *rig.model));

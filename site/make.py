@@ -89,23 +89,33 @@ def truth_of(label):
     return "; ".join(words(effect) for effect in label["effects"]) or "nothing"
 
 
+def logs_of_hardware(entry):
+    """None, where the data are not there."""
+    data = ROOT.parent / "shared/data"
+    return sorted(log for pattern in entry.get("data", []) for log in data.glob(pattern))
+
+
+def can_make(entry):
+    return "twin" in entry or bool(entry.get("logs") or logs_of_hardware(entry))
+
+
 def make_entry(name, entry, folder):
     """Report, video and verdict of one rig, whole or not at all."""
     program = ROOT / "build/bin"
     if not (program / "gapscope").exists():
         fail(f"{program / 'gapscope'} is not there; --gallery runs it; build it with scripts/demo")
     with tempfile.TemporaryDirectory(dir=folder.parent) as temporary:
-        made, logs = pathlib.Path(temporary) / name, entry.get("logs", [])
+        made, logs = pathlib.Path(temporary) / name, entry.get("logs") or logs_of_hardware(entry)
         made.mkdir()
-        truth = entry.get("truth")
+        truth = entry.get("truth") or entry.get("source")
         if "twin" in entry:
             label = made / "label.json"
             subprocess.run([program / "gapscope_twin", *entry["twin"], "--out", made / "logs", "--label", label],
                            check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
             logs, truth = sorted((made / "logs").glob("log_*.csv")), truth_of(json.loads(label.read_text()))
-        subprocess.run([program / "gapscope", "diagnose", entry["model"], *logs, "--out", made / "found", "--quiet"],
-                       check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
-        subprocess.run([program / "gapscope", "render", entry["model"], logs[0], "--compare", "nominal", "--compare",
+        subprocess.run([program / "gapscope", "diagnose", entry["model"], *logs, *entry.get("options", []), "--out",
+                        made / "found", "--quiet"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+        subprocess.run([program / "gapscope", "render", entry["model"], logs[0], *entry.get("options", []), "--compare", "nominal", "--compare",
                         f"diagnosed={made / 'found'}", "--size", "960x540", "--from", "0", "--to", "8", "--quiet",
                         "--out", made / "video.mp4"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
         (made / "truth").write_text(truth)
@@ -115,8 +125,8 @@ def make_entry(name, entry, folder):
 
 def gallery(pages, make):
     """The page of the gallery, of what there is. `make`: names to make, empty: all, none: nothing."""
-    rows = ["# Gallery", "", "What the program made of logs whose cause is known: a twin made them, with equations of "
-            "its own.", ""]
+    rows = ["# Gallery", "", "What the program made of logs of twins, whose cause is known and whose equations are not "
+            "the program's, and of logs of real hardware.", ""]
     kept = ROOT / "out/gallery"
     kept.mkdir(parents=True, exist_ok=True)
     entries = yaml.safe_load((ROOT / "site/gallery.yaml").read_text())
@@ -125,8 +135,11 @@ def gallery(pages, make):
             fail(f"--gallery {name}: no such entry of site/gallery.yaml, which has {', '.join(entries)}")
     for name, entry in entries.items():
         if make is not None and (name in make or not make) and not (kept / name).exists():
-            print(f"site: diagnosing {name}", file=sys.stderr)
-            make_entry(name, entry, kept / name)
+            if can_make(entry):
+                print(f"site: diagnosing {name}", file=sys.stderr)
+                make_entry(name, entry, kept / name)
+            else:
+                print(f"site: {name} is left out, its logs are not there: {', '.join(entry['data'])}", file=sys.stderr)
         if not (kept / name).exists():
             continue
         found = json.loads((kept / name / "found/result.json").read_text())
@@ -137,7 +150,7 @@ def gallery(pages, make):
                 if s["answer"] == "present"]
         rows += [f"## {entry['title']}", "", f'<video controls muted loop preload="metadata" width="640" '
                  f'src="gallery/{name}.mp4" aria-label="{entry["title"]}: nominal and diagnosed model"></video>', "",
-                 f"| made with | {(kept / name / 'truth').read_text()} |", "|---|---|",
+                 f"| {'logs of' if 'data' in entry else 'made with'} | {(kept / name / 'truth').read_text()} |", "|---|---|",
                  f"| found | {'; '.join(told) or 'nothing'}; verdict `{found['verdict']}` |",
                  f"| gap closed on held-out data | {100 * found['gap']['closed']:.0f} % |", "",
                  f"[The report](gallery/{name}.html), as the program writes it.", ""]

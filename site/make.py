@@ -113,11 +113,12 @@ def make_entry(name, entry, folder):
             subprocess.run([program / "gapscope_twin", *entry["twin"], "--out", made / "logs", "--label", label],
                            check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
             logs, truth = sorted((made / "logs").glob("log_*.csv")), truth_of(json.loads(label.read_text()))
-        subprocess.run([program / "gapscope", "diagnose", entry["model"], *logs, *entry.get("options", []), "--out",
-                        made / "found", "--quiet"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
-        subprocess.run([program / "gapscope", "render", entry["model"], logs[0], *entry.get("options", []), "--compare", "nominal", "--compare",
-                        f"diagnosed={made / 'found'}", "--size", "960x540", "--from", "0", "--to", "8", "--quiet",
-                        "--out", made / "video.mp4"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+        options = entry.get("options", [])
+        subprocess.run([program / "gapscope", "diagnose", entry["model"], *logs, *options, "--out", made / "found",
+                        "--quiet"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+        subprocess.run([program / "gapscope", "render", entry["model"], logs[0], *options, "--compare", "nominal",
+                        "--compare", f"diagnosed={made / 'found'}", "--size", "960x540", "--from", "0", "--to", "8",
+                        "--quiet", "--out", made / "video.mp4"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
         (made / "truth").write_text(truth)
         shutil.rmtree(made / "logs", ignore_errors=True)
         made.rename(folder)
@@ -150,7 +151,8 @@ def gallery(pages, make):
                 if s["answer"] == "present"]
         rows += [f"## {entry['title']}", "", f'<video controls muted loop preload="metadata" width="640" '
                  f'src="gallery/{name}.mp4" aria-label="{entry["title"]}: nominal and diagnosed model"></video>', "",
-                 f"| {'logs of' if 'data' in entry else 'made with'} | {(kept / name / 'truth').read_text()} |", "|---|---|",
+                 f"| {'logs of' if 'data' in entry else 'made with'} | {(kept / name / 'truth').read_text()} |",
+                 "|---|---|",
                  f"| found | {'; '.join(told) or 'nothing'}; verdict `{found['verdict']}` |",
                  f"| gap closed on held-out data | {100 * found['gap']['closed']:.0f} % |", "",
                  f"[The report](gallery/{name}.html), as the program writes it.", ""]

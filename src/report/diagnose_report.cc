@@ -425,9 +425,9 @@ std::string ToTable(const DiagnoseRun& run) {
   text += ConditionTable("where", d.where);
   if (MuchRemains(d)) text += ConditionTable("what remains", d.remains);
   text += StatementTable(d);
-  if (d.next.why != NextExperiment::Why::kNothing) {
+  if (const auto sentences = NextSentences(d); !sentences.empty()) {
     text += "\nnext experiment\n";
-    for (const std::string& sentence : NextSentences(d.next)) text += Wrapped("- " + sentence, 120, "  ") + "\n";
+    for (const std::string& sentence : sentences) text += Wrapped("- " + sentence, 120, "  ") + "\n";
     if (!d.next.command.empty()) text += WrappedCommand(d.next.command, 120) + "\n";
   }
   const char* const early = d.interrupted ? ", interrupted" : d.cut.empty() ? "" : ", the whole budget";

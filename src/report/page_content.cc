@@ -89,8 +89,7 @@ PageContent PageOf(const DiagnoseRun& run) {
     for (const auto& p : effect.parameters)
       page.fitted.push_back({.name = effect.use.Text() + "." + p.key, .value = p.value, .low = p.low, .high = p.high});
   }
-  for (const std::string& sentence : NextSentences(d.next))
-    page.next_text += (page.next_text.empty() ? "" : " ") + sentence;
+  for (const std::string& sentence : NextSentences(d)) page.next_text += (page.next_text.empty() ? "" : " ") + sentence;
   page.next_command = d.next.command;
   return page;
 }

@@ -71,6 +71,37 @@ Sentence SentenceOf(const std::vector<const Statement*>& members) {
   return sentence;
 }
 
+// What is open, and what the proposed log would tell of it.
+std::vector<std::string> OfTheQuestion(const NextExperiment& next) {
+  using Why = NextExperiment::Why;
+  if (next.why == Why::kNothing) return {};
+  const std::vector<std::string> names = Collect(next.separates, [](const auto& one) { return Words(one); });
+  const std::string& first = names.front();
+  std::vector<std::string> sentences;
+  switch (next.why) {
+    case Why::kTogether:
+      sentences.push_back("These logs do not tell " + first + " from " +
+                          Listed({names.begin() + 1, names.end()}, "or") + ".");
+      break;
+    case Why::kUnsure:
+      sentences.push_back(fmt::format("Whether {} is there is not sure: P {:.2f}.", first, next.probability));
+      break;
+    case Why::kOneLog:
+      sentences.push_back("Only one log shows " + first + ".");
+      break;
+    default:
+      sentences.push_back("These logs cannot show " + first + ".");
+  }
+  if (next.input_csv.empty()) {
+    sentences.push_back("No experiment is proposed: " + next.problem);
+  } else {
+    sentences.push_back(
+        fmt::format("With the proposed log beside these, P would be about {:.2f} if it is {}, and {:.2f} if not.",
+                    next.if_present, next.why == Why::kTogether ? first : "there", next.if_absent));
+  }
+  return sentences;
+}
+
 }  // namespace
 
 std::string Sentence::Text() const {
@@ -145,32 +176,13 @@ std::vector<Part> PartsOf(const Remainder& remainder) {
   return parts;
 }
 
-std::vector<std::string> NextSentences(const NextExperiment& next) {
-  using Why = NextExperiment::Why;
-  if (next.why == Why::kNothing) return {};
-  const std::vector<std::string> names = Collect(next.separates, [](const auto& one) { return Words(one); });
-  const std::string& first = names.front();
-  std::vector<std::string> sentences;
-  switch (next.why) {
-    case Why::kTogether:
-      sentences.push_back("These logs do not tell " + first + " from " +
-                          Listed({names.begin() + 1, names.end()}, "or") + ".");
-      break;
-    case Why::kUnsure:
-      sentences.push_back(fmt::format("Whether {} is there is not sure: P {:.2f}.", first, next.probability));
-      break;
-    case Why::kOneLog:
-      sentences.push_back("Only one log shows " + first + ".");
-      break;
-    default:
-      sentences.push_back("These logs cannot show " + first + ".");
-  }
-  if (next.input_csv.empty()) {
-    sentences.push_back("No experiment is proposed: " + next.problem);
-  } else {
-    sentences.push_back(
-        fmt::format("With the proposed log beside these, P would be about {:.2f} if it is {}, and {:.2f} if not.",
-                    next.if_present, next.why == Why::kTogether ? first : "there", next.if_absent));
+std::vector<std::string> NextSentences(const Diagnosis& d) {
+  std::vector<std::string> sentences = OfTheQuestion(d.next);
+  const bool much_is_left = d.evidence.floors_left > kDiagnosePolicy.verdict.much_missing;
+  if (d.next.input_csv.empty() && much_is_left && !std::isfinite(d.remainder.not_repeatable)) {
+    sentences.emplace_back(
+        "No two of these logs have the same commands. Send those of one log again: only that tells how much of what is "
+        "left no model could mend.");
   }
   return sentences;
 }

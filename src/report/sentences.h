@@ -42,9 +42,9 @@ struct Part {
 };
 std::vector<Part> PartsOf(const Remainder& remainder);
 
-// What these logs leave open, and what the proposed experiment would tell of it: a sentence each; empty: nothing is
-// open.
-std::vector<std::string> NextSentences(const NextExperiment& next);
+// What these logs leave open, and what the proposed experiment would tell of it, or a repeat of a log: a sentence each;
+// empty: nothing is open.
+std::vector<std::string> NextSentences(const Diagnosis& d);
 
 // The size that an absent effect stays below (of a limit: above), "0.012 N m"; empty: no bound is known.
 std::string BoundText(const Statement& statement);

@@ -89,5 +89,18 @@ TEST(SentencesTest, WhatIsNotKnownOfTheRemainderIsLeftOut) {
   EXPECT_EQ(parts[2].name, "sensors");
 }
 
+TEST(NextSentencesTest, ARepeatIsAskedForWhereMuchIsLeftAndNoLogIsOne) {
+  Diagnosis d;
+  d.evidence.floors_left = 20;
+  d.remainder.not_repeatable = kNaN;
+  ASSERT_EQ(NextSentences(d).size(), 1u);
+  EXPECT_NE(NextSentences(d)[0].find("Send those of one log again"), std::string::npos);
+  d.remainder.not_repeatable = 0.1;
+  EXPECT_TRUE(NextSentences(d).empty()) << "two logs have the same commands";
+  d.remainder.not_repeatable = kNaN;
+  d.evidence.floors_left = 1;
+  EXPECT_TRUE(NextSentences(d).empty()) << "nothing is left";
+}
+
 }  // namespace
 }  // namespace gapscope

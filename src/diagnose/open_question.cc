@@ -34,15 +34,15 @@ class Asking {
   }
 
  private:
-  // One question a group.
+  // Of each kind one question a group.
   void List() {
     std::vector<const Statement*> by_gain;
     for (const Statement& s : judgement_.statements) by_gain.push_back(&s);
     std::ranges::stable_sort(by_gain, std::greater(), [](const Statement* s) { return s->numbers.gain; });
-    std::set<int> groups;
     for (const Why why : {Why::kTogether, Why::kUnsure, Why::kOneLog, Why::kUnseen}) {
+      std::set<int> groups;
       for (const Statement* s : by_gain) {
-        if (IsOpen(why, *s) && (why != Why::kTogether || groups.insert(s->group).second)) asked_.emplace_back(why, s);
+        if (IsOpen(why, *s) && (s->group < 0 || groups.insert(s->group).second)) asked_.emplace_back(why, s);
       }
     }
   }
@@ -65,8 +65,22 @@ class Asking {
   }
 
   std::optional<OpenQuestion> Ask(Why why, const Statement& s) {
-    if (why == Why::kTogether) return Between(why, judgement_.groups[static_cast<std::size_t>(s.group)], s);
+    if (why == Why::kTogether) return Between(why, WithNear(judgement_.groups[static_cast<std::size_t>(s.group)]), s);
     return why == Why::kUnseen ? Unseen(s) : WhetherThere(why, s, s.sets->with, s.sets->without);
+  }
+
+  // With what costs hardly more than what ties: beside a further log it may tie.
+  std::vector<EffectUse> WithNear(const std::vector<EffectUse>& group) const {
+    std::vector<EffectUse> all = group;
+    for (const Statement& s : judgement_.statements) {
+      if (!Has(group, s.use)) continue;
+      for (const Rival& rival : s.rivals) {
+        const bool near = rival.behind < kDiagnosePolicy.next.beyond_tie * TieOf(s.numbers.gain) &&
+                          !IsLessLikely(rival.use, s.use, *found_.base->model);
+        if (near && !Has(all, rival.use)) all.push_back(rival.use);
+      }
+    }
+    return all;
   }
 
   OpenQuestion Empty(Why why) const {

@@ -20,8 +20,8 @@ struct PastPolicy {
   double time_constants = 5;      // of each known one: 0.7 % of a step is left
   double longest_s = 6;
   // A first command moves a mechanism at once that goes at least kRestShare of the way that the model would, when that
-  // is so many counts and rows long. Later than at_once_s that says nothing of a delay.
-  double at_once_s = 0.02, at_once_counts = 6;
+  // is so many times the samples' scatter and takes so many rows. Later than at_once_s that says nothing of a delay.
+  double at_once_s = 0.02, at_once_scatters = 8;
   std::size_t at_once_rows = 3;
 };
 

@@ -12,14 +12,26 @@ namespace {
 
 constexpr PastPolicy kPast;
 
+// How far a signal's first samples scatter about a smooth curve, by their second differences; at least its resolution.
+double ScatterAtStart(const Recording& recording, const Recording::Measured& signal) {
+  const auto& v = signal.values;
+  double sum = 0, count = 0;
+  for (std::size_t row = 2; row < v.size() && recording.time_s[row] - recording.time_s[0] <= kPast.at_once_s; ++row) {
+    const double bend = v[row] - 2 * v[row - 1] + v[row - 2];
+    if (std::isfinite(bend)) sum += bend * bend, ++count;
+  }
+  constexpr double kOfWhiteNoise = 6;  // variance of a second difference
+  return std::max(signal.spec.resolution, count > 0 ? std::sqrt(sum / count / kOfWhiteNoise) : 0);
+}
+
 }  // namespace
 
 bool Simulator::Recall(const Recording& recording, Window window) {
   mj_resetData(mujoco_.get(), data_.get());
   std::fill(held_.begin(), held_.end(), window.begin);
   from_nothing_ = false;
-  if ((remembers_ || latest_s_ > 0) && recording.time_s[window.begin] - recording.time_s.front() <= Past())
-    FindEarlierCommands(recording);
+  const bool looks_back = remembers_ || latest_s_ > 0 || stamps_.forces_s < 0;
+  if (looks_back && recording.time_s[window.begin] - recording.time_s.front() <= Past()) FindEarlierCommands(recording);
   return PreRoll(recording, window);
 }
 
@@ -98,7 +110,6 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   for (std::size_t c = 0; c < earlier_.size(); ++c) commanded = commanded || (moves_[c] && earlier_[c] != 0);
   if (!measured || !still || !commanded) return;
   const auto accelerate = [&](bool with_first) {
-    mj_resetData(m, d);
     StandAt(recording, 0);
     for (std::size_t c = 0; c < earlier_.size(); ++c)
       d->ctrl[actuators[c]] = moves_[c] && !with_first ? 0 : earlier_[c];
@@ -106,6 +117,7 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
     return mju_norm(d->qacc, static_cast<int>(m->nv));
   };
   const double under_none = accelerate(false);
+  mj_resetData(m, d);
   from_nothing_ = under_none < kRestShare * accelerate(true) && !MovesAtOnce(recording);
   mj_resetData(m, d);
   for (std::size_t c = 0; c < earlier_.size(); ++c) {
@@ -113,19 +125,20 @@ void Simulator::FindEarlierCommands(const Recording& recording) {
   }
 }
 
-// Of the signal that shows it best: as soon as the way of the model's present acceleration is clear of the counts.
+// Of the signal that shows it best: as soon as the way of the model's present acceleration is clear of the scatter.
 bool Simulator::MovesAtOnce(const Recording& recording) const {
   const auto& time = recording.time_s;
   double clearest = 0, share = 0;
   for (const auto& signal : recording.measured) {
     const SignalSource& source = model_.source(signal.index);
     if (!TraitsOf(source.kind).gives_angle) continue;
-    const double acceleration = data_->qacc[source.dof], count = signal.spec.resolution;
-    for (std::size_t row = 1; row < recording.rows() && time[row] - time[0] <= kPast.at_once_s; ++row) {
+    const double acceleration = data_->qacc[source.dof], scatter = ScatterAtStart(recording, signal);
+    if (!(std::abs(acceleration) > clearest * scatter)) continue;
+    for (std::size_t row = kPast.at_once_rows; row < recording.rows() && time[row] - time[0] <= kPast.at_once_s;
+         ++row) {
       const double passed = time[row] - time[0], way = 0.5 * acceleration * passed * passed;
-      if (row < kPast.at_once_rows || std::abs(way) < kPast.at_once_counts * count) continue;
-      if (!(std::abs(acceleration) > clearest * count)) break;
-      clearest = count > 0 ? std::abs(acceleration) / count : kInfinity;
+      if (!(std::abs(way) > kPast.at_once_scatters * scatter)) continue;
+      clearest = scatter > 0 ? std::abs(acceleration) / scatter : kInfinity;
       share = (signal.values[row] - signal.values[0]) / way;
       break;
     }

@@ -36,8 +36,7 @@ class Asking {
  private:
   // Of each kind one question a group.
   void List() {
-    std::vector<const Statement*> by_gain;
-    for (const Statement& s : judgement_.statements) by_gain.push_back(&s);
+    std::vector<const Statement*> by_gain = Collect(judgement_.statements, [](const Statement& s) { return &s; });
     std::ranges::stable_sort(by_gain, std::greater(), [](const Statement* s) { return s->numbers.gain; });
     for (const Why why : {Why::kTogether, Why::kUnsure, Why::kOneLog, Why::kUnseen}) {
       std::set<int> groups;
@@ -100,10 +99,10 @@ class Asking {
       if (Has(found_.chosen->effects, use)) members = With(members, use);
     }
     const Candidate* first = nullptr;
-    std::vector<Explanation> never;  // told from the first one, by any log of these signals
+    const EffectUse* asked = nullptr;  // the first one
+    std::vector<Explanation> never;    // told from it, by any log of these signals
     for (const EffectUse& use : uses) {
-      if (!question.next.separates.empty() &&
-          AreOneMotion(*question.next.separates.front(), use, *found_.base->model, found_.logged)) {
+      if (asked && AreOneMotion(*asked, use, *found_.base->model, found_.logged)) {
         never.emplace_back(use);
         continue;
       }
@@ -116,6 +115,7 @@ class Asking {
         if (question.next.models.size() == 1 && first) question.behind = Gain(*fitted, *first);
         if (question.next.models.empty()) first = fitted;
       }
+      if (!asked) asked = &use;
       question.next.separates.emplace_back(use);
       question.next.models.push_back(*std::move(tried));
       if (question.next.models.size() == kMost) break;

@@ -89,14 +89,10 @@ def truth_of(label):
     return "; ".join(words(effect) for effect in label["effects"]) or "nothing"
 
 
-def logs_of_hardware(entry):
-    """None, where the data are not there."""
+def logs_of(entry):
+    """Of the repository or of hardware; none, where the data are not there, or a twin makes them."""
     data = ROOT.parent / "shared/data"
-    return sorted(log for pattern in entry.get("data", []) for log in data.glob(pattern))
-
-
-def can_make(entry):
-    return "twin" in entry or bool(entry.get("logs") or logs_of_hardware(entry))
+    return entry.get("logs") or sorted(log for pattern in entry.get("data", []) for log in data.glob(pattern))
 
 
 def make_entry(name, entry, folder):
@@ -105,7 +101,7 @@ def make_entry(name, entry, folder):
     if not (program / "gapscope").exists():
         fail(f"{program / 'gapscope'} is not there; --gallery runs it; build it with scripts/demo")
     with tempfile.TemporaryDirectory(dir=folder.parent) as temporary:
-        made, logs = pathlib.Path(temporary) / name, entry.get("logs") or logs_of_hardware(entry)
+        made, logs = pathlib.Path(temporary) / name, logs_of(entry)
         made.mkdir()
         truth = entry.get("truth") or entry.get("source")
         if "twin" in entry:
@@ -136,7 +132,7 @@ def gallery(pages, make):
             fail(f"--gallery {name}: no such entry of site/gallery.yaml, which has {', '.join(entries)}")
     for name, entry in entries.items():
         if make is not None and (name in make or not make) and not (kept / name).exists():
-            if can_make(entry):
+            if "twin" in entry or logs_of(entry):
                 print(f"site: diagnosing {name}", file=sys.stderr)
                 make_entry(name, entry, kept / name)
             else:

@@ -22,10 +22,11 @@ RunModel ModelOf(const Candidate& candidate) { return RunModelOf(*candidate.mode
 class Asking {
  public:
   Asking(const Workbench& bench, SearchResult& found, const Judgement& judgement)
-      : bench_(bench), found_(found), judgement_(judgement) {}
+      : bench_(bench), found_(found), judgement_(judgement) {
+    List();
+  }
 
   std::optional<OpenQuestion> Next() {
-    if (!std::exchange(listed_, true)) List();
     while (next_ < asked_.size()) {
       const auto& [why, of] = asked_[next_++];
       if (auto question = Ask(why, *of)) return question;
@@ -192,7 +193,6 @@ class Asking {
   const Workbench& bench_;
   SearchResult& found_;
   const Judgement& judgement_;
-  bool listed_ = false;
   std::vector<std::pair<Why, const Statement*>> asked_;
   std::size_t next_ = 0;
 };

@@ -10,7 +10,7 @@ namespace gapscope {
 namespace {
 
 // Whether the search ended before a fit of the use that its columns promise something of, beside the set's trials.
-bool WasNotReached(SearchResult& found, const EffectUse& use, std::vector<std::size_t> set) {
+bool WasNotReached(const SearchResult& found, const EffectUse& use, std::vector<std::size_t> set) {
   const ColumnTable& table = found.columns;
   const auto fitted = [&](const Candidate* candidate) { return Has(candidate->effects, use); };
   if (found.cut.empty() || std::ranges::any_of(found.ledger.All(), fitted)) return false;
@@ -23,7 +23,7 @@ bool WasNotReached(SearchResult& found, const EffectUse& use, std::vector<std::s
 
 }  // namespace
 
-void TellOthers(const Workbench& bench, SearchResult& found, Judgement* result) {
+void TellOthers(const Workbench& bench, const SearchResult& found, Judgement* result) {
   const ColumnTable& table = found.columns;
   if (!table.valid) return;  // nothing was looked at
   const std::vector<std::size_t> set = TrialsOf(found, found.chosen->effects);

@@ -7,7 +7,7 @@
 namespace gapscope {
 
 // Adds a statement for each that `result` has none of: absent, or unseen and why.
-void TellOthers(const Workbench& bench, SearchResult& found, Judgement* result);
+void TellOthers(const Workbench& bench, const SearchResult& found, Judgement* result);
 
 }  // namespace gapscope
 

@@ -342,7 +342,7 @@ class Searcher {
   // sizes at the base, which hides what partners are together with other parameters.
   std::vector<EffectUse> Shortlist(const Member& member) const {
     const Model& base = *result_.base->model;
-    std::vector<EffectUse> partners;
+    std::vector<EffectUse> shortlist;
     std::vector<std::pair<double, EffectUse>> ranked;
     for (const EffectUse& use : result_.uses) {
       if (Has(result_.chosen->effects, use)) continue;
@@ -351,15 +351,15 @@ class Searcher {
       const double held = one ? 1 : Imitated(result_.columns, member.use, use);
       if (held < kPolicy.imitates) continue;
       if (ArePartners(use, member.use, base)) {
-        partners.push_back(use);
+        shortlist.push_back(use);
       } else {
         ranked.emplace_back(-held, use);
       }
     }
     std::ranges::stable_sort(ranked, {}, [](const auto& one) { return one.first; });
     if (ranked.size() > kPolicy.rivals) ranked.resize(kPolicy.rivals);
-    for (const auto& [held, use] : ranked) partners.push_back(use);
-    return partners;
+    for (const auto& [held, use] : ranked) shortlist.push_back(use);
+    return shortlist;
   }
 
   Candidate* RefitRival(const Member& member, const EffectUse& use) {

@@ -71,6 +71,8 @@ Sentence SentenceOf(const std::vector<const Statement*>& members) {
   return sentence;
 }
 
+bool LeavesMuch(const Diagnosis& d) { return d.evidence.floors_left > kDiagnosePolicy.verdict.much_missing; }
+
 // What is open, and what the proposed log would tell of it.
 std::vector<std::string> OfTheQuestion(const NextExperiment& next) {
   using Why = NextExperiment::Why;
@@ -136,9 +138,7 @@ std::vector<Sentence> SentencesOf(const Diagnosis& d) {
   return sentences;
 }
 
-bool MuchRemains(const Diagnosis& d) {
-  return !d.effects.empty() && d.evidence.floors_left > kDiagnosePolicy.verdict.much_missing;
-}
+bool MuchRemains(const Diagnosis& d) { return !d.effects.empty() && LeavesMuch(d); }
 
 std::string GapInWindows(const Diagnosis& d) {
   return fmt::format(
@@ -178,8 +178,7 @@ std::vector<Part> PartsOf(const Remainder& remainder) {
 
 std::vector<std::string> NextSentences(const Diagnosis& d) {
   std::vector<std::string> sentences = OfTheQuestion(d.next);
-  const bool much_is_left = d.evidence.floors_left > kDiagnosePolicy.verdict.much_missing;
-  if (d.next.input_csv.empty() && much_is_left && !std::isfinite(d.remainder.not_repeatable)) {
+  if (d.next.input_csv.empty() && LeavesMuch(d) && !std::isfinite(d.remainder.not_repeatable)) {
     sentences.emplace_back(
         "No two of these logs have the same commands. Send those of one log again: only that tells how much of what is "
         "left no model could mend.");

@@ -23,11 +23,12 @@ class Judging {
 
   Judgement Make() {
     Judgement result;
+    const EffectSet searched = found_.chosen->effects;
     std::vector<Statement> dropped = Simplify();
     JudgeMembers(&result, &dropped);
-    Couple(&result);
-    JudgeComplements(&result);
-    TellRivals(bench_, found_, &result);
+    JudgeTogether(&result);
+    while (LeaveOutUnsure(&result, &dropped)) JudgeTogether(&result);
+    TellRivals(bench_, found_, found_.chosen->effects.size() < searched.size(), say_, &result);
     for (const Statement& s : dropped) {
       if (!result.Find(s.use)) result.statements.push_back(s);
     }
@@ -147,6 +148,31 @@ class Judging {
     if (!without) return all.end();
     evidence_.Choose(without);
     return least;
+  }
+
+  void JudgeTogether(Judgement* result) {
+    result->groups.clear();
+    Couple(result);
+    JudgeComplements(result);
+  }
+
+  // What is told is the set of the sure members, so that is what they are judged in: beside one that is not told, they
+  // could rest on it. The least likely one goes first, and the others are judged anew. False: all are sure, or none.
+  bool LeaveOutUnsure(Judgement* result, std::vector<Statement>* dropped) {
+    auto& all = result->statements;
+    const auto [least, most] = std::ranges::minmax_element(all, {}, &Statement::probability);
+    const double present = kDiagnosePolicy.probability.present;
+    if (all.empty() || least->probability >= present || most->probability < present) return false;
+    Candidate* without = found_.ledger.FindOrTry(Without(found_.chosen->effects, least->use), *found_.chosen);
+    if (!without) return false;
+    evidence_.Choose(without);
+    const auto member = std::ranges::find(found_.members, least->use, &Member::use);
+    least->rivals = member->rivals;
+    dropped->push_back(*least);
+    found_.members.erase(member);
+    all.erase(least);
+    for (Statement& s : all) s = Of(s.use);
+    return true;
   }
 
   // Evidence and probability from the numbers. Of several uses the likeliest one's prior counts.

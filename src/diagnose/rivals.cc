@@ -22,6 +22,22 @@ class Rivals {
     AddRicher();
   }
 
+  // What ties with a member beside others that have been left out since may have done their work: it is tried in the
+  // set that is told.
+  void AskAgain(const Say& say) {
+    const EffectSet& set = found_.chosen->effects;
+    for (Member& member : found_.members) {
+      for (Rival& rival : member.rivals) {
+        if (rival.behind > TieOf(member.gain)) continue;
+        say("trying " + rival.use.Text() + " for " + member.use.Text());
+        const Candidate* other = RefitInPlace(bench_, found_, {member.use}, rival.use, Effort::kTry);
+        rival.behind = other ? Gain(*other, *found_.chosen) : kInfinity;
+      }
+      const Candidate* without = found_.ledger.FindOrTry(Without(set, member.use), *found_.chosen);
+      if (without) member.gain = GainAboveNoise(*without, *found_.chosen);
+    }
+  }
+
  private:
   // As these logs and the base model have them.
   bool AreOne(const EffectUse& a, const EffectUse& b) const {
@@ -142,6 +158,10 @@ class Rivals {
 
 }  // namespace
 
-void TellRivals(const Workbench& bench, SearchResult& found, Judgement* result) { Rivals(bench, found, result).Tell(); }
+void TellRivals(const Workbench& bench, SearchResult& found, bool anew, const Say& say, Judgement* result) {
+  Rivals rivals(bench, found, result);
+  if (anew) rivals.AskAgain(say);
+  rivals.Tell();
+}
 
 }  // namespace gapscope

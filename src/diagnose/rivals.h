@@ -8,8 +8,8 @@ namespace gapscope {
 
 // Told together with a member of the final set, as likely: what costs as little in its place, what is one motion with
 // it in these logs, and a richer effect that would not show beyond it. The first statements of `result` are the
-// members', in their order.
-void TellRivals(const Workbench& bench, SearchResult& found, Judgement* result);
+// members', in their order. `anew`: the set is not the one that the search tried rivals in.
+void TellRivals(const Workbench& bench, SearchResult& found, bool anew, const Say& say, Judgement* result);
 
 }  // namespace gapscope
 

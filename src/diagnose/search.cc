@@ -17,11 +17,6 @@ namespace {
 
 constexpr const SearchPolicy& kPolicy = kDiagnosePolicy.search;
 
-// Of an effect, none below the noise.
-double GainAboveNoise(const Candidate& without, const Candidate& with) {
-  return LogCostAboveNoise(without.train_limbs) - LogCostAboveNoise(with.train_limbs);
-}
-
 // A set's cost with what each of its effects must gain; of sets that are at the noise alike, the cost itself decides.
 std::pair<double, double> Charged(const Candidate& candidate) {
   return {LogCostAboveNoise(candidate.train_limbs) + kPolicy.member * static_cast<double>(candidate.effects.size()),
@@ -410,7 +405,10 @@ class Searcher {
           result_.ledger.Continue(other, Effort::kFinish);
           ahead = Gain(*result_.chosen, *other);
         }
-        const double needed = richer ? kPolicy.simpler : simpler ? -kPolicy.simpler : kPolicy.exchange;
+        double needed = richer ? kPolicy.simpler : simpler ? -kPolicy.simpler : kPolicy.exchange;
+        // Of two that cost as little the less likely one gives way.
+        if (IsLessLikely(member.use, use, *result_.base->model)) needed = -kPolicy.tie;
+        if (IsLessLikely(use, member.use, *result_.base->model)) needed = kPolicy.tie;
         if (ahead > needed) {
           result_.chosen = other;
           result_.ledger.Continue(other, Effort::kFinish);
@@ -438,6 +436,10 @@ class Searcher {
 
 double Gain(const Candidate& without, const Candidate& with) {
   return LogCost(without.train_limbs) - LogCost(with.train_limbs);
+}
+
+double GainAboveNoise(const Candidate& without, const Candidate& with) {
+  return LogCostAboveNoise(without.train_limbs) - LogCostAboveNoise(with.train_limbs);
 }
 
 double FarBehind(const Candidate& chosen) { return chosen.train_cost * std::exp(kPolicy.far_behind); }

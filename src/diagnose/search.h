@@ -44,6 +44,8 @@ struct SearchResult {
 
 // What `with` has and `without` lacks gains: ln(cost without / cost with), limb by limb.
 double Gain(const Candidate& without, const Candidate& with);
+// The same; what lies below the noise counts as the noise.
+double GainAboveNoise(const Candidate& without, const Candidate& with);
 // The cost above which a set is so far behind the chosen one that it matters little how far.
 double FarBehind(const Candidate& chosen);
 

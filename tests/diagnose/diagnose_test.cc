@@ -63,6 +63,8 @@ Diagnosis DiagnoseLogs(const Logs& logs, DiagnoseOptions options = {}) {
   EXPECT_EQ(std::ranges::count(result.value().cut, "exchange"), 0);
   for (const Statement& there : result.value().statements) {
     if (there.answer != Answer::kPresent) continue;
+    // What is told rests on nothing that is not.
+    if (there.sets) EXPECT_EQ(there.sets->with.effects, result.value().model->effects());
     for (const Statement& s : result.value().statements)
       EXPECT_TRUE(s.use != there.use || s.answer == Answer::kPresent) << s.use.Text() << " is told as absent too";
   }

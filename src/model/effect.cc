@@ -341,6 +341,18 @@ const Effect& EffectOf(const EffectUse& use, const Rig& rig) {
   return *effect;
 }
 
+namespace {
+
+bool AreHinges(const std::vector<std::string>& joints, const Rig& rig) {
+  const mjModel& m = rig.compiled();
+  return std::ranges::all_of(joints, [&](const std::string& joint) {
+    const int j = mj_name2id(&m, mjOBJ_JOINT, joint.c_str());
+    return j >= 0 && m.jnt_type[j] == mjJNT_HINGE;
+  });
+}
+
+}  // namespace
+
 std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& rig, const ScaleTable& table) {
   const auto [effect_of, places] = Placed(use, rig);
   GS_CHECK(effect_of && "a valid effect use");
@@ -370,6 +382,8 @@ std::vector<PlacedParameter> PlacedParameters(const EffectUse& use, const Rig& r
                         .low = zero + p.low * scale,
                         .high = zero + p.high * scale,
                         .start = zero + p.start * scale};
+    if (p.reach_rad > 0 && AreHinges(places, rig))
+      out.low = std::min(out.low, zero - p.reach_rad), out.high = std::max(out.high, zero + p.reach_rad);
     if (p.voltage_only && !volts) out.low = out.high = out.start = out.neutral;
     for (const double trial : p.trials) out.trials.push_back(zero + trial * scale);
     placed.push_back(std::move(out));

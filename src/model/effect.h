@@ -57,9 +57,10 @@ struct EffectParameter {
   ScaleKind scale = ScaleKind::kOne;
   double neutral = 0;  // the effect does nothing here; in multiples of the scale, like all below
   double low = 0, high = 0;
-  std::vector<double> trials;                     // values to screen with; empty: it stays at `start`
-  double start = 0;                               // where a fit starts when nothing better is known
-  bool voltage_only = false;                      // acts on a voltage drive; else fixed at neutral
+  double reach_rad = 0;        // on hinges the bounds reach at least so far to both sides, however little the logs move
+  std::vector<double> trials;  // values to screen with; empty: it stays at `start`
+  double start = 0;            // where a fit starts when nothing better is known
+  bool voltage_only = false;   // acts on a voltage drive; else fixed at neutral
   Parameter::With with = Parameter::With::kNone;  // how it acts with the effect's first parameter
   bool takes_over =
       false;  // another start of a fit: all of the first parameter's torque, at the scale, made by this one

@@ -69,6 +69,12 @@ std::string Number(double value, ScaleKind kind) {
   return value == 0 || kind == ScaleKind::kOne ? text : std::string(text) + " " + ScaleText(kind);
 }
 
+std::string ReachOf(const EffectParameter& p) {
+  char text[60] = "";
+  if (p.reach_rad > 0) std::snprintf(text, sizeof text, ", on a hinge at least %g .. %g", -p.reach_rad, p.reach_rad);
+  return text;
+}
+
 std::string EffectsText() {
   std::string text;
   for (const Effect& effect : Catalogue()) {
@@ -84,7 +90,7 @@ std::string EffectsText() {
       const std::string unit = p.scale == ScaleKind::kCommand ? "V, A or N m" : p.unit;
       const std::string from = p.from_centre >= 0 ? "centre of mass + " : "";
       text += "| " + key + " | " + unit + " | " + from + Number(p.neutral, p.scale) + " | " + from +
-              Number(p.low, p.scale) + " .. " + Number(p.high, p.scale) + " |\n";
+              Number(p.low, p.scale) + " .. " + Number(p.high, p.scale) + ReachOf(p) + " |\n";
     }
     std::string told = "Shows as: " + effect.signature + ". Told apart by: " + effect.told_apart + ". Mistaken for: ";
     for (std::size_t i = 0; i < effect.partners.size(); ++i) told += (i ? ", " : "") + ("`" + effect.partners[i] + "`");

@@ -200,5 +200,17 @@ TEST(CatalogueTest, EveryEffectFindsAPlaceSomewhere) {
   }
 }
 
+// A cable hangs where it was mounted, however little the joint moved in the logs.
+TEST(CatalogueTest, ACablesRestReachesHalfATurn) {
+  const auto model = MakeModel(ShippedExperiment("qube"));
+  for (const double moved : {0.1, 2.0}) {
+    const auto placed = PlacedParameters({"cable_spring", "arm"}, *model->rig(), {{"arm", {.angle_rad = moved}}});
+    ASSERT_EQ(placed[1].key, "rest_rad");
+    EXPECT_DOUBLE_EQ(placed[1].high, std::max(3.2, 4 * moved));
+    EXPECT_DOUBLE_EQ(placed[1].low, -placed[1].high);
+    EXPECT_DOUBLE_EQ(placed[1].trials.back(), moved) << "trials stay where the logs are";
+  }
+}
+
 }  // namespace
 }  // namespace gapscope::testing

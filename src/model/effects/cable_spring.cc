@@ -23,6 +23,7 @@ Effect Effect_cable_spring() {
                .neutral = 0,
                .low = -4,
                .high = 4,
+               .reach_rad = 3.2,
                .trials = {-1, 0, 1},
                .start = 0,
                .with = Parameter::With::kRest},

@@ -50,9 +50,10 @@ class Identification(Keyed):
 
 @dataclass(frozen=True, eq=False)
 class InputDesign(Keyed, Waveform):
-    """An input for the next experiment: ``amplitude`` in ``unit``, and how near it comes to the rig's ``limits``."""
+    """An input for the next experiment: ``amplitude`` and ``offset`` (a constant beside the wave) in ``unit``."""
 
     schema: str
+    offset: float
 
 
 @dataclass(frozen=True, eq=False)

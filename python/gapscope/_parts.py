@@ -353,7 +353,10 @@ class Limit(Open):
 
 @dataclass(frozen=True)
 class Waveform(Open):
-    """An input: ``amplitude`` in ``unit``, frequencies in Hz, and how near it comes to the rig's ``limits``."""
+    """An input: ``amplitude`` in ``unit``, frequencies in Hz, and how near it comes to the rig's ``limits``.
+
+    ``mirrored``: the second half is the first one with its sign changed.
+    """
 
     shape: str
     amplitude: float
@@ -362,6 +365,7 @@ class Waveform(Open):
     low_hz: float
     high_hz: float
     seed: int
+    mirrored: bool
     limits: tuple[Limit, ...]
 
 

@@ -14,7 +14,8 @@ namespace {
 struct InputFlags {
   RigFlags rig;
   WaveShape shape = WaveShape::kChirp;
-  double low_hz = 0.1, high_hz = 5, period_s = 0.63, hold_s = 1;
+  double low_hz = 0.1, high_hz = 5, period_s = 0.63, hold_s = 1, offset = 0;
+  bool mirrored = false;
 };
 
 Error PassesLimits(const Rehearsal& rehearsal, const std::string& where, const std::string& cure) {
@@ -32,17 +33,20 @@ Error PassesLimits(const Rehearsal& rehearsal, const std::string& where, const s
 }
 
 Result<int> RunInput(const InputFlags& flags) {
-  GS_ASSIGN(const DesignRig rig, LoadRig(flags.rig));
+  GS_ASSIGN(DesignRig rig, LoadRig(flags.rig));
+  rig.rehearsal.offset = flags.offset;
   Waveform wave{.shape = flags.shape,
                 .duration_s = flags.rig.duration_s,
                 .low_hz = flags.low_hz,
                 .high_hz = flags.high_hz,
-                .seed = flags.rig.common.seed};
+                .seed = flags.rig.common.seed,
+                .mirrored = flags.mirrored};
   if (flags.shape == WaveShape::kSquare || flags.shape == WaveShape::kTriangle) wave.low_hz = 1 / flags.period_s;
   if (flags.shape == WaveShape::kSteps) wave.low_hz = 1 / (2 * flags.hold_s);
   GS_ASSIGN(const std::vector<double> unit_wave, SampleWaveform(wave, flags.rig.rate_hz));
   Simulator simulator(*rig.model, 0);
-  const std::vector<ModelAndValues> models = {{rig.model.get(), &simulator, rig.values}};
+  const LackedLoad lacks{.command = rig.driven, .value = flags.offset};
+  const std::vector<ModelAndValues> models = {{rig.model.get(), &simulator, rig.values, lacks}};
   double amplitude = flags.rig.amplitude;
   const double command_limit = CommandLimit(rig.experiment, rig.experiment.commands[rig.driven].actuator);
   if (amplitude == 0) {
@@ -56,7 +60,7 @@ Result<int> RunInput(const InputFlags& flags) {
   std::vector<double> values = unit_wave;
   for (double& value : values) value *= amplitude;
   GS_ASSIGN(Recording input, MakeInput(rig.experiment, rig.rehearsal, values));
-  Rehearsal rehearsal = Rehearse(*rig.model, simulator, std::move(input), rig.values);
+  Rehearsal rehearsal = Rehearse(*rig.model, simulator, std::move(input), rig.values, lacks);
   if (!(rehearsal.worst <= 1)) {
     const auto largest = LargestAmplitude(models, rig.rehearsal, unit_wave, amplitude, 1);
     return PassesLimits(rehearsal, flags.rig.experiment,
@@ -66,6 +70,7 @@ Result<int> RunInput(const InputFlags& flags) {
   const InputRun run{.info = {.seed = flags.rig.common.seed},
                      .wave = wave,
                      .amplitude = amplitude,
+                     .offset = flags.offset,
                      .unit = rig.unit,
                      .rehearsal = std::move(rehearsal)};
   Print(stdout, "{}", flags.rig.common.json ? JsonText(ToJson(run)) : ToTable(run));
@@ -107,7 +112,17 @@ Command InputCommand(const char* name, WaveShape shape, const char* what) {
   if (shape == WaveShape::kTriangle) flags->period_s = 10;
   return {.name = name,
           .what = what,
-          .options = Join({OptionsOf(flags->rig), ShapeOptions(*flags)}),
+          .options = Join({OptionsOf(flags->rig),
+                           ShapeOptions(*flags),
+                           {{.flag = "--offset",
+                             .value = &flags->offset,
+                             .unit = "the command's SI unit",
+                             .help = "A constant beside the wave, against a load that the nominal model lacks",
+                             .more = "It is taken to cancel that load: the nominal model is driven without it"},
+                            {.flag = "--mirror",
+                             .value = &flags->mirrored,
+                             .help = "The second half is the first one with its sign changed",
+                             .more = "What integrates its command then goes to both sides"}}}),
           .example = fmt::format("gapscope design {} models/flexjoint/experiment.yaml --out input.csv", name),
           .run = [flags] { return RunInput(*flags); }};
 }

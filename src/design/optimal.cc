@@ -48,6 +48,8 @@ Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<cons
       simulators.push_back(std::make_unique<Simulator>(*h->model, options.time_step_s));
       trials.push_back({h->model.get(), simulators.back().get(), h->values});
     }
+    // The base model lacks what the offset is against.
+    trials.front().lacks = {.command = driven, .value = options.rehearsal.offset};
     // One model after the other: most of them are content with what the one before allowed.
     double largest = highest;
     for (const auto& trial : trials) {
@@ -59,8 +61,8 @@ Result<std::vector<std::optional<InputScore>>> SizeInputs(const std::vector<cons
     std::vector<double> values = wave.value();
     for (double& value : values) value *= score.amplitude;
     auto input = MakeInput(experiment, options.rehearsal, values);
-    score.rehearsal =
-        Rehearse(*models.front()->model, *simulators.front(), std::move(input).value(), models.front()->values);
+    score.rehearsal = Rehearse(*models.front()->model, *simulators.front(), std::move(input).value(),
+                               models.front()->values, trials.front().lacks);
     sized[i] = std::move(score);
   });
   if (std::none_of(sized.begin(), sized.end(), [](const auto& s) { return s.has_value(); })) {
@@ -159,12 +161,21 @@ std::vector<LibraryInput> InputLibrary(double duration_s, double rate_hz) {
                     .high_hz = std::min(to, top),
                     .seed = 1};
   };
+  const auto mirrored = [](Waveform of) {
+    of.mirrored = true;
+    return of;
+  };
   return {
-      {wave(WaveShape::kChirp, 0.1, 10), 1},         {wave(WaveShape::kChirp, 0.1, 10), 0.25},
-      {wave(WaveShape::kMultisine, low, 3), 1},      {wave(WaveShape::kMultisine, low, 10), 1},
-      {wave(WaveShape::kSteps, 0.5, 0.5), 1},        {wave(WaveShape::kSteps, 2, 2), 1},
-      {wave(WaveShape::kSquare, 0.5, 0.5), 1},       {wave(WaveShape::kSquare, 1 / 0.63, 1 / 0.63), 1},
-      {wave(WaveShape::kTriangle, 2 * low, low), 1}, {wave(WaveShape::kTriangle, 2 * low, low), 0.25},
+      {wave(WaveShape::kChirp, 0.1, 10), 1},
+      {wave(WaveShape::kChirp, 0.1, 10), 0.25},
+      {wave(WaveShape::kMultisine, low, 3), 1},
+      {wave(WaveShape::kMultisine, low, 10), 1},
+      {wave(WaveShape::kSteps, 0.5, 0.5), 1},
+      {wave(WaveShape::kSteps, 2, 2), 1},
+      {mirrored(wave(WaveShape::kSquare, 0.5, 0.5)), 1},
+      {wave(WaveShape::kSquare, 1 / 0.63, 1 / 0.63), 1},
+      {mirrored(wave(WaveShape::kTriangle, 2 * low, low)), 1},
+      {wave(WaveShape::kTriangle, 2 * low, low), 0.25},
   };
 }
 
@@ -251,7 +262,9 @@ std::string CommandFor(const std::string& experiment, const RehearsalOptions& re
     default:
       text += fmt::format(" --period {:.6g}", 1 / w.low_hz);
   }
+  if (w.mirrored) text += " --mirror";
   if (!rehearsal.actuator.empty()) text += " --actuator " + rehearsal.actuator;
+  if (rehearsal.offset != 0) text += fmt::format(" --offset {:.6g}", rehearsal.offset);
   for (const auto& [flag, values] : {std::pair{"--value", &rehearsal.log_values}, {"--hold", &rehearsal.hold}}) {
     for (const auto& [name, value] : *values) text += fmt::format(" {} {}={:g}", flag, name, value);
   }

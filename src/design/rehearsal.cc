@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "src/core/collect.h"
 #include "src/core/names.h"
@@ -96,6 +98,7 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
     if (!spec.columns.empty()) command.column = spec.columns.front();
     if (c == driven) {
       command.values = values;
+      for (double& value : command.values) value += options.offset;
     } else {
       double constant = 0;
       if (const auto held = options.hold.find(spec.actuator); held != options.hold.end()) {
@@ -117,14 +120,21 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
   return input;
 }
 
-Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, const std::vector<double>& values) {
+Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, const std::vector<double>& values,
+                   const LackedLoad& lacks) {
   Rehearsal rehearsal{.recording = std::move(input)};
   Recording& recording = rehearsal.recording;
   const std::size_t signals = recording.measured.size();
   std::vector<double> predicted(recording.rows() * signals, kNaN);
+  const auto shift = [&](double by) {
+    if (by == 0) return;
+    for (double& value : recording.commands[lacks.command].values) value += by;
+  };
+  shift(-lacks.value);
   const bool simulated =
       simulator.SetParameters(values, recording) &&
       simulator.Run(recording, {0, recording.rows()}, AtRest(model), predicted).outcome == Outcome::kCompleted;
+  shift(lacks.value);
   for (std::size_t s = 0; s < signals; ++s) {
     for (std::size_t r = 0; r < recording.rows(); ++r) recording.measured[s].values[r] = predicted[r * signals + s];
   }
@@ -163,7 +173,7 @@ Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const
     double worst = 0;
     for (const auto& one : models) {
       GS_ASSIGN(Recording input, MakeInput(one.model->experiment(), options, values));
-      worst = std::max(worst, Rehearse(*one.model, *one.simulator, std::move(input), one.values).worst);
+      worst = std::max(worst, Rehearse(*one.model, *one.simulator, std::move(input), one.values, one.lacks).worst);
       if (worst > 4 * margin) break;
     }
     return worst;
@@ -187,6 +197,59 @@ Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const
                  .where = "limits",
                  .actual = fmt::format("down to {:.3g}", amplitude)};
   return safe;
+}
+
+Result<double> HoldingCommand(const std::vector<ModelAndValues>& models, const RehearsalOptions& options,
+                              double duration_s) {
+  constexpr double kStays = 0.1, kHeld = 0.01, kFirst = 0.02;  // shares of the limits
+  constexpr int kSteps = 10;
+  const ModelAndValues& first = models.front();
+  const Experiment& experiment = first.model->experiment();
+  GS_ASSIGN(const std::size_t driven, DrivenCommand(experiment, options));
+  const double most = CommandLimit(experiment, experiment.commands[driven].actuator);
+  const std::vector<double> rest(static_cast<std::size_t>(duration_s * options.rate_hz) + 1, 0.0);
+  const auto rehearse = [&](const ModelAndValues& on, double command) -> Result<Rehearsal> {
+    RehearsalOptions held = options;
+    held.offset = command;
+    GS_ASSIGN(Recording input, MakeInput(on.model->experiment(), held, rest));
+    return Rehearse(*on.model, *on.simulator, std::move(input), on.values);
+  };
+  const auto worst = [&](double command) -> Result<double> {
+    double most_of_all = 0;
+    for (const ModelAndValues& on : models) {
+      GS_ASSIGN(const Rehearsal rehearsal, rehearse(on, command));
+      most_of_all = std::max(most_of_all, rehearsal.worst);
+    }
+    return most_of_all;
+  };
+  // Where the angle that is farthest off at the end stands, as a share of its limit.
+  std::string farthest;
+  const auto drift = [&](double command) -> Result<double> {
+    GS_ASSIGN(const Rehearsal rehearsal, rehearse(first, command));
+    double share = 0;
+    for (const Limit& limit : experiment.limits) {
+      if (!(limit.position > 0) || (!farthest.empty() && limit.joint != farthest)) continue;
+      for (const auto& measured : rehearsal.recording.measured) {
+        if (measured.spec.signal != kPrefix + limit.joint + " angle") continue;
+        const double end = measured.values.back() / limit.position;
+        if (std::isfinite(end) && std::abs(end) > std::abs(share)) share = end;
+      }
+    }
+    return share;
+  };
+  GS_ASSIGN(const double alone, worst(0));
+  if (!(most > 0) || alone <= kStays) return 0.0;
+  GS_ASSIGN(double before, drift(0));
+  double command_before = 0, command = kFirst * most;
+  for (int step = 0; step < kSteps && std::abs(before) > kHeld; ++step) {
+    GS_ASSIGN(const double now, drift(command));
+    const double slope = (now - before) / (command - command_before);
+    if (!(std::abs(slope) > 0)) return 0.0;
+    command_before = std::exchange(command, std::clamp(command - now / slope, -most, most));
+    before = now;
+  }
+  GS_ASSIGN(const double held, worst(command_before));
+  return held < 0.5 * alone ? command_before : 0.0;
 }
 
 std::string InputCsv(const Experiment& experiment, const Rehearsal& rehearsal) {

@@ -22,6 +22,13 @@ struct RehearsalOptions {
   std::map<std::string, double> hold;        // other commands, SI; else the experiment's default, else zero
   std::map<std::string, double> log_values;  // numbers that a log would bring; else the experiment's default
   double rate_hz = 500;
+  double offset = 0;  // of the driven command, SI: a constant beside the input, against what drives the rig off
+};
+
+// A constant part of a command that a load takes which a model lacks: the model is driven by the rest.
+struct LackedLoad {
+  std::size_t command = 0;
+  double value = 0;
 };
 
 // One limited quantity over a simulated input.
@@ -36,7 +43,8 @@ struct Rehearsal {
   double worst = 0;               // largest reached / limit; infinity after a divergence
 };
 
-// A recording without measurements (NaN) that drives `options.actuator` by `values`, SI, `options.rate_hz` a second.
+// A recording without measurements (NaN) that drives `options.actuator` by `values` and the offset, SI,
+// `options.rate_hz` a second.
 // Errors: no such actuator, a log value without a number.
 Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions& options,
                             const std::vector<double>& values);
@@ -44,7 +52,8 @@ Result<Recording> MakeInput(const Experiment& experiment, const RehearsalOptions
 Result<std::size_t> DrivenCommand(const Experiment& experiment, const RehearsalOptions& options);
 
 // Simulates from rest at the model's initial pose. `model` was built from an experiment of WithLimitSignals.
-Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, const std::vector<double>& values);
+Rehearsal Rehearse(const Model& model, Simulator& simulator, Recording input, const std::vector<double>& values,
+                   const LackedLoad& lacks = {});
 
 // The largest amplitude of `unit_wave`, at most `highest`, at which no limit is passed by more than `margin` times
 // itself (0.9: a tenth is kept free) for any of the models. Errors: the limits are passed at every amplitude.
@@ -52,9 +61,15 @@ struct ModelAndValues {
   const Model* model = nullptr;
   Simulator* simulator = nullptr;
   std::vector<double> values;
+  LackedLoad lacks = {};
 };
 Result<double> LargestAmplitude(const std::vector<ModelAndValues>& models, const RehearsalOptions& options,
                                 const std::vector<double>& unit_wave, double highest, double margin);
+
+// The constant command that keeps the models where they begin for so long, against what drives them off: a bias, a
+// cable, gravity. Found on the first one. 0: they stay by themselves, or it would not keep all of them.
+Result<double> HoldingCommand(const std::vector<ModelAndValues>& models, const RehearsalOptions& options,
+                              double duration_s);
 
 // The command limit of the driven actuator; 0: none is stated.
 double CommandLimit(const Experiment& experiment, const std::string& actuator);

@@ -60,6 +60,16 @@ std::vector<double> Steps(const Waveform& wave, std::size_t rows, double rate_hz
   return values;
 }
 
+Result<std::vector<double>> Mirrored(Waveform wave, std::size_t rows, double rate_hz) {
+  wave.mirrored = false;
+  wave.duration_s /= 2;
+  GS_ASSIGN(std::vector<double> values, SampleWaveform(wave, rate_hz));
+  const std::size_t half = values.size();
+  values.resize(rows);
+  for (std::size_t k = half; k < rows; ++k) values[k] = k - half + 1 < half ? -values[k - half + 1] : 0;
+  return values;
+}
+
 }  // namespace
 
 template <>
@@ -97,6 +107,7 @@ Result<std::vector<double>> SampleWaveform(const Waveform& wave, double rate_hz)
   if (wave.shape == WaveShape::kMultisine && wave.high_hz < wave.low_hz)
     return Error{.what = "the band of the multisine is empty", .where = "--low-hz, --high-hz"};
   const std::size_t rows = static_cast<std::size_t>(std::floor(wave.duration_s * rate_hz + 1e-9)) + 1;
+  if (wave.mirrored) return Mirrored(wave, rows, rate_hz);
   switch (wave.shape) {
     case WaveShape::kMultisine:
       return Multisine(wave, rows, rate_hz);

@@ -22,6 +22,8 @@ struct Waveform {
                         // 1 / (2 low_hz); triangle, square: 1 / period
   double high_hz = 5;   // chirp: end; multisine: highest line; else unused
   std::uint64_t seed = 0;  // steps: levels
+  bool mirrored = false;   // the second half is the first one with its sign changed: what integrates its command goes
+                           // to both sides
 };
 
 // Chirp: sin(2 pi (f0 t + (f1 - f0) t^2 / (2 T))), linear. Triangle: up first. Multisine: up to 24 lines, evenly spaced

@@ -110,6 +110,13 @@ Result<NextExperiment> Design(const OpenQuestion& question, double duration_s, c
     GS_ASSIGN(ResultModel built, BuildRunModel(rig, next.models[i], "the next experiment", bench.scales));
     rivals.push_back({.name = NameOf(next.separates[i]), .model = built.model, .values = std::move(built.values)});
   }
+  std::vector<std::unique_ptr<Simulator>> simulators;
+  std::vector<ModelAndValues> drifting;
+  for (const Hypothesis& rival : rivals) {
+    simulators.push_back(std::make_unique<Simulator>(*rival.model, bench.time_step_s));
+    drifting.push_back({rival.model.get(), simulators.back().get(), rival.values});
+  }
+  GS_ASSIGN(options.rehearsal.offset, HoldingCommand(drifting, options.rehearsal, duration_s));
   const Hypothesis nominal{.name = "nominal", .model = bare, .values = bare->Nominal()};
   GS_ASSIGN(const OptimalDesign design, DesignForRivals(nominal, rivals, options, bench.pool));
   const InputScore& best = design.inputs.front();

@@ -15,20 +15,22 @@ using nlohmann::ordered_json;
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 std::string BandText(const Waveform& wave) {
+  const char* mirrored = wave.mirrored ? ", mirrored" : "";
   switch (wave.shape) {
     case WaveShape::kChirp:
     case WaveShape::kMultisine:
-      return fmt::format("{} {:.3g} to {:.3g} Hz", NameOf(wave.shape), wave.low_hz, wave.high_hz);
+      return fmt::format("{} {:.3g} to {:.3g} Hz{}", NameOf(wave.shape), wave.low_hz, wave.high_hz, mirrored);
     case WaveShape::kSteps:
-      return fmt::format("steps held for about {:.3g} s", 1 / (2 * wave.low_hz));
+      return fmt::format("steps held for about {:.3g} s{}", 1 / (2 * wave.low_hz), mirrored);
     default:
-      return fmt::format("{}, period {:.3g} s", NameOf(wave.shape), 1 / wave.low_hz);
+      return fmt::format("{}, period {:.3g} s{}", NameOf(wave.shape), 1 / wave.low_hz, mirrored);
   }
 }
 
 ordered_json WaveJson(const Waveform& wave, double amplitude, const std::string& unit) {
-  return {{"shape", NameOf(wave.shape)}, {"amplitude", amplitude},  {"unit", unit},     {"duration_s", wave.duration_s},
-          {"low_hz", wave.low_hz},       {"high_hz", wave.high_hz}, {"seed", wave.seed}};
+  return {
+      {"shape", NameOf(wave.shape)}, {"amplitude", amplitude},  {"unit", unit},      {"duration_s", wave.duration_s},
+      {"low_hz", wave.low_hz},       {"high_hz", wave.high_hz}, {"seed", wave.seed}, {"mirrored", wave.mirrored}};
 }
 
 ordered_json ExtremesJson(const Rehearsal& rehearsal) {
@@ -142,6 +144,7 @@ std::string ToTable(const InputRun& run) { return RehearsalTable(run.wave, run.a
 ordered_json ToJson(const InputRun& run) {
   ordered_json json = {{"schema", "gapscope.design.input/1"}};
   json.update(WaveJson(run.wave, run.amplitude, run.unit));
+  json["offset"] = run.offset;
   json["limits"] = ExtremesJson(run.rehearsal);
   json["versions"] = JsonVersions(run.info);
   return json;

@@ -33,7 +33,7 @@ std::string TrimmedNumber(double value, int decimals);
 struct InputRun {
   RunInfo info;
   Waveform wave;
-  double amplitude = 0;  // of the command, in `unit`
+  double amplitude = 0, offset = 0;  // of the command, in `unit`
   std::string unit;
   Rehearsal rehearsal;
 };

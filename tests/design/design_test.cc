@@ -74,6 +74,35 @@ TEST(RehearsalTest, TorqueLimitOfAStepIsTheServosStiffness) {
   EXPECT_LE(amplitude.value(), 119.6 / 157.1451 * 1.15);
 }
 
+// Against a bias the motor has to give that torque at standstill: R / kt volts a newton metre. The nominal model, which
+// has no bias, is driven without it.
+TEST(RehearsalTest, AConstantCommandHoldsTheRigAgainstABias) {
+  const Rig rig = Load("qube");
+  constexpr double kBias_n_m = 1e-4;
+  const EffectUse bias{"torque_bias", "arm"};
+  const auto model = Model::Build(rig.model->rig(), {bias}, {{"arm", {.torque_n_m = 0.01, .angle_rad = 1}}});
+  ASSERT_TRUE(model.ok()) << model.error().Text();
+  std::vector<double> values = model.value()->Nominal();
+  values[static_cast<std::size_t>(model.value()->IndexOf("torque_bias@arm.torque_n_m"))] = kBias_n_m;
+  Simulator simulator(*model.value(), 0), nominal(*rig.model, 0);
+  RehearsalOptions options{.rate_hz = 200};
+  const auto held = HoldingCommand({{model.value().get(), &simulator, values}}, options, 8);
+  ASSERT_TRUE(held.ok()) << held.error().Text();
+  EXPECT_NEAR(held.value(), -kBias_n_m * 8.4 / 0.042, 1e-4);
+  const auto none = HoldingCommand({{rig.model.get(), &nominal, rig.model->Nominal()}}, options, 8);
+  ASSERT_TRUE(none.ok());
+  EXPECT_EQ(none.value(), 0);
+
+  options.offset = held.value();
+  const auto input = MakeInput(rig.experiment, options, std::vector<double>(1601, 0.0));
+  ASSERT_TRUE(input.ok());
+  const Rehearsal of_nominal =
+      Rehearse(*rig.model, nominal, input.value(), rig.model->Nominal(), {.command = 0, .value = options.offset});
+  EXPECT_EQ(of_nominal.extremes[0].reached, std::abs(options.offset));
+  EXPECT_LT(of_nominal.extremes[1].reached, 1e-9);
+  EXPECT_LT(Rehearse(*model.value(), simulator, input.value(), values).extremes[1].reached, 0.02);
+}
+
 TEST(RehearsalTest, CsvIsALogOfTheExperiment) {
   const Rig rig = Load("flexjoint");
   Simulator simulator(*rig.model, 0);

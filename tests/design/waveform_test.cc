@@ -42,6 +42,22 @@ TEST(WaveformTest, TriangleHasConstantSlope) {
   EXPECT_NEAR(values.value()[150], -1, 1e-9);
 }
 
+TEST(WaveformTest, AMirroredOneGoesBack) {
+  Waveform wave{.shape = WaveShape::kTriangle, .duration_s = 4, .low_hz = 0.5};
+  const auto once = SampleWaveform(wave, 100);
+  wave.duration_s = 8, wave.mirrored = true;
+  const auto both = SampleWaveform(wave, 100);
+  ASSERT_TRUE(once.ok() && both.ok());
+  ASSERT_EQ(both.value().size(), 801u);
+  double sum = 0;
+  for (std::size_t k = 0; k <= 400; ++k) {
+    EXPECT_EQ(both.value()[k], once.value()[k]) << k;
+    EXPECT_NEAR(both.value()[400 + k], -once.value()[k], 1e-9) << k;
+  }
+  for (const double value : both.value()) sum += value;
+  EXPECT_NEAR(sum, 0, 1e-9);
+}
+
 // Past the fade-in only multiples of 1 / duration inside the band hold power.
 TEST(WaveformTest, MultisineKeepsItsBand) {
   const double duration = 20, rate = 100;

@@ -223,12 +223,11 @@ Result<double> HoldingCommand(const std::vector<ModelAndValues>& models, const R
     return most_of_all;
   };
   // Where the angle that is farthest off at the end stands, as a share of its limit.
-  std::string farthest;
   const auto drift = [&](double command) -> Result<double> {
     GS_ASSIGN(const Rehearsal rehearsal, rehearse(first, command));
     double share = 0;
     for (const Limit& limit : experiment.limits) {
-      if (!(limit.position > 0) || (!farthest.empty() && limit.joint != farthest)) continue;
+      if (!(limit.position > 0)) continue;
       for (const auto& measured : rehearsal.recording.measured) {
         if (measured.spec.signal != kPrefix + limit.joint + " angle") continue;
         const double end = measured.values.back() / limit.position;

@@ -23,12 +23,12 @@ class Judging {
 
   Judgement Make() {
     Judgement result;
-    const EffectSet searched = found_.chosen->effects;
+    const std::size_t searched = found_.chosen->effects.size();
     std::vector<Statement> dropped = Simplify();
     JudgeMembers(&result, &dropped);
     JudgeTogether(&result);
     while (LeaveOutUnsure(&result, &dropped)) JudgeTogether(&result);
-    TellRivals(bench_, found_, found_.chosen->effects.size() < searched.size(), say_, &result);
+    TellRivals(bench_, found_, found_.chosen->effects.size() < searched, say_, &result);
     for (const Statement& s : dropped) {
       if (!result.Find(s.use)) result.statements.push_back(s);
     }
@@ -144,10 +144,14 @@ class Judging {
   std::vector<Statement>::iterator TakeOutSpare(std::vector<Statement>& all) {
     const auto least = LeastLikelySpare(all);
     if (least == all.end() || (found_.members.size() < 2 && !IsUnconfirmed(least->numbers))) return all.end();
-    Candidate* without = found_.ledger.FindOrTry(Without(found_.chosen->effects, least->use), *found_.chosen);
-    if (!without) return all.end();
-    evidence_.Choose(without);
-    return least;
+    return ChooseWithout(least->use) ? least : all.end();
+  }
+
+  // False: the set without it cannot be built or simulated.
+  bool ChooseWithout(const EffectUse& use) {
+    Candidate* without = found_.ledger.FindOrTry(Without(found_.chosen->effects, use), *found_.chosen);
+    if (without) evidence_.Choose(without);
+    return without != nullptr;
   }
 
   void JudgeTogether(Judgement* result) {
@@ -163,9 +167,7 @@ class Judging {
     const auto [least, most] = std::ranges::minmax_element(all, {}, &Statement::probability);
     const double present = kDiagnosePolicy.probability.present;
     if (all.empty() || least->probability >= present || most->probability < present) return false;
-    Candidate* without = found_.ledger.FindOrTry(Without(found_.chosen->effects, least->use), *found_.chosen);
-    if (!without) return false;
-    evidence_.Choose(without);
+    if (!ChooseWithout(least->use)) return false;
     const auto member = std::ranges::find(found_.members, least->use, &Member::use);
     least->rivals = member->rivals;
     dropped->push_back(*least);

@@ -8,6 +8,20 @@
 
 namespace gapscope {
 
+namespace {
+
+// At an end stop the stop bears the torque.
+constexpr double kNearStop = 0.02;  // of the joint's range: stops give way, and angles have noise
+
+bool AtStop(const mjModel& model, int joint, const Samples::Motion& motion) {
+  if (!model.jnt_limited[joint]) return false;
+  const double low = model.jnt_range[2 * joint], high = model.jnt_range[2 * joint + 1];
+  const double near = kNearStop * (high - low);
+  return motion.lowest < low + near || motion.highest > high - near;
+}
+
+}  // namespace
+
 Motions MotionsOf(const std::vector<const Samples*>& logs, const std::vector<Guess>& guesses, const Pairing& p,
                   const Scalings& s, double half_width_s) {
   Motions motions(p.joints.size());
@@ -15,8 +29,10 @@ Motions MotionsOf(const std::vector<const Samples*>& logs, const std::vector<Gue
     if (p.positions[j].column < 0) continue;
     const double factor = s.positions[j].factor, add = s.positions[j].add;
     for (const Samples* log : logs) {
-      for (const auto& m : log->MotionOf(guesses[p.positions[j].column].column, half_width_s))
-        motions[j].push_back({factor * m.value + add, factor * m.slope, factor * m.curvature});
+      for (const auto& m : log->MotionOf(guesses[p.positions[j].column].column, half_width_s)) {
+        const auto [lowest, highest] = std::minmax({factor * m.lowest + add, factor * m.highest + add});
+        motions[j].push_back({factor * m.value + add, factor * m.slope, factor * m.curvature, lowest, highest});
+      }
     }
   }
   return motions;
@@ -34,16 +50,19 @@ std::vector<std::vector<double>> TorquesOf(const mjModel& model, const Pairing& 
     bool known = true;
     for (std::size_t j = 0; j < p.joints.size(); ++j) {
       if (motions[j].empty()) continue;
-      const auto& [q, v, a] = motions[j][k];
+      const Samples::Motion& m = motions[j][k];
       const int joint = p.joints[j].joint;
-      known = known && std::isfinite(q + v + a);
-      data->qpos[model.jnt_qposadr[joint]] = q;
-      data->qvel[model.jnt_dofadr[joint]] = v;
-      data->qacc[model.jnt_dofadr[joint]] = a;
+      known = known && std::isfinite(m.value + m.slope + m.curvature);
+      data->qpos[model.jnt_qposadr[joint]] = m.value;
+      data->qvel[model.jnt_dofadr[joint]] = m.slope;
+      data->qacc[model.jnt_dofadr[joint]] = m.curvature;
     }
     if (known) mj_inverse(free.get(), data.get());
-    for (std::size_t j = 0; j < p.joints.size(); ++j)
-      torques[j].push_back(known ? data->qfrc_inverse[model.jnt_dofadr[p.joints[j].joint]] : kNaN);
+    for (std::size_t j = 0; j < p.joints.size(); ++j) {
+      const int joint = p.joints[j].joint;
+      const bool borne = !motions[j].empty() && AtStop(model, joint, motions[j][k]);
+      torques[j].push_back(known && !borne ? data->qfrc_inverse[model.jnt_dofadr[joint]] : kNaN);
+    }
   }
   return torques;
 }

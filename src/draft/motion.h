@@ -21,8 +21,8 @@ inline constexpr double kLatest_s = 0.08, kLagStep_s = 0.004;
 Motions MotionsOf(const std::vector<const Samples*>& logs, const std::vector<Guess>& guesses, const Pairing& pairing,
                   const Scalings& scalings, double half_width_s = kHalfWidth_s);
 
-// Torque at each joint that the motion takes, at every sampled row; NaN where the motion is not known. Unmeasured
-// joints stand still.
+// Torque at each joint that the motion takes, at every sampled row; NaN where the motion is not known, or
+// the joint is at an end of its range. Unmeasured joints stand still.
 std::vector<std::vector<double>> TorquesOf(const mjModel& model, const Pairing& pairing, const Motions& motions);
 
 }  // namespace gapscope

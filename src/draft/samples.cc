@@ -111,11 +111,13 @@ std::vector<Samples::Motion> Samples::MotionOf(std::size_t column, double half_w
   std::vector<Motion> motion;
   for (const std::size_t row : rows_) {
     Sums s;
+    double lowest = kInfinity, highest = -kInfinity;
     const bool inside = row >= near && row + near < count;
     for (std::size_t i = row - std::min(row, near); inside && i <= row + near; ++i) {
       const double t = timeline_.time_s[i] - timeline_.time_s[row], y = At(column, i);
       s.t0 += 1, s.t1 += t, s.t2 += t * t, s.t3 += t * t * t, s.t4 += t * t * t * t;
       s.y0 += y, s.y1 += t * y, s.y2 += t * t * y;
+      lowest = std::min(lowest, y), highest = std::max(highest, y);
     }
     // y = a + b t + c t^2 by Cramer's rule.
     const auto det = [](double a, double b, double c, double d, double e, double f, double g, double h, double i) {
@@ -124,7 +126,9 @@ std::vector<Samples::Motion> Samples::MotionOf(std::size_t column, double half_w
     const double d = det(s.t0, s.t1, s.t2, s.t1, s.t2, s.t3, s.t2, s.t3, s.t4);
     motion.push_back({.value = det(s.y0, s.t1, s.t2, s.y1, s.t2, s.t3, s.y2, s.t3, s.t4) / d,
                       .slope = det(s.t0, s.y0, s.t2, s.t1, s.y1, s.t3, s.t2, s.y2, s.t4) / d,
-                      .curvature = 2 * det(s.t0, s.t1, s.y0, s.t1, s.t2, s.y1, s.t2, s.t3, s.y2) / d});
+                      .curvature = 2 * det(s.t0, s.t1, s.y0, s.t1, s.t2, s.y1, s.t2, s.t3, s.y2) / d,
+                      .lowest = lowest,
+                      .highest = highest});
   }
   return motion;
 }

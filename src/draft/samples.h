@@ -42,9 +42,10 @@ class Samples {
   bool whole_numbers(std::size_t column) const { return whole_[column]; }
   // Lags of both signs up to 0.3 s.
   Following Follow(std::size_t leader, std::size_t follower) const;
-  // Second derivative of a parabola through the rows around each sampled one, with value and slope.
+  // A parabola through the rows around each sampled one: value, slope and second derivative in its middle, and how low
+  // and high those rows are.
   struct Motion {
-    double value, slope, curvature;
+    double value, slope, curvature, lowest, highest;
   };
   std::vector<Motion> MotionOf(std::size_t column, double half_width_s) const;
 

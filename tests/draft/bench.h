@@ -45,6 +45,7 @@ struct Motion {
 struct MoveOptions {
   int rows = 2500;
   double gravity_n_m = 0;
+  double stop_rad = 1e9;  // on both sides, hard and without rebound
 };
 
 // kInertia q'' = kp (target held from row to row - q) - kd q' - gravity sin q, by small steps.
@@ -59,6 +60,7 @@ inline Motion Move(std::size_t joint, double kp, double kd, const MoveOptions& o
     for (int i = 0; i < kParts; ++i) {
       w += kStep_s / kParts * (kp * (u - q) - kd * w - options.gravity_n_m * std::sin(q)) / kInertia;
       q += kStep_s / kParts * w;
+      if (std::abs(q) > options.stop_rad) q = std::copysign(options.stop_rad, q), w = 0;
     }
   }
   return m;

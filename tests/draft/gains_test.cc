@@ -60,6 +60,19 @@ TEST_F(GainsTest, OfATorqueWithGravityAreSure) {
   EXPECT_FALSE(IsUnsure("gains")) << text_;
 }
 
+// A joint that runs into its stops is borne by them there: those rows say nothing of the servo.
+TEST_F(GainsTest, AreOfTheMotionBetweenTheStops) {
+  const Motion m = Move(0, kGainsKp, kGainsKd, {.gravity_n_m = 0.981, .stop_rad = 0.35});
+  const Experiment e = Drafted(
+      "<mujoco><compiler angle=\"radian\"/><worldbody><body><joint name=\"hip\" axis=\"0 1 0\" limited=\"true\" "
+      "range=\"-0.35 0.35\"/><inertial pos=\"0 0 -0.1\" mass=\"1\" diaginertia=\"0.01 0.01 0.01\"/></body>"
+      "</worldbody></mujoco>",
+      {{"time", m.time_s}, {"q_des", m.target}, {"q", m.angle}});
+  ASSERT_NE(Added(e, "hip"), nullptr) << text_;
+  EXPECT_NEAR(Added(e, "hip")->kp, kGainsKp, kWithin * kGainsKp);
+  EXPECT_FALSE(IsUnsure("gains")) << text_;
+}
+
 TEST_F(GainsTest, AreMadeUpAndMarkedWhereTheLogDoesNotTell) {
   // The joint follows at once: no torque that moves it can be told.
   Motion m = Move(0, kGainsKp, kGainsKd);
